@@ -1,0 +1,31 @@
+"""The errors that saltus raises for a user to act on; each message says what was wrong, where, and what would be right."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class SaltusError(Exception):
+    """The base of every error that saltus raises on purpose; the command line prints it as one sentence."""
+
+
+class ParameterError(SaltusError, ValueError):
+    """A value, a name or a combination of them that has no meaning for the system."""
+
+
+class TraceError(SaltusError, TypeError):
+    """A model uses an operation that cannot be expanded in a Taylor series."""
+
+
+class MotionError(SaltusError, RuntimeError):
+    """A motion cannot be continued: it is not unique, an impact has no solution, or the numbers overflow."""
+
+
+def near(name: str, known: Iterable[str]) -> str:
+    """The end of a sentence about an unknown `name`: the near names, or else all that are known."""
+    known = sorted(known)
+    close = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
+    if close:
+        return "did you mean " + " or ".join(repr(c) for c in close) + "?"
+    return "known here: " + (", ".join(known) if known else "none")

@@ -1,0 +1,38 @@
+"""What moves: the contract of a model, the models, their loads and impact laws, and the system that joins them.
+
+Every class here is frozen, dimensionless and pure; `UnitCell` converts from and to SI. Nothing here integrates anything.
+"""
+
+from saltus.systems.impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
+from saltus.systems.load import Channel, Load
+from saltus.systems.metainterface import Metainterface
+from saltus.systems.model import Model
+from saltus.systems.registry import IMPACTS, MODELS, register
+from saltus.systems.rocking_block import RockingBlock
+from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
+from saltus.systems.system import System
+from saltus.systems.two_layer import TwoLayer
+from saltus.systems.wall_oscillator import WallOscillator
+
+__all__ = [
+    "IMPACTS",
+    "MODELS",
+    "Channel",
+    "Constant",
+    "EnergyRestitution",
+    "Harmonic",
+    "ImpactLaw",
+    "InelasticImpact",
+    "Load",
+    "Metainterface",
+    "Model",
+    "Record",
+    "RockingBlock",
+    "Signal",
+    "Sum",
+    "System",
+    "TwoLayer",
+    "VelocityReduction",
+    "WallOscillator",
+    "register",
+]

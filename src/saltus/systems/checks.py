@@ -1,0 +1,58 @@
+"""Checks of parameter values, shared by every model, load and impact law."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+from typing import Any
+
+from saltus.errors import ParameterError
+
+
+def check_number(
+    name: str,
+    value: Any,
+    *,
+    above: float | None = None,
+    below: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    unit: str = "",
+) -> None:
+    """Refuse what is not a finite real number within the stated bounds.
+
+    Raises:
+        ParameterError: with the name, the range and the value, and a hint where degrees look likely.
+    """
+    wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise ParameterError(f"{name} must be {wanted.replace('lie in', 'a number in')}, got {value!r}")
+    inside = (
+        math.isfinite(value)
+        and (above is None or value > above)
+        and (below is None or value < below)
+        and (at_least is None or value >= at_least)
+        and (at_most is None or value <= at_most)
+    )
+    if not inside:
+        hint = " (degrees?)" if unit == "rad" and math.isfinite(value) and 3.2 < abs(value) <= 360 else ""
+        raise ParameterError(f"{name} must {wanted}, got {value!r}{hint}")
+
+
+def _range_text(
+    above: float | None, below: float | None, at_least: float | None, at_most: float | None
+) -> str:
+    if above is None and at_least is None and below is None and at_most is None:
+        return "be finite"
+    left = (
+        f"({_short(above)}" if above is not None else "(-inf" if at_least is None else f"[{_short(at_least)}"
+    )
+    right = f"{_short(below)})" if below is not None else "inf)" if at_most is None else f"{_short(at_most)}]"
+    return f"lie in {left}, {right}"
+
+
+def _short(value: float) -> str:
+    for multiple, text in ((math.pi, "pi"), (math.pi / 2, "pi/2"), (-math.pi, "-pi"), (2 * math.pi, "2 pi")):
+        if value == multiple:
+            return text
+    return f"{value:g}"

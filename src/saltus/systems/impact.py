@@ -1,0 +1,93 @@
+"""Impact laws: the velocity just after contact, and the energy that goes with it (paper, section "Impact scenarios")."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.systems.checks import check_number
+from saltus.systems.load import Load
+from saltus.systems.model import Model
+
+
+class ImpactLaw:
+    """What turns the velocity before an impact into the one after it, v-, s -> v+, s+, for any model.
+
+    `velocity_after` gives the velocity carried through the contact; a wall turns it round itself. It is traced, and may
+    use comparisons within NumPy's where, and maximum and minimum, besides what an acceleration may use.
+    """
+
+    __slots__ = ()
+
+    def velocity_after(
+        self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
+    ) -> Any:
+        """The velocity after an impact at `t` from `side` to `next_side`."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True)
+class VelocityReduction(ImpactLaw):
+    """v+ = e v-, with a constant factor e in [0, 1] (paper, `vel_red`)."""
+
+    e: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_number("VelocityReduction.e", self.e, at_least=0.0, at_most=1.0)
+
+    def velocity_after(
+        self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
+    ) -> Any:
+        """e v-."""
+        return self.e * velocity
+
+
+@dataclass(frozen=True, slots=True)
+class EnergyRestitution(ImpactLaw):
+    """T+ = r T-, with T the model's kinetic energy, ground velocities and unequal masses included (`rest_def`, errata 5, 26).
+
+    T on the new side is a quadratic a v^2 + b v + c in the velocity; its root of the sign of v- is taken, and of two such the
+    one on the same side of the minimum -b / (2 a) as v-, which is v+ = v- at r = 1. Where no root has the sign of v- (small v-
+    on a moving ground) the motion cannot go on, and is refused with the instant and the numbers.
+    """
+
+    r: float
+
+    def __post_init__(self) -> None:
+        check_number("EnergyRestitution.r", self.r, above=0.0)
+
+    def velocity_after(
+        self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
+    ) -> Any:
+        """The root v+ of a v^2 + b v + c = r T(v-); NaN where there is none."""
+
+        def after(v: Any) -> Any:
+            return model.kinetic_energy(t, model.contact, v, next_side, load)
+
+        c = after(0.0)
+        a = (after(1.0) + after(-1.0)) / 2 - c
+        b = (after(1.0) - after(-1.0)) / 2
+        energy = self.r * model.kinetic_energy(t, model.contact, velocity, side, load)
+        lowest = -b / (2 * a)
+        reach = np.sqrt((energy - c) / a + lowest * lowest)
+        branch = np.where(velocity > lowest, 1.0, -1.0)
+        nearer, other = lowest + branch * reach, lowest - branch * reach
+        through = np.where(nearer * velocity > 0, nearer, other)
+        return np.where(through * velocity > 0, through, np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class InelasticImpact(ImpactLaw):
+    """Frictionless, perfectly inelastic contact: the momentum balance of the layer that is not hit fixes v+ (errata 25).
+
+    For the metainterface v+ = -cos(2 beta0) v- from lower to upper and -cos(2 beta0)/(1+m) v- back, whatever the ground does, for
+    45 to 135 degrees; outside that range both contacts act and the motion stops. For the rocking block Housner's factor.
+    """
+
+    def velocity_after(
+        self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
+    ) -> Any:
+        """The model's `inelastic_factor` times v-."""
+        return model.inelastic_factor(side) * velocity

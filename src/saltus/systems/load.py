@@ -1,0 +1,114 @@
+"""Loads: a base frequency and one signal for each channel that a model reads."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from saltus.errors import ParameterError
+from saltus.systems.checks import check_number
+from saltus.systems.signals import Record, Signal, as_signal
+
+
+class Channel:
+    """One channel of a load at work: `channel(t)` is its value, `.velocity(t)` and `.acceleration(t)` its derivatives.
+
+    `t` is the dimensionless time tau: a number, an array, or the symbolic time of a traced model.
+    """
+
+    __slots__ = ("_frequency", "_signal")
+
+    def __init__(self, signal: Signal | None, frequency: Any) -> None:
+        self._signal, self._frequency = signal, frequency
+
+    def _derivative(self, t: Any, order: int) -> Any:
+        return 0.0 if self._signal is None else self._signal.derivative(t, self._frequency, order)
+
+    def __call__(self, t: Any) -> Any:
+        """The value at `t` (a force, or a displacement of the ground)."""
+        return self._derivative(t, 0)
+
+    def velocity(self, t: Any) -> Any:
+        """The first derivative at `t`."""
+        return self._derivative(t, 1)
+
+    def acceleration(self, t: Any) -> Any:
+        """The second derivative at `t`."""
+        return self._derivative(t, 2)
+
+
+class Load:
+    """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H), vertical=-0.5)`.
+
+    Each channel is a number, a `Harmonic`, a `Record`, or a sum of them; a channel that is not named is 0. Channels that
+    begin with `ground_` are displacements of the ground (zeta, nu), all others forces. Frozen.
+
+    The paper's loads: (i) `loadpatha`, `Load(frequency=W, horizontal=Harmonic(amplitude=H), vertical=-0.5)`;
+    (ii) `loadpathaa`, `Load(frequency=W, ground_horizontal=Harmonic(amplitude=z), vertical=-0.5)`; (iii) `loadpathb`,
+    `Load(frequency=W, horizontal=Harmonic(amplitude=H), vertical=Harmonic(mean=-0.5, amplitude=0.25, phase=pi/2))`.
+
+    Args:
+        frequency: the base angular frequency Omega > 0 of every harmonic, or None for a load without a period.
+
+    Raises:
+        ParameterError: a harmonic without a frequency, a frequency without a harmonic, a record of the wrong quantity.
+    """
+
+    __slots__ = ("channels", "frequency")
+
+    frequency: float | None
+    channels: dict[str, Signal]
+
+    def __init__(self, *, frequency: float | None = None, **channels: Signal | float) -> None:
+        signals = {name: as_signal(value, f"load.{name}") for name, value in channels.items()}
+        if frequency is not None:
+            check_number("load.frequency", frequency, above=0.0)
+        for name, signal in signals.items():
+            if signal.periodic and frequency is None:
+                raise ParameterError(f"load.{name} is harmonic, so load.frequency must be given")
+            _check_records(name, signal)
+        object.__setattr__(self, "frequency", frequency)
+        object.__setattr__(self, "channels", signals)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError("a Load is frozen; system.with_({'load.frequency': ...}) makes a changed copy")
+
+    def __getattr__(self, name: str) -> Channel:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return Channel(self.channels.get(name), self.frequency)
+
+    def __reduce__(self) -> Any:
+        return _rebuild, (self.frequency, self.channels)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Load) and (self.frequency, self.channels) == (
+            other.frequency,
+            other.channels,
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.frequency, tuple(sorted(self.channels.items(), key=lambda item: item[0]))))
+
+    def __repr__(self) -> str:
+        parts = [] if self.frequency is None else [f"frequency={self.frequency!r}"]
+        for name, signal in self.channels.items():
+            value = getattr(signal, "value", signal) if type(signal).__name__ == "Constant" else signal
+            parts.append(f"{name}={value!r}")
+        return f"Load({', '.join(parts)})"
+
+    @property
+    def period(self) -> float | None:
+        """The forcing period 2 pi / Omega, or None for a load without a base frequency."""
+        return None if self.frequency is None else 2.0 * math.pi / self.frequency
+
+
+def _rebuild(frequency: float | None, channels: dict[str, Signal]) -> Load:
+    return Load(frequency=frequency, **channels)
+
+
+def _check_records(name: str, signal: Signal) -> None:
+    for term in getattr(signal, "terms", (signal,)):
+        if isinstance(term, Record) and (term.quantity == "force") == name.startswith("ground_"):
+            wanted = "displacement, velocity or acceleration" if name.startswith("ground_") else "force"
+            raise ParameterError(f"load.{name} takes a record of {wanted}, got quantity={term.quantity!r}")

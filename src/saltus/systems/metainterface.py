@@ -1,0 +1,153 @@
+"""The reduced metainterface: one layer open at a time, no bouncing (paper, `gov_eqn_theta_long`)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.systems.checks import check_number
+from saltus.systems.load import Load
+from saltus.systems.model import Model
+from saltus.systems.signals import Constant, Signal, scaled
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Metainterface(Model):
+    """The single-degree-of-freedom metainterface (paper, `gov_eqn_theta_long`).
+
+    theta > 0 is the lower layer open (side s = +1, P = 1), theta < 0 the upper one (s = -1, P = 0); dimensionless time tau:
+
+        (1+m)^P theta'' + c^P C theta' + k^P theta =
+              sin(abs(theta) + beta0) [(1+h)^P H - (1+m)^P zeta'']
+          + s cos(abs(theta) + beta0) [(1+v)^P V - (1+m)^P nu'']
+
+    The channels `horizontal`, `vertical` are H, V on the upper mass, `lower_horizontal`, `lower_vertical` are h H, v V on the
+    lower one, `ground_horizontal`, `ground_vertical` the displacements zeta, nu of the ground.
+
+    Margins, which a motion may be asked to stop at: `line_limit`, pi - beta0 - abs(theta) (`line_cond`, n = 1);
+    `kinematic_limit`, 2 (pi - beta0) - abs(theta), where the slider closes again (errata 20); `reaction`, the closed
+    layer's reaction with the sign that keeps it closed (errata 21): with the lower layer open
+    -R2 = cos(2 beta0 + theta) theta'' - sin(2 beta0 + theta) theta'^2 + (H - zeta'') sin beta0 - (V - nu'') cos beta0 >= 0, with the
+    upper one open R1 = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2
+    - [(1+h) H - (1+m) zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one of `eomnl`.
+    """
+
+    beta0: float  # angle of the undeformed cell, rad, in (0, pi)
+    damping: float = 0.0  # C, at least 0
+    stiffness_ratio: float = 1.0  # k = K1 / K2, above 0
+    mass_ratio: float = 0.0  # m = M1 / M2, at least 0
+    dissipation_ratio: float = 1.0  # c = C1 / C2, at least 0
+    smoothing: float | None = None  # B of `smoothing`: sgn(theta) becomes tanh(B theta / 2); None is exact
+
+    channels: ClassVar[tuple[str, ...]] = (
+        "horizontal",
+        "vertical",
+        "lower_horizontal",
+        "lower_vertical",
+        "ground_horizontal",
+        "ground_vertical",
+    )
+
+    def __post_init__(self) -> None:
+        check_number("beta0", self.beta0, above=0.0, below=math.pi, unit="rad")
+        check_number("damping", self.damping, at_least=0.0)
+        check_number("stiffness_ratio", self.stiffness_ratio, above=0.0)
+        check_number("mass_ratio", self.mass_ratio, at_least=0.0)
+        check_number("dissipation_ratio", self.dissipation_ratio, at_least=0.0)
+        if self.smoothing is not None:
+            check_number("smoothing", self.smoothing, above=0.0)
+            if (self.stiffness_ratio, self.mass_ratio, self.dissipation_ratio) != (1.0, 0.0, 1.0):
+                raise ParameterError(
+                    "smoothing is defined for symmetric layers only (stiffness_ratio 1, mass_ratio 0, dissipation_ratio 1); "
+                    "drop it to compute the exact motion of unequal ones"
+                )
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """Two sides, or none where the sign is smoothed."""
+        return (1, -1) if self.smoothing is None else ()
+
+    def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """theta'' of `gov_eqn_theta_long`, with `side` for sgn(theta), or with `smoothing` in its place."""
+        if self.smoothing is None:
+            lower, sign, size = (1 + side) / 2, side, abs(theta)
+        else:
+            lower, sign = 0.0, np.tanh(theta * (self.smoothing / 2))
+            size = theta * sign
+        mass = 1 + self.mass_ratio * lower
+        damping = self.damping * (1 + (self.dissipation_ratio - 1) * lower)
+        stiffness = 1 + (self.stiffness_ratio - 1) * lower
+        across, along = self._forces(t, lower, load)
+        push = np.sin(size + self.beta0) * across + sign * (np.cos(size + self.beta0) * along)
+        return (push - damping * velocity - stiffness * theta) / mass
+
+    def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """T / K2 of `kin_eng` with the other layer closed (errata 5): with x' = zeta' + theta' sin(beta0 + abs(theta)),
+        y' = nu' + s theta' cos(beta0 + abs(theta)), (1+m)/2 (x'^2 + y'^2) on the lower layer and
+        m/2 (zeta'^2 + nu'^2) + (x'^2 + y'^2)/2 on the upper one.
+        """
+        lower, m = (1 + side) / 2, self.mass_ratio
+        zeta, nu = load.ground_horizontal.velocity(t), load.ground_vertical.velocity(t)
+        angle = self.beta0 + side * theta
+        x = zeta + velocity * np.sin(angle)
+        y = nu + side * velocity * np.cos(angle)
+        return (1 + m * lower) / 2 * (x * x + y * y) + m * (1 - lower) / 2 * (zeta * zeta + nu * nu)
+
+    def inelastic_factor(self, side: Any) -> Any:
+        """-cos(2 beta0) from lower to upper, -cos(2 beta0) / (1+m) back, and 0 outside 45 to 135 degrees (errata 25)."""
+        mass = 1 + self.mass_ratio * (1 - side) / 2
+        return np.maximum(-np.cos(2 * self.beta0), 0.0) / mass
+
+    def margins(
+        self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load
+    ) -> dict[str, Any]:
+        """The straight line, the kinematic limit and the closed layer's reaction; all positive in a motion of the mechanism."""
+        opening = math.pi - self.beta0
+        size = abs(theta) if self.smoothing is not None else side * theta
+        margins = {"line_limit": opening - size, "kinematic_limit": 2 * opening - size}
+        if self.smoothing is None:
+            across, along = self._forces(t, (1 - side) / 2, load)
+            angle = 2 * self.beta0 + size
+            margins["reaction"] = (
+                side * (np.cos(angle) * acceleration)
+                - np.sin(angle) * (velocity * velocity)
+                + side * across * np.sin(self.beta0)
+                - along * np.cos(self.beta0)
+            )
+        return margins
+
+    def mirror(self, load: Load) -> Load | None:
+        """The load with every horizontal channel reversed, for k = c = 1+m = 1+h = 1+v (errata 18); None otherwise."""
+        ratio = 1 + self.mass_ratio
+        channels = load.channels
+        same = self.stiffness_ratio == ratio and self.dissipation_ratio == ratio
+        if not same or not all(
+            _proportional(channels.get(f"lower_{name}"), channels.get(name), self.mass_ratio)
+            for name in ("horizontal", "vertical")
+        ):
+            return None
+        reversed_ = {n: scaled(s, -1.0) if n.endswith("horizontal") else s for n, s in channels.items()}
+        return Load(frequency=load.frequency, **reversed_)
+
+    def _forces(self, t: Any, lower: Any, load: Load) -> tuple[Any, Any]:
+        """[(1+h)^P H - (1+m)^P zeta''] and [(1+v)^P V - (1+m)^P nu''], with P = `lower`."""
+        mass = 1 + self.mass_ratio * lower
+        across = (
+            load.horizontal(t)
+            + lower * load.lower_horizontal(t)
+            - mass * load.ground_horizontal.acceleration(t)
+        )
+        along = (
+            load.vertical(t) + lower * load.lower_vertical(t) - mass * load.ground_vertical.acceleration(t)
+        )
+        return across, along
+
+
+def _proportional(lower: Signal | None, upper: Signal | None, ratio: float) -> bool:
+    """Whether the lower load is `ratio` times the upper one; a channel that is not named is 0."""
+    zero = Constant(0.0)
+    return (lower or zero) == (scaled(upper, ratio) if upper and ratio else zero)

@@ -1,0 +1,79 @@
+"""The contract of a model: a hybrid automaton written once, as plain Python."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from saltus.errors import ParameterError
+
+
+class Model:
+    """A piecewise-smooth oscillator. Subclass it as a frozen, keyword-only dataclass of numbers and give it:
+
+    1. `coordinates`, the names of its degrees of freedom, and `channels`, the load channels that it reads;
+    2. `sides`, the numbers of its smooth modes: (+1, -1) for a motion that crosses the contact, (+1,) for a wall that
+       turns it back, () for a motion without contact;
+    3. `acceleration`, an expression of numbers, NumPy functions, load channels and `abs` of the coordinate. It is traced
+       once with symbols into a Taylor recurrence, so it may not branch on the state: use `side`, which is fixed along an
+       arc (the sign of the coordinate is ambiguous at contact);
+    4. `gap`, positive inside a mode: its first zero, reached from above, ends the mode; and `contact`, the coordinate
+       at which the gaps of all sides are zero. While the system rests there the accelerations at contact decide when it leaves;
+    5. `reset`, the next side and the velocity after an impact, given the impact law;
+    6. optionally `mirror` (the symmetry that maps motions to motions), `kinetic_energy` (for impact laws that need
+       it), `margins` (what must stay positive) and `stops` (the margins that end a motion unasked).
+
+    Every argument may be a number, an array or a symbol. With one degree of freedom the coordinate, the velocity and the
+    acceleration are scalars; with several they are tuples.
+    """
+
+    __slots__ = ()
+
+    coordinates: ClassVar[tuple[str, ...]] = ("theta",)
+    channels: ClassVar[tuple[str, ...]] = ()
+    stops: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """The numbers of the smooth modes."""
+        return (1, -1)
+
+    @property
+    def contact(self) -> Any:
+        """The coordinate at contact."""
+        return 0.0
+
+    def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
+        """The acceleration on the given side."""
+        raise NotImplementedError(
+            f"{type(self).__name__} must define acceleration(t, theta, velocity, side, load)"
+        )
+
+    def gap(self, theta: Any, side: Any) -> Any:
+        """What is positive inside the mode `side` and zero at contact."""
+        return side * theta
+
+    def reset(self, t: Any, velocity: Any, side: Any, load: Any, impact: Any) -> tuple[Any, Any]:
+        """The next side and the velocity after an impact that ends the mode `side` with `velocity`."""
+        return -side, impact.velocity_after(self, t, velocity, side, -side, load)
+
+    def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
+        """The kinetic energy; impact laws that conserve or restitute energy need it."""
+        raise ParameterError(
+            f"{type(self).__name__} defines no kinetic_energy, so this impact law cannot be used with it"
+        )
+
+    def inelastic_factor(self, side: Any) -> Any:
+        """The velocity factor of a frictionless, perfectly inelastic impact that ends the mode `side`."""
+        raise ParameterError(
+            f"{type(self).__name__} defines no inelastic_factor, so InelasticImpact() cannot be used with it"
+        )
+
+    def margins(
+        self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Any
+    ) -> dict[str, Any]:
+        """Named quantities that must stay positive for the motion to be one of the real mechanism."""
+        return {}
+
+    def mirror(self, load: Any) -> Any:
+        """The load under which -theta moves as theta does under `load`, or None where there is no such symmetry."""
+        return None

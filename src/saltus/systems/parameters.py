@@ -1,0 +1,90 @@
+"""Dotted paths: every number of a system has one name, read, changed, listed and replaced by symbols through it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from saltus.errors import ParameterError, near
+from saltus.systems.load import Load
+from saltus.systems.signals import Constant, Sum, as_signal
+
+
+def children(node: Any) -> dict[str, Any]:
+    """The named parts of a system's node: fields of a dataclass, channels of a load, terms of a sum."""
+    if isinstance(node, Load):
+        return {"frequency": node.frequency, **node.channels}
+    if isinstance(node, Sum):
+        return {str(i): term for i, term in enumerate(node.terms)}
+    if dataclasses.is_dataclass(node):
+        return {f.name: getattr(node, f.name) for f in dataclasses.fields(node)}
+    return {}
+
+
+def is_number(value: Any) -> bool:
+    """Whether a leaf is a number of the system (a switch or a name is part of its structure)."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def numbers(node: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
+    """Every number below `node` with its dotted path; a `Constant` is the path of its channel."""
+    if isinstance(node, Constant):
+        yield prefix, node.value
+        return
+    for name, child in children(node).items():
+        path = f"{prefix}.{name}" if prefix else name
+        if is_number(child):
+            yield path, float(child)
+        else:
+            yield from numbers(child, path)
+
+
+def replace(node: Any, path: str, value: Any, whole: str = "") -> Any:
+    """A copy of `node` with the part at the dotted `path` replaced; numbers become constant signals where signals stand.
+
+    Raises:
+        ParameterError: a path that leads nowhere, with the near ones; a value that the part refuses.
+    """
+    whole = whole or path
+    head, _, rest = path.partition(".")
+    parts = children(node)
+    new_channel = isinstance(node, Load) and head.isidentifier() and not rest
+    if head not in parts and not new_channel:
+        raise ParameterError(
+            f"no parameter {whole!r}: {type(node).__name__} has no {head!r}; {near(head, parts)}"
+        )
+    part = replace(parts[head], rest, value, whole) if rest else value
+    if isinstance(node, Load):
+        return Load(**{**parts, head: part})
+    if isinstance(node, Sum):
+        return Sum(tuple(as_signal(part, whole) if name == head else p for name, p in parts.items()))
+    return dataclasses.replace(node, **{head: part})
+
+
+def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -> Any:
+    """A twin of `node` with every number replaced by `leaf(path, number)`, built without its checks: for tracing."""
+    twin: Any
+    if isinstance(node, Constant):
+        twin = object.__new__(Constant)
+        object.__setattr__(twin, "value", leaf(prefix, node.value))
+        return twin
+    parts = {}
+    for name, child in children(node).items():
+        path = f"{prefix}.{name}" if prefix else name
+        parts[name] = leaf(path, float(child)) if is_number(child) else substitute(child, leaf, path)
+    if isinstance(node, Load):
+        twin = object.__new__(Load)
+        object.__setattr__(twin, "frequency", parts.pop("frequency"))
+        object.__setattr__(twin, "channels", parts)
+        return twin
+    if isinstance(node, Sum):
+        twin = object.__new__(Sum)
+        object.__setattr__(twin, "terms", tuple(parts.values()))
+        return twin
+    if not dataclasses.is_dataclass(node):
+        return node
+    twin = object.__new__(type(node))
+    for name, part in parts.items():
+        object.__setattr__(twin, name, part)
+    return twin

@@ -1,0 +1,52 @@
+"""The types that a file may name: models, impact laws and signals. A new one is one new file and one line here."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from saltus.errors import ParameterError, near
+from saltus.systems.impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
+from saltus.systems.metainterface import Metainterface
+from saltus.systems.model import Model
+from saltus.systems.rocking_block import RockingBlock
+from saltus.systems.two_layer import TwoLayer
+from saltus.systems.wall_oscillator import WallOscillator
+
+MODELS: dict[str, type[Model]] = {
+    "Metainterface": Metainterface,
+    "RockingBlock": RockingBlock,
+    "TwoLayer": TwoLayer,
+    "WallOscillator": WallOscillator,
+}
+IMPACTS: dict[str, type[ImpactLaw]] = {
+    "VelocityReduction": VelocityReduction,
+    "EnergyRestitution": EnergyRestitution,
+    "InelasticImpact": InelasticImpact,
+}
+
+T = TypeVar("T", type[Model], type[ImpactLaw])
+
+
+def register(cls: T) -> T:
+    """Make a model or an impact law of your own known by its class name, so that files can name it; use as a decorator."""
+    if issubclass(cls, Model):
+        MODELS[cls.__name__] = cls
+    elif issubclass(cls, ImpactLaw):
+        IMPACTS[cls.__name__] = cls
+    else:
+        raise ParameterError(f"register takes a Model or an ImpactLaw, got {cls!r}")
+    return cls
+
+
+def find_model(name: str) -> type[Model]:
+    """The model class called `name`."""
+    if name not in MODELS:
+        raise ParameterError(f"model.type {name!r} is not a known model; {near(name, MODELS)}")
+    return MODELS[name]
+
+
+def find_impact(name: str) -> type[ImpactLaw]:
+    """The impact law called `name`."""
+    if name not in IMPACTS:
+        raise ParameterError(f"impact.type {name!r} is not a known impact law; {near(name, IMPACTS)}")
+    return IMPACTS[name]

@@ -1,0 +1,64 @@
+"""The rigid rocking block (paper, appendix A)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from saltus.systems.checks import check_number
+from saltus.systems.load import Load
+from saltus.systems.model import Model
+from saltus.systems.signals import scaled
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RockingBlock(Model):
+    """A rigid block rocking about its base corners, without bouncing (paper, `EOM&Rock`).
+
+    With time scaled by p = sqrt(3 g / (4 R)), zeta = 3 U_h / (4 R) and nu = 3 U_v / (4 R), on the side s = +1 or -1:
+
+        theta'' = -zeta'' cos(alpha - abs(theta)) - s (1 + nu'') sin(alpha - abs(theta))
+
+    A motion stops, `overturned`, when the block lies on its side: pi/2 - abs(theta) = 0.
+    """
+
+    alpha: float  # slenderness angle, rad, in (0, pi/2)
+
+    channels: ClassVar[tuple[str, ...]] = ("ground_horizontal", "ground_vertical")
+    stops: ClassVar[tuple[str, ...]] = ("overturned",)
+
+    def __post_init__(self) -> None:
+        check_number("alpha", self.alpha, above=0.0, below=math.pi / 2, unit="rad")
+
+    def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """theta'' of `EOM&Rock` in the time p t."""
+        tilt = self.alpha - abs(theta)
+        weight = 1 + load.ground_vertical.acceleration(t)
+        return -(load.ground_horizontal.acceleration(t) * np.cos(tilt)) - side * (weight * np.sin(tilt))
+
+    def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """T / ((4/3) M R^2 p^2) = [theta'^2 + (4/3)(zeta'^2 + nu'^2)
+        + 2 theta' (zeta' cos(alpha - abs(theta)) + s nu' sin(alpha - abs(theta)))] / 2 (errata 10).
+        """
+        zeta, nu = load.ground_horizontal.velocity(t), load.ground_vertical.velocity(t)
+        tilt = self.alpha - side * theta
+        ground = zeta * np.cos(tilt) + side * nu * np.sin(tilt)
+        return (velocity * velocity + (zeta * zeta + nu * nu) * (4 / 3) + 2 * velocity * ground) / 2
+
+    def inelastic_factor(self, side: Any) -> Any:
+        """1 - (3/2) sin(alpha)^2: angular momentum about the new corner is conserved (Housner 1963); not below 0."""
+        return np.maximum(1 - 1.5 * np.sin(self.alpha) * np.sin(self.alpha), 0.0)
+
+    def margins(
+        self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load
+    ) -> dict[str, Any]:
+        """`overturned`: pi/2 - abs(theta)."""
+        return {"overturned": math.pi / 2 - side * theta}
+
+    def mirror(self, load: Load) -> Load:
+        """The load with the horizontal ground motion reversed."""
+        reversed_ = {n: scaled(s, -1.0) if n == "ground_horizontal" else s for n, s in load.channels.items()}
+        return Load(frequency=load.frequency, **reversed_)

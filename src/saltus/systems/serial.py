@@ -1,0 +1,71 @@
+"""Systems as plain dictionaries, and back: the form in which they are written to files."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from saltus.errors import ParameterError, near
+from saltus.systems.load import Load
+from saltus.systems.registry import find_impact, find_model
+from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
+
+
+def to_dict(part: Any) -> Any:
+    """A model or impact law with its `type`, a load with its channels, a signal by its fields."""
+    if isinstance(part, Load):
+        frequency = {} if part.frequency is None else {"frequency": part.frequency}
+        return {**frequency, **{name: to_dict(signal) for name, signal in part.channels.items()}}
+    if isinstance(part, Constant):
+        return part.value
+    if isinstance(part, Sum):
+        return [to_dict(term) for term in part.terms]
+    if isinstance(part, Record):
+        fields = {"time": part.time.tolist(), "value": part.value.tolist(), "quantity": part.quantity}
+        return {**fields, "scale": part.scale, **({"source": part.source} if part.source else {})}
+    fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(part)}
+    fields = {name: value for name, value in fields.items() if value is not None}
+    return fields if isinstance(part, Signal) else {"type": type(part).__name__, **fields}
+
+
+def from_dict(kind: str, data: Any) -> Any:
+    """The inverse of `to_dict` for `kind` one of model, load, impact."""
+    if not isinstance(data, Mapping):
+        raise ParameterError(f"{kind} must be a table of keys and values, got {data!r}")
+    if kind == "load":
+        channels = {
+            name: read_signal(value, f"load.{name}") for name, value in data.items() if name != "frequency"
+        }
+        return Load(frequency=data.get("frequency"), **channels)
+    fields = dict(data)
+    if "type" not in fields:
+        raise ParameterError(
+            f"{kind}.type is missing: it names the {kind}, such as 'Metainterface' or 'VelocityReduction'"
+        )
+    name = fields.pop("type")
+    cls: Any = find_model(name) if kind == "model" else find_impact(name)
+    return build(cls, fields, kind)
+
+
+def read_signal(data: Any, where: str) -> Signal | float:
+    """A number, a table of a `Harmonic` or a `Record`, or a list of them (their sum)."""
+    if isinstance(data, (list, tuple)):
+        terms = [read_signal(item, f"{where}.{i}") for i, item in enumerate(data)]
+        return Sum(tuple(t if isinstance(t, Signal) else Constant(t) for t in terms))
+    if isinstance(data, Mapping):
+        return build(Record if "time" in data or "value" in data else Harmonic, dict(data), where)
+    return data
+
+
+def build(cls: type, fields: dict[str, Any], where: str) -> Any:
+    """An instance of a dataclass from a table, with unknown and missing keys named."""
+    known = {f.name: f for f in dataclasses.fields(cls)}
+    for name in fields:
+        if name not in known:
+            raise ParameterError(f"unknown key {where}.{name} of {cls.__name__}; {near(name, known)}")
+    for name, f in known.items():
+        needed = f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
+        if needed and name not in fields:
+            raise ParameterError(f"{where}.{name} is missing; {cls.__name__} needs it")
+    return cls(**fields)

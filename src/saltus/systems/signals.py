@@ -1,0 +1,238 @@
+"""Signals: how one load channel varies with time. A constant, a harmonic, a sum of them, or a record of samples.
+
+A signal answers one question, its value or its first or second derivative at a time `t`, for numbers, for arrays,
+and for the symbolic time with which a model is traced (an object with the methods `phase` and `record`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.systems.checks import check_number
+
+
+class Signal:
+    """What a load channel carries.
+
+    Contract: `derivative(t, frequency, order)` returns the value (order 0), or its first or second derivative with
+    respect to the dimensionless time tau, at `t` (number, array or symbolic time); `frequency` is the base frequency
+    Omega of the load, or None.
+    """
+
+    __slots__ = ()
+    periodic: ClassVar[bool] = False  # needs a base frequency
+
+    def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
+        """The `order`-th derivative with respect to tau at `t`."""
+        raise NotImplementedError
+
+    def __add__(self, other: Signal | float) -> Sum:
+        return Sum(terms=(*_terms(self), *_terms(other)))
+
+    def __radd__(self, other: float) -> Sum:
+        return Sum(terms=(*_terms(other), *_terms(self)))
+
+
+@dataclass(frozen=True, slots=True)
+class Constant(Signal):
+    """A channel that does not vary: value."""
+
+    value: float
+
+    def __post_init__(self) -> None:
+        check_number("a constant load", self.value)
+
+    def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
+        """`value`, or 0 for a derivative."""
+        return self.value if order == 0 else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Harmonic(Signal):
+    """mean + amplitude sin(order Omega tau + phase), with the base frequency Omega of the load and an integer order.
+
+    `Harmonic(amplitude=H)` is load (i) of the paper (`loadpatha`); a phase of pi/2 makes it a cosine (`loadpathb`).
+    """
+
+    amplitude: float
+    mean: float = 0.0
+    phase: float = 0.0  # rad
+    order: int = 1
+    periodic: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        for name in ("amplitude", "mean", "phase"):
+            check_number(f"Harmonic.{name}", getattr(self, name))
+        if isinstance(self.order, bool) or self.order != int(self.order) or self.order < 1:
+            raise ParameterError(f"Harmonic.order must be a whole number of at least 1, got {self.order!r}")
+
+    def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
+        """mean + amplitude sin(...), or -- differentiated -- amplitude (order Omega)^n sin(... + n pi/2)."""
+        rate = self.order * frequency
+        argument = t.phase(rate, self.phase) if hasattr(t, "phase") else rate * t + self.phase
+        if order == 0:
+            return self.mean + self.amplitude * np.sin(argument)
+        if order == 1:
+            return self.amplitude * rate * np.cos(argument)
+        return -(self.amplitude * rate * rate * np.sin(argument))
+
+
+@dataclass(frozen=True, slots=True)
+class Sum(Signal):
+    """The sum of several signals; written `Harmonic(...) + Harmonic(...) + 0.5`."""
+
+    terms: tuple[Signal, ...]
+
+    def __post_init__(self) -> None:
+        if not self.terms or not all(isinstance(term, Signal) for term in self.terms):
+            raise ParameterError(f"a Sum needs signals (Harmonic, Record, Constant), got {self.terms!r}")
+
+    @property
+    def periodic(self) -> bool:  # type: ignore[override]
+        """Whether any term needs the base frequency."""
+        return any(term.periodic for term in self.terms)
+
+    def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
+        """The sum of the terms' derivatives."""
+        total = self.terms[0].derivative(t, frequency, order)
+        for term in self.terms[1:]:
+            total = total + term.derivative(t, frequency, order)
+        return total
+
+
+QUANTITIES = ("force", "displacement", "velocity", "acceleration")
+
+
+@dataclass(frozen=True, eq=False)
+class Record(Signal):
+    """Samples over time, uniform or not: `Record(time, value, quantity=...)`, dimensionless like every load.
+
+    * `force`: linear between samples; 0 before the first and after the last one.
+    * `acceleration` (ground): linear between samples, integrated twice exactly from rest at the first sample.
+    * `velocity`, `displacement` (ground): a cubic spline through the samples, so that the acceleration is continuous.
+
+    Outside its samples a ground record has no acceleration: the ground goes on with the velocity it has.
+
+    Raises:
+        ParameterError: fewer than 2 samples (4 for a spline), lengths that differ, times that do not increase, NaN.
+    """
+
+    time: np.ndarray
+    value: np.ndarray
+    quantity: str = "force"
+    scale: float = 1.0
+    source: str = field(default="", compare=False)  # the file it came from
+
+    def __post_init__(self) -> None:
+        if self.quantity not in QUANTITIES:
+            raise ParameterError(
+                f"Record.quantity must be one of {', '.join(QUANTITIES)}, got {self.quantity!r}"
+            )
+        check_number("Record.scale", self.scale)
+        where = f"record {self.source!r}" if self.source else "record"
+        try:
+            time, value = (np.array(a, dtype=float) for a in (self.time, self.value))
+        except (TypeError, ValueError):
+            raise ParameterError(f"{where}: time and value must be lists of numbers") from None
+        if time.ndim != 1 or time.shape != value.shape:
+            raise ParameterError(
+                f"{where}: time and value must be two lists of one length, got shapes {time.shape} and {value.shape}"
+            )
+        least = 4 if self.quantity in ("velocity", "displacement") else 2
+        if time.size < least:
+            raise ParameterError(
+                f"{where}: a record of {self.quantity} needs at least {least} samples, got {time.size}"
+            )
+        if not (np.isfinite(time).all() and np.isfinite(value).all()):
+            bad = int(np.argmin(np.isfinite(time) & np.isfinite(value)))
+            raise ParameterError(
+                f"{where}: sample {bad} is not a finite number (time {time[bad]}, value {value[bad]})"
+            )
+        if not (np.diff(time) > 0).all():
+            bad = int(np.argmin(np.diff(time) > 0)) + 1
+            raise ParameterError(
+                f"{where}: times must increase, but sample {bad} has {time[bad]:g} after {time[bad - 1]:g}; sort the file"
+            )
+        time.setflags(write=False)
+        value.setflags(write=False)
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "value", value)
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Record)
+            and (self.quantity, self.scale) == (other.quantity, other.scale)
+            and np.array_equal(self.time, other.time)
+            and np.array_equal(self.value, other.value)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.quantity, self.scale, self.time.tobytes(), self.value.tobytes()))
+
+    def __repr__(self) -> str:
+        span = f"{self.time.size} samples in [{self.time[0]:g}, {self.time[-1]:g}]"
+        return f"Record({span}, quantity={self.quantity!r}, scale={self.scale!r})"
+
+    @cached_property
+    def polynomials(self) -> tuple[Any, Any, Any]:
+        """The value and its first two derivatives as SciPy piecewise polynomials, `scale` left out."""
+        from scipy.interpolate import CubicSpline, PPoly
+
+        if self.quantity in ("velocity", "displacement"):
+            spline = CubicSpline(self.time, self.value)
+            base = PPoly(spline.c, spline.x)
+        else:
+            slope = np.diff(self.value) / np.diff(self.time)
+            base = PPoly(np.vstack([slope, self.value[:-1]]), self.time)
+        if self.quantity == "acceleration":
+            return base.antiderivative(2), base.antiderivative(1), base
+        if self.quantity == "velocity":
+            return base.antiderivative(1), base, base.derivative(1)
+        return base, base.derivative(1), base.derivative(2)
+
+    def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
+        """The interpolated record, or its derivative, at `t`; outside the samples as the class says."""
+        if hasattr(t, "record"):
+            return t.record(self, order)
+        t = np.asarray(t, dtype=float)
+        first, last = self.time[0], self.time[-1]
+        inside = self.polynomials[order](np.clip(t, first, last))
+        beyond = (t < first) | (t > last)
+        if self.quantity == "force" or order == 2:
+            result = np.where(beyond, 0.0, inside)
+        elif order == 1:
+            result = inside
+        else:
+            drift = np.where(t < first, (t - first) * self.polynomials[1](first), 0.0)
+            result = inside + drift + np.where(t > last, (t - last) * self.polynomials[1](last), 0.0)
+        return self.scale * (result if result.ndim else float(result))
+
+
+def as_signal(value: Any, name: str) -> Signal:
+    """A number becomes a `Constant`; a signal stays what it is; anything else is refused."""
+    if isinstance(value, Signal):
+        return value
+    check_number(name, value)
+    return Constant(float(value))
+
+
+def _terms(signal: Signal | float) -> tuple[Signal, ...]:
+    return signal.terms if isinstance(signal, Sum) else (as_signal(signal, "a term of a sum"),)
+
+
+def scaled(signal: Signal, factor: float) -> Signal:
+    """`factor` times the signal, of the same kind."""
+    if isinstance(signal, Constant):
+        return Constant(factor * signal.value)
+    if isinstance(signal, Harmonic):
+        return Harmonic(factor * signal.amplitude, factor * signal.mean, signal.phase, signal.order)
+    if isinstance(signal, Sum):
+        return Sum(tuple(scaled(term, factor) for term in signal.terms))
+    if isinstance(signal, Record):
+        return Record(signal.time, signal.value, signal.quantity, factor * signal.scale, signal.source)
+    raise ParameterError(f"a {type(signal).__name__} cannot be scaled")

@@ -1,0 +1,111 @@
+"""A system: a model, a load and an impact law, frozen and complete."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from saltus.errors import ParameterError, near
+from saltus.systems.impact import ImpactLaw, VelocityReduction
+from saltus.systems.load import Load
+from saltus.systems.model import Model
+from saltus.systems.parameters import children, numbers, replace
+from saltus.systems.serial import from_dict, to_dict
+
+
+@dataclass(frozen=True, kw_only=True)
+class System:
+    """What moves, and all that is needed to repeat the motion.
+
+    `System(model=Metainterface(beta0=...), load=Load(...), impact=VelocityReduction(1.0))`. Every number has a dotted path:
+    `model.damping`, `load.frequency`, `load.horizontal.amplitude`, `load.vertical`, `impact.e`.
+
+    Raises:
+        ParameterError: a load channel that the model does not read.
+    """
+
+    model: Model
+    load: Load = field(default_factory=Load)
+    impact: ImpactLaw = field(default_factory=VelocityReduction)
+
+    def __post_init__(self) -> None:
+        for name, kind in (("model", Model), ("load", Load), ("impact", ImpactLaw)):
+            if not isinstance(getattr(self, name), kind):
+                raise ParameterError(f"System.{name} must be a {kind.__name__}, got {getattr(self, name)!r}")
+        for channel in self.load.channels:
+            if channel not in self.model.channels:
+                raise ParameterError(
+                    f"{type(self.model).__name__} does not read load.{channel}; {near(channel, self.model.channels)}"
+                )
+
+    def with_(self, changes: Mapping[str, Any] | None = None, **more: Any) -> System:
+        """A copy with the parts at the given dotted paths replaced: `system.with_({"load.frequency": 1.1})`.
+
+        Raises:
+            ParameterError: a path that leads nowhere, with the near ones, or a value that is refused there.
+        """
+        system = self
+        for path, value in {**(changes or {}), **more}.items():
+            system = replace(system, path, value)
+        return system
+
+    def get(self, path: str) -> Any:
+        """The part at a dotted path; a constant channel is its number."""
+        node: Any = self
+        for name in path.split("."):
+            parts = children(node)
+            if name not in parts:
+                raise ParameterError(f"no parameter {path!r}; {near(path, self.parameters)}")
+            node = parts[name]
+        return node.value if type(node).__name__ == "Constant" else node
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Every number of the system by its dotted path."""
+        return dict(numbers(self))
+
+    def mirrored(self) -> System | None:
+        """The system in which -theta moves as theta does in this one, or None without a mirror symmetry."""
+        load = self.model.mirror(self.load)
+        return None if load is None else System(model=self.model, load=load, impact=self.impact)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain nested dictionaries, as written to JSON and TOML."""
+        return {"model": to_dict(self.model), "load": to_dict(self.load), "impact": to_dict(self.impact)}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> System:
+        """The inverse of `to_dict`; `load` and `impact` may be left out."""
+        unknown = set(data) - {"model", "load", "impact"}
+        if unknown:
+            name = sorted(unknown)[0]
+            raise ParameterError(
+                f"unknown key {name!r} of a system; {near(name, ('model', 'load', 'impact'))}"
+            )
+        if "model" not in data:
+            raise ParameterError("a system needs a model, such as {'type': 'Metainterface', 'beta0': 1.4}")
+        parts: dict[str, Any] = {name: from_dict(name, value) for name, value in data.items()}
+        return cls(**parts)
+
+    def to_json(self) -> str:
+        """The system as one line of JSON; numbers are exact."""
+        return json.dumps(self.to_dict())
+
+    @classmethod
+    def from_json(cls, text: str) -> System:
+        """The inverse of `to_json`."""
+        return cls.from_dict(json.loads(text))
+
+    def to_toml(self) -> str:
+        """The system as TOML."""
+        import tomli_w
+
+        return tomli_w.dumps(self.to_dict())
+
+    @classmethod
+    def from_toml(cls, text: str) -> System:
+        """The inverse of `to_toml`."""
+        return cls.from_dict(tomllib.loads(text))

@@ -1,0 +1,56 @@
+"""The linear oscillator with a one-sided wall: the impact oscillator of the grazing literature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from saltus.systems.checks import check_number
+from saltus.systems.load import Load
+from saltus.systems.model import Model
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WallOscillator(Model):
+    """x'' + c x' + k x = F(tau), free while x < d; at the wall x = d the velocity turns round, v+ = -e v-.
+
+    It has one mode, ended at the wall and entered again, and rests on the wall while F - k d > 0.
+    """
+
+    stiffness: float = 1.0  # k, at least 0
+    damping: float = 0.0  # c, at least 0
+    wall: float = 1.0  # d
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    def __post_init__(self) -> None:
+        check_number("stiffness", self.stiffness, at_least=0.0)
+        check_number("damping", self.damping, at_least=0.0)
+        check_number("wall", self.wall)
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """One side: the wall lets nothing through."""
+        return (1,)
+
+    @property
+    def contact(self) -> Any:
+        """x = d."""
+        return self.wall
+
+    def acceleration(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """x'' = F - c x' - k x."""
+        return load.force(t) - self.damping * velocity - self.stiffness * x
+
+    def gap(self, x: Any, side: Any) -> Any:
+        """d - x."""
+        return self.wall - x
+
+    def reset(self, t: Any, velocity: Any, side: Any, load: Load, impact: Any) -> tuple[Any, Any]:
+        """The same side, with the velocity turned round."""
+        return side, -impact.velocity_after(self, t, velocity, side, side, load)
+
+    def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """v^2 / 2."""
+        return velocity * velocity / 2
