@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from numbers import Real
 from typing import Any
+
+import numpy as np
 
 from saltus.errors import ParameterError
 
@@ -25,7 +26,7 @@ def check_number(
         ParameterError: with the name, the range and the value, and a hint where degrees look likely.
     """
     wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
-    if isinstance(value, bool) or not isinstance(value, Real):
+    if isinstance(value, bool) or not isinstance(value, (float, int, np.floating, np.integer)):
         raise ParameterError(f"{name} must be {wanted.replace('lie in', 'a number in')}, got {value!r}")
     inside = (
         math.isfinite(value)
@@ -39,14 +40,10 @@ def check_number(
         raise ParameterError(f"{name} must {wanted}, got {value!r}{hint}")
 
 
-def _range_text(
-    above: float | None, below: float | None, at_least: float | None, at_most: float | None
-) -> str:
+def _range_text(above: float | None, below: float | None, at_least: float | None, at_most: float | None) -> str:
     if above is None and at_least is None and below is None and at_most is None:
         return "be finite"
-    left = (
-        f"({_short(above)}" if above is not None else "(-inf" if at_least is None else f"[{_short(at_least)}"
-    )
+    left = f"({_short(above)}" if above is not None else "(-inf" if at_least is None else f"[{_short(at_least)}"
     right = f"{_short(below)})" if below is not None else "inf)" if at_most is None else f"{_short(at_most)}]"
     return f"lie in {left}, {right}"
 
@@ -56,3 +53,10 @@ def _short(value: float) -> str:
         if value == multiple:
             return text
     return f"{value:g}"
+
+
+def settle_number(owner: Any, name: str, **bounds: Any) -> None:
+    """Check the field `name` of a frozen dataclass and store it as a plain float; messages name the field."""
+    value = getattr(owner, name)
+    check_number(bounds.pop("label", name), value, **bounds)
+    object.__setattr__(owner, name, float(value))

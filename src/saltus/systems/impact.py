@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.systems.checks import check_number
+from saltus.systems.checks import settle_number
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 
@@ -21,9 +21,7 @@ class ImpactLaw:
 
     __slots__ = ()
 
-    def velocity_after(
-        self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
-    ) -> Any:
+    def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
         """The velocity after an impact at `t` from `side` to `next_side`."""
         raise NotImplementedError
 
@@ -35,11 +33,9 @@ class VelocityReduction(ImpactLaw):
     e: float = 1.0
 
     def __post_init__(self) -> None:
-        check_number("VelocityReduction.e", self.e, at_least=0.0, at_most=1.0)
+        settle_number(self, "e", label="VelocityReduction.e", at_least=0.0, at_most=1.0)
 
-    def velocity_after(
-        self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
-    ) -> Any:
+    def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
         """e v-."""
         return self.e * velocity
 
@@ -56,11 +52,9 @@ class EnergyRestitution(ImpactLaw):
     r: float
 
     def __post_init__(self) -> None:
-        check_number("EnergyRestitution.r", self.r, above=0.0)
+        settle_number(self, "r", label="EnergyRestitution.r", above=0.0)
 
-    def velocity_after(
-        self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
-    ) -> Any:
+    def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
         """The root v+ of a v^2 + b v + c = r T(v-); NaN where there is none."""
 
         def after(v: Any) -> Any:
@@ -86,8 +80,6 @@ class InelasticImpact(ImpactLaw):
     45 to 135 degrees; outside that range both contacts act and the motion stops. For the rocking block Housner's factor.
     """
 
-    def velocity_after(
-        self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
-    ) -> Any:
+    def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
         """The model's `inelastic_factor` times v-."""
         return model.inelastic_factor(side) * velocity

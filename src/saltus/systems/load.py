@@ -63,6 +63,7 @@ class Load:
         signals = {name: as_signal(value, f"load.{name}") for name, value in channels.items()}
         if frequency is not None:
             check_number("load.frequency", frequency, above=0.0)
+            frequency = float(frequency)
         for name, signal in signals.items():
             if signal.periodic and frequency is None:
                 raise ParameterError(f"load.{name} is harmonic, so load.frequency must be given")

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.systems.checks import check_number
+from saltus.systems.checks import settle_number
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 from saltus.systems.signals import Constant, Signal, scaled
@@ -53,16 +53,16 @@ class Metainterface(Model):
     )
 
     def __post_init__(self) -> None:
-        check_number("beta0", self.beta0, above=0.0, below=math.pi, unit="rad")
-        check_number("damping", self.damping, at_least=0.0)
-        check_number("stiffness_ratio", self.stiffness_ratio, above=0.0)
-        check_number("mass_ratio", self.mass_ratio, at_least=0.0)
-        check_number("dissipation_ratio", self.dissipation_ratio, at_least=0.0)
+        settle_number(self, "beta0", above=0.0, below=math.pi, unit="rad")
+        settle_number(self, "damping", at_least=0.0)
+        settle_number(self, "stiffness_ratio", above=0.0)
+        settle_number(self, "mass_ratio", at_least=0.0)
+        settle_number(self, "dissipation_ratio", at_least=0.0)
         if self.smoothing is not None:
-            check_number("smoothing", self.smoothing, above=0.0)
+            settle_number(self, "smoothing", above=0.0)
             if (self.stiffness_ratio, self.mass_ratio, self.dissipation_ratio) != (1.0, 0.0, 1.0):
                 raise ParameterError(
-                    "smoothing is defined for symmetric layers only (stiffness_ratio 1, mass_ratio 0, dissipation_ratio 1); "
+                    "smoothing is for symmetric layers only (stiffness_ratio 1, mass_ratio 0, dissipation_ratio 1); "
                     "drop it to compute the exact motion of unequal ones"
                 )
 
@@ -102,10 +102,8 @@ class Metainterface(Model):
         mass = 1 + self.mass_ratio * (1 - side) / 2
         return np.maximum(-np.cos(2 * self.beta0), 0.0) / mass
 
-    def margins(
-        self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load
-    ) -> dict[str, Any]:
-        """The straight line, the kinematic limit and the closed layer's reaction; all positive in a motion of the mechanism."""
+    def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load) -> dict[str, Any]:
+        """The straight line, the kinematic limit and the closed layer's reaction; all positive in the mechanism."""
         opening = math.pi - self.beta0
         size = abs(theta) if self.smoothing is not None else side * theta
         margins = {"line_limit": opening - size, "kinematic_limit": 2 * opening - size}
@@ -136,14 +134,8 @@ class Metainterface(Model):
     def _forces(self, t: Any, lower: Any, load: Load) -> tuple[Any, Any]:
         """[(1+h)^P H - (1+m)^P zeta''] and [(1+v)^P V - (1+m)^P nu''], with P = `lower`."""
         mass = 1 + self.mass_ratio * lower
-        across = (
-            load.horizontal(t)
-            + lower * load.lower_horizontal(t)
-            - mass * load.ground_horizontal.acceleration(t)
-        )
-        along = (
-            load.vertical(t) + lower * load.lower_vertical(t) - mass * load.ground_vertical.acceleration(t)
-        )
+        across = load.horizontal(t) + lower * load.lower_horizontal(t) - mass * load.ground_horizontal.acceleration(t)
+        along = load.vertical(t) + lower * load.lower_vertical(t) - mass * load.ground_vertical.acceleration(t)
         return across, along
 
 

@@ -51,9 +51,7 @@ def replace(node: Any, path: str, value: Any, whole: str = "") -> Any:
     parts = children(node)
     new_channel = isinstance(node, Load) and head.isidentifier() and not rest
     if head not in parts and not new_channel:
-        raise ParameterError(
-            f"no parameter {whole!r}: {type(node).__name__} has no {head!r}; {near(head, parts)}"
-        )
+        raise ParameterError(f"no parameter {whole!r}: {type(node).__name__} has no {head!r}; {near(head, parts)}")
     part = replace(parts[head], rest, value, whole) if rest else value
     if isinstance(node, Load):
         return Load(**{**parts, head: part})

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.systems.checks import check_number
+from saltus.systems.checks import settle_number
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 from saltus.systems.signals import scaled
@@ -31,7 +31,7 @@ class RockingBlock(Model):
     stops: ClassVar[tuple[str, ...]] = ("overturned",)
 
     def __post_init__(self) -> None:
-        check_number("alpha", self.alpha, above=0.0, below=math.pi / 2, unit="rad")
+        settle_number(self, "alpha", above=0.0, below=math.pi / 2, unit="rad")
 
     def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
         """theta'' of `EOM&Rock` in the time p t."""
@@ -52,9 +52,7 @@ class RockingBlock(Model):
         """1 - (3/2) sin(alpha)^2: angular momentum about the new corner is conserved (Housner 1963); not below 0."""
         return np.maximum(1 - 1.5 * np.sin(self.alpha) * np.sin(self.alpha), 0.0)
 
-    def margins(
-        self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load
-    ) -> dict[str, Any]:
+    def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load) -> dict[str, Any]:
         """`overturned`: pi/2 - abs(theta)."""
         return {"overturned": math.pi / 2 - side * theta}
 

@@ -34,15 +34,11 @@ def from_dict(kind: str, data: Any) -> Any:
     if not isinstance(data, Mapping):
         raise ParameterError(f"{kind} must be a table of keys and values, got {data!r}")
     if kind == "load":
-        channels = {
-            name: read_signal(value, f"load.{name}") for name, value in data.items() if name != "frequency"
-        }
+        channels = {name: read_signal(value, f"load.{name}") for name, value in data.items() if name != "frequency"}
         return Load(frequency=data.get("frequency"), **channels)
     fields = dict(data)
     if "type" not in fields:
-        raise ParameterError(
-            f"{kind}.type is missing: it names the {kind}, such as 'Metainterface' or 'VelocityReduction'"
-        )
+        raise ParameterError(f"{kind}.type is missing: it names the {kind}, such as 'Metainterface' or 'VelocityReduction'")
     name = fields.pop("type")
     cls: Any = find_model(name) if kind == "model" else find_impact(name)
     return build(cls, fields, kind)

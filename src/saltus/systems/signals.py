@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.systems.checks import check_number
+from saltus.systems.checks import check_number, settle_number
 
 
 class Signal:
@@ -45,7 +45,7 @@ class Constant(Signal):
     value: float
 
     def __post_init__(self) -> None:
-        check_number("a constant load", self.value)
+        settle_number(self, "value", label="a constant load")
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
         """`value`, or 0 for a derivative."""
@@ -67,9 +67,10 @@ class Harmonic(Signal):
 
     def __post_init__(self) -> None:
         for name in ("amplitude", "mean", "phase"):
-            check_number(f"Harmonic.{name}", getattr(self, name))
+            settle_number(self, name, label=f"Harmonic.{name}")
         if isinstance(self.order, bool) or self.order != int(self.order) or self.order < 1:
             raise ParameterError(f"Harmonic.order must be a whole number of at least 1, got {self.order!r}")
+        object.__setattr__(self, "order", int(self.order))
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
         """mean + amplitude sin(...), or -- differentiated -- amplitude (order Omega)^n sin(... + n pi/2)."""
@@ -130,10 +131,8 @@ class Record(Signal):
 
     def __post_init__(self) -> None:
         if self.quantity not in QUANTITIES:
-            raise ParameterError(
-                f"Record.quantity must be one of {', '.join(QUANTITIES)}, got {self.quantity!r}"
-            )
-        check_number("Record.scale", self.scale)
+            raise ParameterError(f"Record.quantity must be one of {', '.join(QUANTITIES)}, got {self.quantity!r}")
+        settle_number(self, "scale", label="Record.scale")
         where = f"record {self.source!r}" if self.source else "record"
         try:
             time, value = (np.array(a, dtype=float) for a in (self.time, self.value))
@@ -145,14 +144,10 @@ class Record(Signal):
             )
         least = 4 if self.quantity in ("velocity", "displacement") else 2
         if time.size < least:
-            raise ParameterError(
-                f"{where}: a record of {self.quantity} needs at least {least} samples, got {time.size}"
-            )
+            raise ParameterError(f"{where}: a record of {self.quantity} needs at least {least} samples, got {time.size}")
         if not (np.isfinite(time).all() and np.isfinite(value).all()):
             bad = int(np.argmin(np.isfinite(time) & np.isfinite(value)))
-            raise ParameterError(
-                f"{where}: sample {bad} is not a finite number (time {time[bad]}, value {value[bad]})"
-            )
+            raise ParameterError(f"{where}: sample {bad} is not a finite number (time {time[bad]}, value {value[bad]})")
         if not (np.diff(time) > 0).all():
             bad = int(np.argmin(np.diff(time) > 0)) + 1
             raise ParameterError(

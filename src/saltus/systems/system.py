@@ -37,9 +37,8 @@ class System:
                 raise ParameterError(f"System.{name} must be a {kind.__name__}, got {getattr(self, name)!r}")
         for channel in self.load.channels:
             if channel not in self.model.channels:
-                raise ParameterError(
-                    f"{type(self.model).__name__} does not read load.{channel}; {near(channel, self.model.channels)}"
-                )
+                known = [*self.model.channels, "frequency"]
+                raise ParameterError(f"{type(self.model).__name__} does not read load.{channel}; {near(channel, known)}")
 
     def with_(self, changes: Mapping[str, Any] | None = None, **more: Any) -> System:
         """A copy with the parts at the given dotted paths replaced: `system.with_({"load.frequency": 1.1})`.
@@ -82,9 +81,7 @@ class System:
         unknown = set(data) - {"model", "load", "impact"}
         if unknown:
             name = sorted(unknown)[0]
-            raise ParameterError(
-                f"unknown key {name!r} of a system; {near(name, ('model', 'load', 'impact'))}"
-            )
+            raise ParameterError(f"unknown key {name!r} of a system; {near(name, ('model', 'load', 'impact'))}")
         if "model" not in data:
             raise ParameterError("a system needs a model, such as {'type': 'Metainterface', 'beta0': 1.4}")
         parts: dict[str, Any] = {name: from_dict(name, value) for name, value in data.items()}

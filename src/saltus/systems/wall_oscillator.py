@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from saltus.systems.checks import check_number
+from saltus.systems.checks import settle_number
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 
@@ -25,9 +25,9 @@ class WallOscillator(Model):
     channels: ClassVar[tuple[str, ...]] = ("force",)
 
     def __post_init__(self) -> None:
-        check_number("stiffness", self.stiffness, at_least=0.0)
-        check_number("damping", self.damping, at_least=0.0)
-        check_number("wall", self.wall)
+        settle_number(self, "stiffness", at_least=0.0)
+        settle_number(self, "damping", at_least=0.0)
+        settle_number(self, "wall")
 
     @property
     def sides(self) -> tuple[int, ...]:
