@@ -1,9 +1,180 @@
-"""The two-degree-of-freedom metainterface (paper, `eomnl`)."""
+"""The metainterface with both layers free: two degrees of freedom (paper, `eomnl`)."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from saltus.systems.checks import settle_number
+from saltus.systems.load import Load
+from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TwoLayer(Model):
-    """Placeholder until written."""
+    """The metainterface with theta_1 >= 0 of the lower and theta_2 <= 0 of the upper layer (paper, `eomnl`).
+
+        M(theta) theta'' + C theta' + D(theta) theta'^2 + K theta = f(theta, tau),   S = 2 beta0 + theta_1 - theta_2,
+        M = [[1+m, -cos S], [-cos S, 1]],  C = C diag(c, 1),  D = [[0, -sin S], [sin S, 0]],  K = diag(k, 1),
+        f_1 = [(1+h) H - (1+m) zeta''] sin(beta0 + theta_1) + [(1+v) V - (1+m) nu''] cos(beta0 + theta_1),
+        f_2 = [H - zeta''] sin(beta0 - theta_2) - [V - nu''] cos(beta0 - theta_2).
+
+    Its motion is exact while both layers are open, and stops at the first contact of either: `lower_contact` (theta_1 = 0) and
+    `upper_contact` (theta_2 = 0). Impacts, and motion with a layer closed, come later; until then `constraint_reactions` tells
+    what a closed layer would need. With m = 0 the mass matrix is singular where sin S = 0, that is beta_1 + beta_2 = pi.
+
+    Angles and velocities are pairs (lower, upper) of numbers or arrays; matrices have the shape (2, 2), or (2, 2, ...) for
+    arrays. Energies are per K2. The load channels are those of `Metainterface`.
+    """
+
+    beta0: float  # angle of the undeformed cell, rad, in (0, pi)
+    damping: float = 0.0  # C, at least 0
+    stiffness_ratio: float = 1.0  # k = K1 / K2, above 0
+    mass_ratio: float = 0.0  # m = M1 / M2, at least 0
+    dissipation_ratio: float = 1.0  # c = C1 / C2, at least 0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("theta_1", "theta_2")
+    channels: ClassVar[tuple[str, ...]] = Metainterface.channels
+    stops: ClassVar[tuple[str, ...]] = ("lower_contact", "upper_contact")
+
+    def __post_init__(self) -> None:
+        settle_number(self, "beta0", above=0.0, below=math.pi, unit="rad")
+        settle_number(self, "damping", at_least=0.0)
+        settle_number(self, "stiffness_ratio", above=0.0)
+        settle_number(self, "mass_ratio", at_least=0.0)
+        settle_number(self, "dissipation_ratio", at_least=0.0)
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """None: one smooth mode, in which both layers are open."""
+        return ()
+
+    @property
+    def contact(self) -> Any:
+        """Both layers closed."""
+        return (0.0, 0.0)
+
+    def mass_matrix(self, theta: Any) -> Any:
+        """M(theta)."""
+        coupling = -np.cos(self._sum(theta))
+        return _matrix(1 + self.mass_ratio + 0 * coupling, coupling, coupling, 1 + 0 * coupling)
+
+    def damping_matrix(self) -> Any:
+        """C = C diag(c, 1)."""
+        return _matrix(self.damping * self.dissipation_ratio, 0, 0, self.damping)
+
+    def velocity_matrix(self, theta: Any) -> Any:
+        """D(theta), which multiplies the squares of the velocities."""
+        coupling = np.sin(self._sum(theta))
+        return _matrix(0 * coupling, -coupling, coupling, 0 * coupling)
+
+    def stiffness_matrix(self) -> Any:
+        """K = diag(k, 1)."""
+        return _matrix(self.stiffness_ratio, 0, 0, 1)
+
+    def force(self, t: Any, theta: Any, load: Load) -> tuple[Any, Any]:
+        """f(theta, tau): the loads and the ground's accelerations."""
+        zeta, nu = load.ground_horizontal.acceleration(t), load.ground_vertical.acceleration(t)
+        return self._push(t, theta, load, zeta, nu)
+
+    def linear_stiffness_matrix(self, t: Any, load: Load) -> Any:
+        """K0(tau) = diag(kappa_1, kappa_2), the stiffness less the linear part of f, at theta = 0.
+
+        kappa_1 = k - cos(beta0) [(1+h) H - (1+m) zeta''] + sin(beta0) [(1+v) V - (1+m) nu''] and
+        kappa_2 = 1 + cos(beta0) [H - zeta''] + sin(beta0) [V - nu''].
+        M0 and f0 are `mass_matrix` and `force` at `contact`; C is unchanged.
+        """
+        zeta, nu = load.ground_horizontal.acceleration(t), load.ground_vertical.acceleration(t)
+        (across_1, along_1), (across_2, along_2) = self._loads(t, load, zeta, nu)
+        sine, cosine = np.sin(self.beta0), np.cos(self.beta0)
+        kappa_1 = self.stiffness_ratio - across_1 * cosine + along_1 * sine
+        kappa_2 = 1 + across_2 * cosine + along_2 * sine
+        return _matrix(kappa_1, 0 * kappa_1, 0 * kappa_2, kappa_2)
+
+    def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> tuple[Any, Any]:
+        """theta'' of `eomnl`, by Cramer's rule with det M = m + sin(S)^2."""
+        angle = self._sum(theta)
+        coupling, twist = -np.cos(angle), np.sin(angle)
+        force = self.force(t, theta, load)
+        viscous = self.damping * self.dissipation_ratio * velocity[0]
+        first = force[0] - viscous - self.stiffness_ratio * theta[0] + twist * (velocity[1] * velocity[1])
+        second = force[1] - self.damping * velocity[1] - theta[1] - twist * (velocity[0] * velocity[0])
+        determinant = self.mass_ratio + twist * twist
+        return (
+            (first - coupling * second) / determinant,
+            ((1 + self.mass_ratio) * second - coupling * first) / determinant,
+        )
+
+    def constraint_reactions(self, t: Any, theta: Any, velocity: Any, acceleration: Any, load: Load) -> tuple[Any, Any]:
+        """(R_1, R_2) = M theta'' + C theta' + D theta'^2 + K theta - f, what contacts must supply (erratum 21).
+
+        Both vanish in free motion. A closed layer (theta_j = theta_j' = theta_j'' = 0) stays closed while R_1 >= 0 or R_2 <= 0.
+        """
+        angle = self._sum(theta)
+        coupling, twist = -np.cos(angle), np.sin(angle)
+        force = self.force(t, theta, load)
+        viscous = self.damping * self.dissipation_ratio * velocity[0]
+        inertia_1 = (1 + self.mass_ratio) * acceleration[0] + coupling * acceleration[1] - twist * (velocity[1] * velocity[1])
+        inertia_2 = coupling * acceleration[0] + acceleration[1] + twist * (velocity[0] * velocity[0])
+        return (
+            inertia_1 + viscous + self.stiffness_ratio * theta[0] - force[0],
+            inertia_2 + self.damping * velocity[1] + theta[1] - force[1],
+        )
+
+    def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """T / K2 of `kin_eng`, with the velocities of both masses in the inertial frame."""
+        lower, upper = self.beta0 + theta[0], self.beta0 - theta[1]
+        x_1 = load.ground_horizontal.velocity(t) + np.sin(lower) * velocity[0]
+        y_1 = load.ground_vertical.velocity(t) + np.cos(lower) * velocity[0]
+        x_2, y_2 = x_1 + np.sin(upper) * velocity[1], y_1 - np.cos(upper) * velocity[1]
+        return (self.mass_ratio * (x_1 * x_1 + y_1 * y_1) + x_2 * x_2 + y_2 * y_2) / 2
+
+    def potential_energy(self, theta: Any) -> Any:
+        """Pi / K2 = (k theta_1^2 + theta_2^2) / 2 of the springs (`pot_eng_beta`)."""
+        return (self.stiffness_ratio * theta[0] * theta[0] + theta[1] * theta[1]) / 2
+
+    def dissipation(self, velocity: Any) -> Any:
+        """R / K2 = C (c theta_1'^2 + theta_2'^2) / 2 (`Rayleigh`)."""
+        return self.damping * (self.dissipation_ratio * velocity[0] * velocity[0] + velocity[1] * velocity[1]) / 2
+
+    def generalised_forces(self, t: Any, theta: Any, load: Load) -> tuple[Any, Any]:
+        """Q_j / K2 of the loads alone, without the ground (`ext_forces_beta`)."""
+        return self._push(t, theta, load, 0.0, 0.0)
+
+    def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load) -> dict[str, Any]:
+        """Each layer's opening, and what it lacks to the straight line and to the kinematic limit (errata 19, 20)."""
+        opening = math.pi - self.beta0
+        return {
+            "lower_contact": theta[0],
+            "upper_contact": -theta[1],
+            "lower_line_limit": opening - theta[0],
+            "upper_line_limit": opening + theta[1],
+            "lower_kinematic_limit": 2 * opening - theta[0],
+            "upper_kinematic_limit": 2 * opening + theta[1],
+        }
+
+    def _sum(self, theta: Any) -> Any:
+        """S = beta_1 + beta_2."""
+        return 2 * self.beta0 + theta[0] - theta[1]
+
+    def _loads(self, t: Any, load: Load, zeta: Any, nu: Any) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+        """(1+h)^P H - (1+m)^P zeta'' and (1+v)^P V - (1+m)^P nu'' with P = 1 for the lower, P = 0 for the upper layer."""
+        mass, across, along = 1 + self.mass_ratio, load.horizontal(t), load.vertical(t)
+        lower = (across + load.lower_horizontal(t) - mass * zeta, along + load.lower_vertical(t) - mass * nu)
+        return lower, (across - zeta, along - nu)
+
+    def _push(self, t: Any, theta: Any, load: Load, zeta: Any, nu: Any) -> tuple[Any, Any]:
+        (across_1, along_1), (across_2, along_2) = self._loads(t, load, zeta, nu)
+        lower, upper = self.beta0 + theta[0], self.beta0 - theta[1]
+        return (
+            across_1 * np.sin(lower) + along_1 * np.cos(lower),
+            across_2 * np.sin(upper) - along_2 * np.cos(upper),
+        )
+
+
+def _matrix(a: Any, b: Any, c: Any, d: Any) -> Any:
+    return np.array([[a, b], [c, d]])

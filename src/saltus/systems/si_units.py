@@ -1,0 +1,160 @@
+"""SI data of a cell, and the dimensionless numbers that stand for them (paper, `timeT` to `displ_ratio1`, `dim_less`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from saltus.errors import ParameterError
+from saltus.systems.checks import settle_number
+from saltus.systems.load import Load
+from saltus.systems.metainterface import Metainterface
+from saltus.systems.signals import Record, Signal, Sum, scaled
+from saltus.systems.two_layer import TwoLayer
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PhysicalCell:
+    """Length, masses, rotational stiffnesses and dampings of a cell in SI units; layer 1 is the lower one, 2 the upper one.
+
+    The characteristic time is T = sqrt(M2 l^2 / K2) (`timeT`), so that tau = t / T; forces are H l / K2 (`dim_less`), ground
+    displacements U / l (`displ_ratio1`), the damping C = C2 T / (M2 l^2), all three as corrected by erratum 13; energies are
+    per K2. Every conversion takes a number or an array.
+
+    Raises:
+        ParameterError: a value out of range, or a lower damping without an upper one (c = C1 / C2 is then undefined).
+    """
+
+    length: float  # l of the inclined bars, m
+    upper_mass: float  # M2, kg
+    upper_stiffness: float  # K2, N m / rad
+    lower_mass: float = 0.0  # M1, kg
+    lower_stiffness: float | None = None  # K1, N m / rad; None is K2
+    upper_damping: float = 0.0  # C2, N m s / rad
+    lower_damping: float | None = None  # C1, N m s / rad; None is C2
+
+    def __post_init__(self) -> None:
+        for name, twin in (("lower_stiffness", "upper_stiffness"), ("lower_damping", "upper_damping")):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, getattr(self, twin))
+        for name in ("length", "upper_mass", "upper_stiffness", "lower_stiffness"):
+            settle_number(self, name, label=f"PhysicalCell.{name}", above=0.0)
+        for name in ("lower_mass", "upper_damping", "lower_damping"):
+            settle_number(self, name, label=f"PhysicalCell.{name}", at_least=0.0)
+        if self.upper_damping == 0.0 and self.lower_damping != 0.0:
+            raise ParameterError(
+                f"PhysicalCell.lower_damping is {self.lower_damping!r} but upper_damping is 0, so the ratio C1 / C2 has no "
+                "value; give the upper hinge a small damping"
+            )
+
+    @classmethod
+    def from_model(
+        cls, model: Metainterface | TwoLayer, *, length: float, upper_mass: float, upper_stiffness: float
+    ) -> PhysicalCell:
+        """The cell of this length, upper mass and upper stiffness whose dimensionless numbers are those of `model`."""
+        upper_damping = model.damping * math.sqrt(upper_mass * length**2 * upper_stiffness)
+        return cls(
+            length=length,
+            upper_mass=upper_mass,
+            upper_stiffness=upper_stiffness,
+            lower_mass=model.mass_ratio * upper_mass,
+            lower_stiffness=model.stiffness_ratio * upper_stiffness,
+            upper_damping=upper_damping,
+            lower_damping=model.dissipation_ratio * upper_damping,
+        )
+
+    @property
+    def time_unit(self) -> float:
+        """T = sqrt(M2 l^2 / K2), s (`timeT`)."""
+        return math.sqrt(self.upper_mass * self.length**2 / self.upper_stiffness)
+
+    @property
+    def force_unit(self) -> float:
+        """K2 / l, N (`dim_less`)."""
+        return self.upper_stiffness / self.length
+
+    @property
+    def ratios(self) -> dict[str, float]:
+        """C, k, m, c as the models name them (`m_k_ratio`, `disip_ratio`); c is 1 where nothing is damped."""
+        return {
+            "damping": self.upper_damping * self.time_unit / (self.upper_mass * self.length**2),
+            "stiffness_ratio": (self.lower_stiffness or self.upper_stiffness) / self.upper_stiffness,
+            "mass_ratio": self.lower_mass / self.upper_mass,
+            "dissipation_ratio": (self.lower_damping or 0.0) / self.upper_damping if self.upper_damping else 1.0,
+        }
+
+    def metainterface(self, beta0: float) -> Metainterface:
+        """The reduced model of this cell with the angle `beta0`, rad."""
+        return Metainterface(beta0=beta0, **self.ratios)
+
+    def two_layer(self, beta0: float) -> TwoLayer:
+        """The two-layer model of this cell with the angle `beta0`, rad."""
+        return TwoLayer(beta0=beta0, **self.ratios)
+
+    def time(self, seconds: Any) -> Any:
+        """tau = t / T."""
+        return seconds / self.time_unit
+
+    def seconds(self, time: Any) -> Any:
+        """t = T tau."""
+        return time * self.time_unit
+
+    def frequency(self, radians_per_second: Any) -> Any:
+        """Omega = T omega."""
+        return radians_per_second * self.time_unit
+
+    def radians_per_second(self, frequency: Any) -> Any:
+        """omega = Omega / T."""
+        return frequency / self.time_unit
+
+    def force(self, newtons: Any) -> Any:
+        """H = H_2 l / K2."""
+        return newtons / self.force_unit
+
+    def newtons(self, force: Any) -> Any:
+        """H_2 = H K2 / l."""
+        return force * self.force_unit
+
+    def displacement(self, metres: Any) -> Any:
+        """zeta = U / l."""
+        return metres / self.length
+
+    def metres(self, displacement: Any) -> Any:
+        """U = l zeta."""
+        return displacement * self.length
+
+    def joules(self, energy: Any) -> Any:
+        """K2 times an energy of the models."""
+        return energy * self.upper_stiffness
+
+    def load(self, si: Load) -> Load:
+        """The dimensionless load of one written in SI: rad/s, N, and for the ground m, m/s or m/s^2; records in s."""
+        return self._convert(si, self.time, self.frequency, -1)
+
+    def load_in_si(self, load: Load) -> Load:
+        """The inverse of `load`."""
+        return self._convert(load, self.seconds, self.radians_per_second, 1)
+
+    def _convert(self, load: Load, time: Callable[[Any], Any], frequency: Callable[[Any], Any], power: int) -> Load:
+        units = {
+            "force": self.force_unit,
+            "displacement": self.length,
+            "velocity": self.length / self.time_unit,
+            "acceleration": self.length / self.time_unit**2,
+        }
+
+        def convert(signal: Signal, quantity: str) -> Signal:
+            if isinstance(signal, Sum):
+                return Sum(tuple(convert(term, quantity) for term in signal.terms))
+            if isinstance(signal, Record):
+                scale = signal.scale * units[signal.quantity] ** power
+                return Record(time(signal.time), signal.value, signal.quantity, scale, signal.source)
+            return scaled(signal, units[quantity] ** power)
+
+        channels = {
+            name: convert(signal, "displacement" if name.startswith("ground_") else "force")
+            for name, signal in load.channels.items()
+        }
+        return Load(frequency=None if load.frequency is None else frequency(load.frequency), **channels)

@@ -1,0 +1,201 @@
+"""The unit cell: geometry and kinematics of one layer, and of both for drawing (paper, section "Mechanical model")."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.systems.cell_layout import CellLayout
+from saltus.systems.checks import settle_number
+from saltus.systems.metainterface import Metainterface
+from saltus.systems.si_units import PhysicalCell
+from saltus.systems.two_layer import TwoLayer
+
+ROUNDING = 1e-12  # an angle past a limit by no more than this is rounded onto it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnitCell:
+    """Two articulated parallelograms, each with a slider amid its diagonal (paper, `gen_conf` to `max_disp_condition`).
+
+    In every layer base, inclined bar (length 1, in units of l) and diagonal form a triangle: `beta` is the angle between the
+    base and the bar, `alpha` the one between the base and the line joining the ends of the diagonal, `phi` the misalignment
+    between that line and the two halves of the diagonal, which stay parallel and slide past each other at mid-span.
+
+    A difference angle `theta` is a number or an array of any shape, rad: theta >= 0 is theta_1 of the lower layer, theta <= 0 is
+    theta_2 of the upper one (`theta_conditions`), as in the reduced model. Lengths are in units of l.
+
+    With `physical`, a `PhysicalCell` of SI data, the cell makes its models (`metainterface`, `two_layer`); conversions
+    of times, forces and displacements are the methods of `physical`.
+
+    Raises:
+        ParameterError: angles outside alpha0 > 0, 0 < beta0 < pi, alpha0 + beta0 < pi (`restangle`).
+    """
+
+    alpha0: float  # rad
+    beta0: float  # rad
+    physical: PhysicalCell | None = None
+
+    def __post_init__(self) -> None:
+        settle_number(self, "beta0", above=0.0, below=math.pi, unit="rad")
+        settle_number(self, "alpha0", above=0.0, below=math.pi, unit="rad")
+        if self.alpha0 + self.beta0 >= math.pi:
+            raise ParameterError(f"alpha0 + beta0 must lie below pi rad, got {self.alpha0!r} + {self.beta0!r}")
+
+    @property
+    def lambda_(self) -> float:
+        """lambda = sin(beta0) / (2 sin(alpha0)), the length of half the diagonal (`psi_lambda_chi`)."""
+        return math.sin(self.beta0) / (2 * math.sin(self.alpha0))
+
+    @property
+    def psi(self) -> float:
+        """psi = sin(beta0)^2 / (2 sin(alpha0) sin(alpha0 + beta0)) = 2 lambda^2 / base (`psi_lambda_chi`)."""
+        return math.sin(self.beta0) ** 2 / (2 * math.sin(self.alpha0) * math.sin(self.alpha0 + self.beta0))
+
+    @property
+    def chi(self) -> float:
+        """chi = sin(2 alpha0 + beta0) / (2 sin(alpha0 + beta0)) (`psi_lambda_chi`, erratum 1)."""
+        return math.sin(2 * self.alpha0 + self.beta0) / (2 * math.sin(self.alpha0 + self.beta0))
+
+    @property
+    def base(self) -> float:
+        """Length of the horizontal edges, sin(alpha0 + beta0) / sin(alpha0), by the law of sines."""
+        return math.sin(self.alpha0 + self.beta0) / math.sin(self.alpha0)
+
+    @property
+    def line_limit(self) -> float:
+        """abs(theta) at which a layer becomes a line segment, pi - beta0 (`line_cond` with n = 1, erratum 19), rad."""
+        return math.pi - self.beta0
+
+    @property
+    def kinematic_limit(self) -> float:
+        """abs(theta) at which the slider closes again, 2 (pi - beta0), from cos(beta_j) <= cos(beta0) (erratum 20), rad."""
+        return 2 * (math.pi - self.beta0)
+
+    @property
+    def max_displacement(self) -> float:
+        """The bound 1 + cos(beta0) of abs(xi), reached on the line (`max_disp_condition`)."""
+        return 1 + math.cos(self.beta0)
+
+    @property
+    def max_misalignment(self) -> float:
+        """The largest abs(phi), arctan sqrt((1 + cos(beta0)) / psi), reached on the line, rad."""
+        return math.atan(math.sqrt((1 + math.cos(self.beta0)) / self.psi))
+
+    def line_condition(self, n: int = 1) -> float:
+        """n pi - beta0, rad (`line_cond`).
+
+        Raises:
+            ParameterError: n >= 2, which lies past the kinematic limit (erratum 20).
+        """
+        if n != 1:
+            raise ParameterError(f"only n = 1 of the line conditions can be reached before the kinematic limit, got n = {n!r}")
+        return self.line_limit
+
+    def beta(self, theta: Any) -> Any:
+        """beta_j = beta0 + abs(theta_j) (erratum 2), rad."""
+        return self.beta0 + abs(theta)
+
+    def phi(self, theta: Any) -> Any:
+        """abs(phi_j) from cos(beta_j) = cos(beta0) - psi tan(phi_j)^2 (`gen_conf`), rad.
+
+        Raises:
+            ParameterError: abs(theta) past the kinematic limit.
+        """
+        return np.arctan(np.sqrt(self._lowering(theta) / self.psi))
+
+    def theta(self, phi: Any, *, layer: int = 1, past_line: bool = False) -> Any:
+        """theta_j = -(-1)^j (beta_j(phi_j) - beta0) (`gen_conf`, erratum 2), rad; `past_line` takes beta_j > pi.
+
+        Raises:
+            ParameterError: abs(phi) above `max_misalignment`, or a layer other than 1 and 2.
+        """
+        if layer not in (1, 2):
+            raise ParameterError(f"layer must be 1 (lower) or 2 (upper), got {layer!r}")
+        beta = self.beta_of_phi(phi)
+        beta = 2 * math.pi - beta if past_line else beta
+        return -((-1) ** layer) * (beta - self.beta0)
+
+    def alpha(self, theta: Any) -> Any:
+        """alpha_j of theta_j (`configalpha`, errata 1 and 3), rad; past the line it is the diagonal's angle below the base."""
+        lowering = self._lowering(theta)
+        cosine = np.sqrt(self.psi / (lowering + self.psi)) * (lowering + 2 * self.lambda_ * self.chi + self.psi)
+        return np.arccos(np.clip(cosine / (2 * self.lambda_), -1, 1))
+
+    def alpha_of_phi(self, phi: Any) -> Any:
+        """arccos(psi / (2 lambda cos(phi)) + chi cos(phi)) (`gen_conf`), rad."""
+        self._check_phi(phi)
+        cosine = np.cos(phi)
+        return np.arccos(np.clip(self.psi / (2 * self.lambda_ * cosine) + self.chi * cosine, -1, 1))
+
+    def beta_of_phi(self, phi: Any) -> Any:
+        """arccos(cos(beta0) - psi tan(phi)^2), from beta0 to pi (`gen_conf`), rad."""
+        self._check_phi(phi)
+        return np.arccos(np.clip(math.cos(self.beta0) - self.psi * np.tan(phi) ** 2, -1, 1))
+
+    def xi(self, theta: Any) -> Any:
+        """Relative horizontal displacement, sgn(theta) (cos(beta0) - cos(beta_j)) (`configdbeta`, erratum 2)."""
+        return np.sign(theta) * (math.cos(self.beta0) - np.cos(self.beta(theta)))
+
+    def eta(self, theta: Any) -> Any:
+        """Height of the layer, sin(beta_j) (`configdbeta`)."""
+        return np.sin(self.beta(theta))
+
+    def phi_velocity(self, theta: Any, velocity: Any) -> Any:
+        """Rate of abs(phi_j) at theta and theta': abs(theta)' sin(beta_j) cos(phi_j)^3 / (2 psi sin(phi_j)).
+
+        At an impact, theta -> 0 with theta' finite, it diverges like abs(theta)' sqrt(sin(beta0) / (4 psi abs(theta)))
+        (`fundamentalproperty`, `fundamentalvelocity`): there the result is an infinity of its sign, or 0 for theta' = 0.
+        """
+        phi, rate = self.phi(theta), np.where(np.less(theta, 0), -1.0, 1.0) * velocity
+        slope = np.sin(self.beta(theta)) * np.cos(phi) ** 3 / (2 * self.psi)
+        closed = np.sin(phi) == 0
+        moving = np.where(closed & (np.asarray(rate) != 0), np.copysign(np.inf, rate * slope), 0.0)
+        return np.where(closed, moving, rate * slope / np.where(closed, 1.0, np.sin(phi)))[()]
+
+    def small_phi(self, theta: Any) -> Any:
+        """abs(phi) = sqrt(abs(theta) sin(beta0) / psi), its limit for theta -> 0 (`fundamentalproperty`), rad."""
+        return np.sqrt(abs(theta) * math.sin(self.beta0) / self.psi)
+
+    def layout(self, theta_1: float = 0.0, theta_2: float = 0.0, *, misaligned: tuple[int, int] = (1, 1)) -> CellLayout:
+        """Where every hinge, slider and mass is, in units of l from the lower left hinge; `misaligned` holds the signs of phi_j.
+
+        Raises:
+            ParameterError: theta_1 < 0 or theta_2 > 0 (`theta_conditions`), or either past the kinematic limit.
+        """
+        if theta_1 < 0 or theta_2 > 0:
+            raise ParameterError(f"a cell has theta_1 >= 0 and theta_2 <= 0, got {theta_1!r} and {theta_2!r}")
+        phi = (float(self.phi(theta_1)) * misaligned[0], float(self.phi(theta_2)) * misaligned[1])
+        return CellLayout.build(self.base, self.lambda_, (self.beta(theta_1), self.beta(theta_2)), phi)
+
+    def metainterface(self) -> Metainterface:
+        """The reduced model of this cell; needs `physical`."""
+        return self._data().metainterface(self.beta0)
+
+    def two_layer(self) -> TwoLayer:
+        """The two-layer model of this cell; needs `physical`."""
+        return self._data().two_layer(self.beta0)
+
+    def _data(self) -> PhysicalCell:
+        if self.physical is None:
+            raise ParameterError("this UnitCell has no SI data; make it with physical=PhysicalCell(length=..., ...)")
+        return self.physical
+
+    def _lowering(self, theta: Any) -> Any:
+        """cos(beta0) - cos(beta_j), as a product so that it keeps its digits near theta = 0."""
+        size = np.abs(theta)
+        if np.any(size > self.kinematic_limit + ROUNDING):
+            worst = float(np.max(size))
+            raise ParameterError(
+                f"abs(theta) must not pass the kinematic limit 2 (pi - beta0) = {self.kinematic_limit:.6g} rad, got {worst!r}"
+            )
+        return np.maximum(2 * np.sin(self.beta0 + size / 2) * np.sin(size / 2), 0.0)
+
+    def _check_phi(self, phi: Any) -> None:
+        if not np.all(np.abs(phi) <= self.max_misalignment + ROUNDING):
+            worst = float(np.max(np.abs(phi)))
+            raise ParameterError(f"abs(phi) must lie in [0, {self.max_misalignment:.6g}] rad in this cell, got {worst!r}")
