@@ -1,0 +1,118 @@
+"""The [load] table: a base frequency, and for each channel a number, a harmonic, a record, or a list of them."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from saltus.config.fields import Text, build, call, check_table, read_number, show, table_of
+from saltus.config.source import Keys, Source
+from saltus.systems import Constant, Harmonic, Load, Record, Signal, Sum
+
+
+def read_load(source: Source, data: Any) -> Load:
+    """The load of a study.
+
+    Raises:
+        ParameterError: with the place of what is wrong.
+    """
+    if not isinstance(data, Mapping):
+        source.refuse(("load",), f"load must be a table of keys and values, got {show(data)}")
+    channels = {name: read_signal(source, ("load", name), value) for name, value in data.items() if name != "frequency"}
+    frequency = _number(source, ("load", "frequency"), data["frequency"]) if "frequency" in data else None
+    for name in channels:
+        if not name.isidentifier() or name.startswith("__"):
+            source.refuse(("load", name), f"load has no channel {show(name)[len('the text ') :]}")
+    loaded: Load = call(source, Load, frequency=frequency, **channels)
+    return loaded
+
+
+def read_signal(source: Source, keys: Keys, data: Any) -> Signal:
+    """What one channel carries."""
+    if isinstance(data, list):
+        if not data:
+            source.refuse(keys, f"{'.'.join(keys)} is an empty list; give at least one number, harmonic or record")
+        return Sum(tuple(read_signal(source, (*keys, str(i)), item) for i, item in enumerate(data)))
+    if not isinstance(data, Mapping):
+        return Constant(_number(source, keys, data))
+    if {"file", "time", "value"} & set(data):
+        return _record(source, keys, data)
+    harmonic: Signal = build(source, keys, Harmonic, check_table(source, keys, data, table_of(Harmonic)))
+    return harmonic
+
+
+def _number(source: Source, keys: Keys, value: Any) -> float:
+    try:
+        return read_number(value)
+    except ValueError as error:
+        source.refuse(keys, f"{'.'.join(keys)} {error}")
+
+
+def _record(source: Source, keys: Keys, data: Any) -> Signal:
+    if "file" not in data:
+        listed: Signal = build(source, keys, Record, check_table(source, keys, data, table_of(Record)))
+        return listed
+    for name in ("time", "value", "source"):
+        if name in data:
+            source.refuse((*keys, name), f"{'.'.join(keys)} has both file and {name}; keep one of them")
+    table = table_of(Record, file=(Text, ...), time=(Any, None), value=(Any, None))
+    values = check_table(source, keys, data, table)
+    name = values.pop("file")
+    time, value = read_samples(source, (*keys, "file"), name)
+    sampled: Signal = build(source, keys, Record, {**values, "time": time, "value": value, "source": name})
+    return sampled
+
+
+def read_samples(source: Source, keys: Keys, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values from the first two columns of the text file `name`, relative to the study.
+
+    Columns are parted by commas, semicolons, tabs or spaces; one line of headings, blank lines and lines that begin with # are
+    skipped. Returns two arrays of shape (samples,).
+
+    Raises:
+        ParameterError: no such file, a line that is not two finite numbers, times that do not increase (with the line).
+    """
+    where = f"{'.'.join(keys)} {name!r}"
+    path = source.path.parent / Path(name)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        source.refuse(keys, f"{where} does not exist; paths are relative to the study file")
+    except UnicodeDecodeError:
+        source.refuse(keys, f"{where} is not a text file; a record has two columns, time and value")
+    except (OSError, ValueError) as error:
+        source.refuse(keys, f"{where} cannot be read ({getattr(error, 'strerror', None) or error})")
+    rows: list[tuple[float, float]] = []
+    headed = False
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        row = _row(line)
+        if row is None:
+            if rows or headed:
+                source.refuse(keys, f"{where}: line {number} must begin with two finite numbers, got {show(line.strip())}")
+            headed = True
+            continue
+        if rows and row[0] <= rows[-1][0]:
+            source.refuse(
+                keys, f"{where}: times must increase, but line {number} has {row[0]:g} after {rows[-1][0]:g}; sort the file"
+            )
+        rows.append(row)
+    time, value = np.array(rows, dtype=float).reshape(-1, 2).T
+    return time, value
+
+
+def _row(line: str) -> tuple[float, float] | None:
+    """The first two numbers of a line, or None where they are not two finite numbers."""
+    separator = next((s for s in ";,\t" if s in line), None)
+    cells = next(csv.reader([line], delimiter=separator)) if separator else line.split()
+    try:
+        time, value = (float(cell) for cell in cells[:2])
+    except ValueError:
+        return None
+    return (time, value) if math.isfinite(time) and math.isfinite(value) else None

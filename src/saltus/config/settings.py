@@ -1,0 +1,134 @@
+"""The [simulate] table: from where, for how long and how accurately a motion is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, create_model
+
+from saltus.config.fields import ANGLES, Angle, Number, Table, check_table, read_number, read_text, read_whole, show
+from saltus.config.source import Source
+from saltus.systems import System
+
+TOLERANCES = (1e-15, 1e-6)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How a study is simulated; what is None is left to `saltus.simulate`."""
+
+    state: dict[str, float] = field(default_factory=dict)  # the coordinates at the start, by name; 0 where left out
+    velocity: float | tuple[float, ...] = 0.0
+    periods: float | None = None  # of the load; or else
+    duration: float | None = None  # in the dimensionless time tau
+    tol: float | None = None
+    time: float = 0.0  # at the start
+    side: int | None = None
+    stop_at: tuple[str, ...] = ()  # the margins that end the motion
+    samples: int | None = None  # written to motion.nc, evenly spaced
+
+    def arguments(self) -> dict[str, Any]:
+        """The keyword arguments of `saltus.simulate`, the system apart."""
+        given = {name: getattr(self, name) for name in ("periods", "duration", "tol", "side")}
+        given = {name: value for name, value in given.items() if value is not None}
+        return {**self.state, "velocity": self.velocity, "time": self.time, "stop_at": self.stop_at, **given}
+
+
+def read_settings(source: Source, system: System, data: Any) -> Settings:
+    """The settings of a study of `system`.
+
+    Raises:
+        ParameterError: with the place of what is wrong.
+    """
+    coordinates = system.model.coordinates
+    values = check_table(source, ("simulate",), data, _table(coordinates, margin_names(system)))
+    _check_horizon(source, system, values)
+    state = {name: values.pop(name) for name in coordinates if name in values}
+    return Settings(state=state, **values)
+
+
+def margin_names(system: System) -> tuple[str, ...]:
+    """The margins of the system's model, at which a motion may be asked to stop."""
+    count = len(system.model.coordinates)
+    state: Any = 0.1 if count == 1 else (0.1,) * count
+    rest: Any = 0.0 if count == 1 else (0.0,) * count
+    side = (*system.model.sides, 1)[0]
+    return tuple(system.model.margins(0.0, state, rest, rest, side, system.load))
+
+
+def _check_horizon(source: Source, system: System, values: Mapping[str, Any]) -> None:
+    if "periods" in values and "duration" in values:
+        source.refuse(("simulate", "duration"), "simulate has both periods and duration; keep one of them")
+    if "periods" not in values and "duration" not in values:
+        source.refuse(
+            ("simulate",), "simulate needs periods (of the load) or duration (dimensionless time), such as duration = 50"
+        )
+    if "periods" in values and system.load.period is None:
+        source.refuse(
+            ("simulate", "periods"), "simulate.periods needs load.frequency, which is not given; give simulate.duration instead"
+        )
+
+
+def _table(coordinates: tuple[str, ...], margins: tuple[str, ...]) -> type[Table]:
+    several = len(coordinates) > 1
+    velocity = Annotated[Any, BeforeValidator(_numbers(len(coordinates)))] if several else Number
+    positive = Annotated[float, BeforeValidator(_positive)]
+    fields: dict[str, Any] = {name: (Angle if name in ANGLES else Number, 0.0) for name in coordinates}
+    fields |= {"velocity": (velocity, 0.0), "periods": (positive, None), "duration": (positive, None)}
+    fields |= {"tol": (Annotated[float, BeforeValidator(_tolerance)], None), "time": (Number, 0.0)}
+    fields |= {"side": (Annotated[int, BeforeValidator(_side)], None)}
+    fields |= {"stop_at": (Annotated[Any, BeforeValidator(_margins(margins))], ())}
+    fields |= {"samples": (Annotated[int, BeforeValidator(_samples)], None)}
+    return create_model("simulate", __base__=Table, **fields)
+
+
+def _positive(value: Any) -> float:
+    number = read_number(value)
+    if number <= 0:
+        raise ValueError(f"must be above 0, got {show(value)}")
+    return number
+
+
+def _tolerance(value: Any) -> float:
+    number, (least, most) = read_number(value), TOLERANCES
+    if not least <= number <= most:
+        raise ValueError(f"must lie in [{least:g}, {most:g}], got {show(value)}")
+    return number
+
+
+def _side(value: Any) -> int:
+    number = read_number(value)
+    if number not in (1, -1):
+        raise ValueError(f"must be 1 (theta > 0) or -1 (theta < 0), got {show(value)}")
+    return int(number)
+
+
+def _samples(value: Any) -> int:
+    number = read_whole(value)
+    if not 2 <= number <= 10_000_000:
+        raise ValueError(f"must lie in [2, 10000000], got {show(value)}")
+    return number
+
+
+def _margins(known: tuple[str, ...]) -> Any:
+    def read(value: Any) -> tuple[str, ...]:
+        from saltus.errors import near
+
+        names = tuple(read_text(item) for item in (value if isinstance(value, list) else [value]))
+        for name in names:
+            if name not in known:
+                raise ValueError(f"names no margin of this model with {show(name)}; {near(name, known)}")
+        return names
+
+    return read
+
+
+def _numbers(count: int) -> Any:
+    def read(value: Any) -> tuple[float, ...]:
+        if not isinstance(value, list) or len(value) != count:
+            raise ValueError(f"must be a list of {count} numbers, got {show(value)}")
+        return tuple(read_number(item) for item in value)
+
+    return read

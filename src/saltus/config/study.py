@@ -1,0 +1,75 @@
+"""A study: a system and how to simulate it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from saltus.config.fields import call
+from saltus.config.loads import read_load
+from saltus.config.settings import Settings, read_settings
+from saltus.config.source import Source, read_source
+from saltus.config.types import read_part
+from saltus.errors import MotionError, near
+from saltus.systems import Load, System, VelocityReduction
+
+PARTS = ("model", "load", "impact", "simulate")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A system and how to simulate it, as a TOML file gives them.
+
+    `load_study("study.toml").run()` is `saltus.simulate` with the file's settings.
+    """
+
+    name: str
+    system: System
+    simulate: Settings | None = None  # None where the file has no [simulate]
+    source: Source
+
+    def settings(self) -> Settings:
+        """`simulate`, refused where the file has none.
+
+        Raises:
+            ParameterError: the file has no [simulate].
+        """
+        if self.simulate is None:
+            self.source.refuse((), "has no [simulate]; add one, such as [simulate] theta = 0.3, periods = 20")
+        return self.simulate
+
+    def run(self, **more: Any) -> Any:
+        """The motion that the study asks for; `more` goes to `saltus.simulate` as it is.
+
+        Raises:
+            ParameterError: the file has no [simulate], or the flow refuses a setting (with the file's name).
+            MotionError: the motion cannot be continued (with the file's name).
+        """
+        from saltus.flow import simulate
+
+        arguments = {**self.settings().arguments(), **more}
+        try:
+            return call(self.source, simulate, self.system, **arguments)
+        except MotionError as error:
+            raise MotionError(f"{self.source.path}: {error}") from error
+
+
+def load_study(path: Path | str) -> Study:
+    """The study in the TOML file at `path`, checked in full.
+
+    Raises:
+        ParameterError: whatever is wrong, in one sentence with the file, the line and the dotted key.
+    """
+    source, tables = read_source(Path(path))
+    for name in tables:
+        if name not in PARTS:
+            source.refuse((name,), f"unknown key {name!r}; {near(name, PARTS)}")
+    if "model" not in tables:
+        source.refuse((), 'has no [model]; begin with [model] type = "Metainterface", beta0 = "80 deg"')
+    model = read_part(source, "model", tables["model"])
+    load = read_load(source, tables["load"]) if "load" in tables else Load()
+    impact = read_part(source, "impact", tables["impact"]) if "impact" in tables else VelocityReduction()
+    system: System = call(source, System, model=model, load=load, impact=impact)
+    settings = read_settings(source, system, tables["simulate"]) if "simulate" in tables else None
+    return Study(name=source.path.stem, system=system, simulate=settings, source=source)

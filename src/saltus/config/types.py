@@ -1,0 +1,112 @@
+"""What `type` names: a class that saltus knows, or one of the user's own in a Python file or an installed module."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import importlib.util
+import sys
+import traceback
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from saltus.config.fields import build, check_table, read_text, table_of
+from saltus.config.source import Source
+from saltus.errors import ParameterError, near
+from saltus.systems import IMPACTS, MODELS, ImpactLaw, Model, register
+
+EXAMPLES = {"model": "Metainterface", "impact": "VelocityReduction"}
+
+
+def read_part(source: Source, kind: str, data: Any) -> Any:
+    """The model or the impact law (`kind`) of a study: `type` and the fields of that class.
+
+    Raises:
+        ParameterError: with the place of what is wrong.
+    """
+    if not isinstance(data, dict):
+        data = check_table(source, (kind,), data, table_of(_Typed))
+    if "type" not in data:
+        source.refuse((kind,), f'{kind}.type is missing; it names the {kind}, such as type = "{EXAMPLES[kind]}"')
+    try:
+        name = read_text(data["type"])
+    except ValueError as error:
+        source.refuse((kind, "type"), f"{kind}.type {error}")
+    cls = find_class(source, kind, name)
+    values = {key: value for key, value in data.items() if key != "type"}
+    return build(source, (kind,), cls, check_table(source, (kind,), values, table_of(cls)))
+
+
+@dataclasses.dataclass
+class _Typed:
+    type: str
+
+
+def find_class(source: Source, kind: str, name: str) -> type:
+    """The class that `model.type` or `impact.type` names: `Metainterface`, `my_model.py:Duffing` or `module:Class`.
+
+    Raises:
+        ParameterError: an unknown name, with the near ones; a file or module that cannot be imported; a class that will not do.
+    """
+    keys, known = (kind, "type"), MODELS if kind == "model" else IMPACTS
+    if ":" not in name:
+        if name in known:
+            return known[name]
+        source.refuse(keys, f'{kind}.type "{name}" is not known; {near(name, known)} (one of your own is "file.py:Class")')
+    place, _, attribute = name.rpartition(":")
+    module = _from_file(source, kind, place) if place.endswith(".py") else _installed(source, kind, place)
+    cls: Any = getattr(module, attribute, None)
+    wanted: Any = Model if kind == "model" else ImpactLaw
+    if cls is None:
+        classes = [n for n, c in vars(module).items() if isinstance(c, type) and issubclass(c, wanted) and c is not wanted]
+        source.refuse(keys, f'{kind}.type: {place} has no class "{attribute}"; {near(attribute, classes)}')
+    if not (isinstance(cls, type) and issubclass(cls, wanted) and dataclasses.is_dataclass(cls)):
+        source.refuse(
+            keys, f"{kind}.type: {attribute} in {place} must be a dataclass that inherits saltus.systems.{wanted.__name__}"
+        )
+    builtin = known.get(cls.__name__)
+    if builtin is not None and builtin is not cls and builtin.__module__.startswith("saltus."):
+        source.refuse(
+            keys, f"{kind}.type: {place} calls its class {cls.__name__}, which saltus has already; give it another name"
+        )
+    owned: Any = cls  # narrowed above to a dataclass, which is not what `register` asks for
+    register(owned)
+    return cls
+
+
+def _from_file(source: Source, kind: str, place: str) -> ModuleType:
+    """The module in a Python file, relative to the study; run anew each time."""
+    path = (source.path.parent / Path(place)).resolve()
+    if not path.is_file():
+        source.refuse((kind, "type"), f"{kind}.type: there is no file {place}; paths are relative to the study file")
+    spec = importlib.util.spec_from_file_location(f"saltus_study_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ParameterError(f"{path} cannot be imported")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses and pickle look it up there
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # the user's own code may raise anything
+        source.refuse((kind, "type"), f"{kind}.type: {place} cannot be imported{_where(error, str(path))}: {_what(error)}")
+    return module
+
+
+def _installed(source: Source, kind: str, place: str) -> ModuleType:
+    try:
+        return importlib.import_module(place)
+    except Exception as error:  # the user's own code may raise anything
+        source.refuse((kind, "type"), f"{kind}.type: module {place!r} cannot be imported: {_what(error)}")
+
+
+def _what(error: Exception) -> str:
+    message = error.msg if isinstance(error, SyntaxError) else str(error)
+    return f"{type(error).__name__}: {' '.join(message.split())}"
+
+
+def _where(error: Exception, path: str) -> str:
+    """The line of the user's file at which importing failed."""
+    if isinstance(error, SyntaxError) and error.filename == path:
+        return f" (its line {error.lineno})"
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == path]
+    return f" (its line {lines[-1]})" if lines else ""
