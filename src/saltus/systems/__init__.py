@@ -10,6 +10,7 @@ from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model
 from saltus.systems.registry import IMPACTS, MODELS, register
 from saltus.systems.rocking_block import RockingBlock
+from saltus.systems.scenarios import Impact, LayerState, Scenario, TableRow, name_impact, other_impulse, table_1
 from saltus.systems.si_units import PhysicalCell
 from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
 from saltus.systems.system import System
@@ -25,20 +26,27 @@ __all__ = [
     "Constant",
     "EnergyRestitution",
     "Harmonic",
+    "Impact",
     "ImpactLaw",
     "InelasticImpact",
+    "LayerState",
     "Load",
     "Metainterface",
     "Model",
     "PhysicalCell",
     "Record",
     "RockingBlock",
+    "Scenario",
     "Signal",
     "Sum",
     "System",
+    "TableRow",
     "TwoLayer",
     "UnitCell",
     "VelocityReduction",
     "WallOscillator",
+    "name_impact",
+    "other_impulse",
     "register",
+    "table_1",
 ]

@@ -65,11 +65,12 @@ class EnergyRestitution(ImpactLaw):
         b = (after(1.0) - after(-1.0)) / 2
         energy = self.r * model.kinetic_energy(t, model.contact, velocity, side, load)
         lowest = -b / (2 * a)
-        reach = np.sqrt((energy - c) / a + lowest * lowest)
+        square = (energy - c) / a + lowest * lowest
+        reach = np.sqrt(np.maximum(square, 0.0))
         branch = np.where(velocity > lowest, 1.0, -1.0)
         nearer, other = lowest + branch * reach, lowest - branch * reach
         through = np.where(nearer * velocity > 0, nearer, other)
-        return np.where(through * velocity > 0, through, np.nan)
+        return np.where(square >= 0, np.where(through * velocity > 0, through, np.nan), np.nan)
 
 
 @dataclass(frozen=True, slots=True)

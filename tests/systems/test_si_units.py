@@ -1,0 +1,150 @@
+"""SI data and dimensionless numbers: both ways, and erratum 13."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from saltus.errors import ParameterError
+from saltus.systems import Harmonic, Load, Metainterface, PhysicalCell, Record, TwoLayer, UnitCell
+
+positive = st.floats(1e-3, 1e3)
+physical_cells = st.builds(
+    PhysicalCell,
+    length=positive,
+    upper_mass=positive,
+    upper_stiffness=positive,
+    lower_mass=positive,
+    lower_stiffness=positive,
+    upper_damping=positive,
+    lower_damping=positive,
+)
+CELL = PhysicalCell(length=0.1, upper_mass=0.2, upper_stiffness=3.0, lower_mass=0.05, upper_damping=0.01)
+
+
+@settings(deadline=None)
+@given(physical_cells, st.floats(-1e3, 1e3))
+def test_conversions_undo_each_other(cell, value):
+    assert cell.seconds(cell.time(value)) == pytest.approx(value)
+    assert cell.newtons(cell.force(value)) == pytest.approx(value)
+    assert cell.metres(cell.displacement(value)) == pytest.approx(value)
+    assert cell.radians_per_second(cell.frequency(value)) == pytest.approx(value)
+    assert cell.frequency(value) * cell.time(2.0) == pytest.approx(2.0 * value)  # a phase is the same in both
+
+
+@settings(deadline=None)
+@given(physical_cells)
+def test_a_cell_is_recovered_from_its_dimensionless_model(cell):
+    for model in (cell.metainterface(1.2), cell.two_layer(1.2)):
+        back = PhysicalCell.from_model(
+            model, length=cell.length, upper_mass=cell.upper_mass, upper_stiffness=cell.upper_stiffness
+        )
+        for name in ("lower_mass", "lower_stiffness", "upper_damping", "lower_damping"):
+            assert getattr(back, name) == pytest.approx(getattr(cell, name), rel=1e-12)
+
+
+@settings(deadline=None)
+@given(physical_cells, positive, positive, positive)
+def test_erratum_13_dimensionless_numbers_do_not_depend_on_the_units(cell, metre, kilogram, second):
+    """Measured in other units of length, mass and time, C, H and tau keep their values; the printed ones do not."""
+    moment, drag = kilogram * metre**2 / second**2, kilogram * metre**2 / second
+    other = PhysicalCell(
+        length=cell.length * metre,
+        upper_mass=cell.upper_mass * kilogram,
+        lower_mass=cell.lower_mass * kilogram,
+        upper_stiffness=cell.upper_stiffness * moment,
+        lower_stiffness=cell.lower_stiffness * moment,
+        upper_damping=cell.upper_damping * drag,
+        lower_damping=cell.lower_damping * drag,
+    )
+    assert other.ratios == pytest.approx(cell.ratios, rel=1e-12)
+    assert other.time(second) == pytest.approx(cell.time(1.0), rel=1e-12)
+    assert other.force(kilogram * metre / second**2) == pytest.approx(cell.force(1.0), rel=1e-12)
+
+    def printed(c):
+        return c.upper_damping / (c.upper_mass * c.length**2), math.sqrt(c.upper_mass / c.upper_stiffness)
+
+    assert printed(other)[0] * second == pytest.approx(printed(cell)[0])  # a rate, not a number
+    assert printed(other)[1] * metre / second == pytest.approx(printed(cell)[1])  # not 1 over a time
+
+
+def test_erratum_13_damping_and_force_follow_from_the_equation_in_seconds():
+    """M2 l^2 theta'' + C2 theta' + K2 theta = l H_2 sin(beta0 - theta), with t = T tau, divided by K2."""
+    mass, length, stiffness, drag, push, t = sp.symbols("M2 l K2 C2 H2 t", positive=True)
+    tau = sp.Symbol("tau")
+    unit = sp.sqrt(mass * length**2 / stiffness)
+    theta = sp.Function("theta")
+    second, first = sp.diff(theta(t / unit), t, 2), sp.diff(theta(t / unit), t)
+    equation = (mass * length**2 * second + drag * first).doit().subs(t, unit * tau).doit() / stiffness
+    equation = sp.expand(equation)
+    assert sp.simplify(equation.coeff(sp.diff(theta(tau), tau, 2)) - 1) == 0
+    damping = sp.simplify(equation.coeff(sp.diff(theta(tau), tau)))
+    numbers = {mass: CELL.upper_mass, length: CELL.length, stiffness: CELL.upper_stiffness, drag: CELL.upper_damping}
+    assert CELL.ratios["damping"] == pytest.approx(float(damping.subs(numbers)), rel=1e-14)
+    assert CELL.force(1.7) == pytest.approx(float((push * length / stiffness).subs({**numbers, push: 1.7})), rel=1e-14)
+    assert abs(float((drag / (mass * length**2)).subs(numbers)) / CELL.ratios["damping"] - 1) > 1  # as printed
+
+
+def test_defaults_are_equal_layers_without_a_lower_mass():
+    cell = PhysicalCell(length=0.1, upper_mass=0.2, upper_stiffness=3.0, upper_damping=0.01)
+    model = UnitCell(alpha0=0.5, beta0=1.2, physical=cell).metainterface()
+    assert isinstance(model, Metainterface)
+    assert (model.stiffness_ratio, model.mass_ratio, model.dissipation_ratio) == (1.0, 0.0, 1.0)
+    assert cell.time_unit == pytest.approx(math.sqrt(0.2 * 0.01 / 3.0))
+    assert isinstance(UnitCell(alpha0=0.5, beta0=1.2, physical=cell).two_layer(), TwoLayer)
+
+
+def test_loads_are_converted_and_back_and_keep_what_they_mean():
+    seconds = np.linspace(0.0, 0.4, 9)
+    si = Load(
+        frequency=25.0,  # rad/s
+        horizontal=Harmonic(amplitude=12.0, mean=1.0, phase=0.3, order=2) + 0.5,  # N
+        vertical=-20.0,
+        ground_horizontal=Record(seconds, np.sin(9 * seconds), quantity="acceleration"),  # m/s^2
+        ground_vertical=Record(seconds, np.cos(9 * seconds), quantity="velocity", scale=0.1),  # m/s
+    )
+    load = CELL.load(si)
+    t = 0.13
+    tau = CELL.time(t)
+    assert load.horizontal(tau) == pytest.approx(CELL.force(si.horizontal(t)))
+    assert load.vertical(tau) == pytest.approx(-20.0 * 0.1 / 3.0)
+    rate = CELL.length / CELL.time_unit
+    for name in ("ground_horizontal", "ground_vertical"):
+        mine, theirs = getattr(load, name), getattr(si, name)
+        assert mine(tau) == pytest.approx(theirs(t) / CELL.length, rel=1e-12)
+        assert mine.velocity(tau) == pytest.approx(theirs.velocity(t) / rate, rel=1e-12)
+        assert mine.acceleration(tau) == pytest.approx(theirs.acceleration(t) * CELL.time_unit / rate, rel=1e-12)
+    back = CELL.load_in_si(load)
+    assert back.frequency == pytest.approx(25.0)
+    assert back.horizontal(t) == pytest.approx(si.horizontal(t))
+    assert back.ground_vertical.acceleration(t) == pytest.approx(si.ground_vertical.acceleration(t))
+
+
+def test_the_model_moves_as_the_cell_does_in_si():
+    """theta'' of the dimensionless model is T^2 times that of the equation in SI, lower layer open, with everything acting."""
+    model = CELL.metainterface(1.2)
+    load = CELL.load(Load(horizontal=7.0, vertical=-11.0, lower_horizontal=2.0, lower_vertical=3.0))
+    theta, rate = 0.4, 5.0  # rad, rad/s
+    length, mass = CELL.length, CELL.upper_mass + CELL.lower_mass
+    moment = length * (9.0 * math.sin(1.2 + theta) - 8.0 * math.cos(1.2 + theta))
+    second = (moment - 0.01 * rate - 3.0 * theta) / (mass * length**2)  # rad/s^2
+    found = model.acceleration(0.0, theta, rate * CELL.time_unit, 1, load)
+    assert found == pytest.approx(second * CELL.time_unit**2, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"length": 0.0}, r"PhysicalCell.length must lie in \(0, inf\), got 0.0"),
+        ({"upper_stiffness": -1.0}, "PhysicalCell.upper_stiffness must lie in"),
+        ({"lower_mass": -0.1}, "PhysicalCell.lower_mass must lie in"),
+        ({"upper_mass": math.inf}, "PhysicalCell.upper_mass must lie in"),
+        ({"lower_damping": 0.1}, "upper_damping is 0"),
+    ],
+)
+def test_impossible_data_are_refused(change, message):
+    with pytest.raises(ParameterError, match=message):
+        PhysicalCell(**{"length": 0.1, "upper_mass": 0.2, "upper_stiffness": 3.0, **change})
