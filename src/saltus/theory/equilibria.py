@@ -1,0 +1,120 @@
+"""Equilibria under constant loads and their stability."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise
+
+from saltus.systems import System
+from saltus.theory.layer import Layer, layers
+
+ROUNDING = 4e-15  # moments below this share of a layer's scale are zero
+
+
+class Stability(Enum):
+    """Whether a small disturbance of an equilibrium grows."""
+
+    STABLE = "stable"
+    UNSTABLE = "unstable"
+    FOLD = "fold"  # P' = P'' = 0: two equilibria meet
+
+
+@dataclass(frozen=True, slots=True)
+class Equilibrium:
+    """A state of rest under constant loads."""
+
+    theta: float  # rad
+    stability: Stability
+    energy: float  # P(theta) - P(0), over K2
+    curvature: float | None  # P''(theta); None at theta = 0, where it has a corner
+    eigenvalues: tuple[complex, complex] | None  # of the linearised motion, the faster growing one first; None at theta = 0
+    within_line: bool  # abs(theta) <= pi - beta0, the straight line
+
+    @property
+    def stable(self) -> bool:
+        """Whether it is stable."""
+        return self.stability is Stability.STABLE
+
+
+def equilibria(system: System) -> tuple[Equilibrium, ...]:
+    """Every equilibrium of the full equation within the kinematic limit 2 (pi - beta0), by increasing theta.
+
+    They are the zeros of P'(theta) (`pot_balance0`), stable where P'' > 0, and theta = 0 while the loads hold both layers
+    closed or push both open. Between the zeros of P'', known in closed form, P' is monotone, so none can be missed.
+
+    Raises:
+        ParameterError: another model, a smoothed sign, or a load that varies in time.
+    """
+    lower, upper = layers(system)
+    found = [_deformed(lower, x) for x in zeros_of_slope(lower)] + [_deformed(upper, x) for x in zeros_of_slope(upper)]
+    undeformed = undeformed_stability(system)
+    if undeformed is not None:
+        found.append(Equilibrium(0.0, undeformed, 0.0, None, None, True))
+    return tuple(sorted(found, key=lambda e: e.theta))
+
+
+def undeformed_stability(system: System) -> Stability | None:
+    """Stability of theta = 0 (`stabeunstabletrivial`), or None where it is no equilibrium.
+
+    With H = 0 it is stable for V cos(beta0) < 0 and unstable for V cos(beta0) > 0; in general, stable if the loads close
+    both layers. If they push one open and the other closed the system leaves, and theta = 0 is no equilibrium.
+    At V cos(beta0) = 0 the curvature decides, k^P + V sin(beta0).
+    """
+    lower, upper = layers(system)
+    closing = (slope_sign(lower), slope_sign(upper))
+    if min(closing) > 0:
+        return Stability.STABLE
+    pushes = [layer.push(0.0) > ROUNDING * layer.scale for layer in (lower, upper)]
+    return None if pushes[0] != pushes[1] else Stability.UNSTABLE
+
+
+def zeros_of_slope(layer: Layer) -> Iterator[float]:
+    """The openings 0 < x <= 2 (pi - beta0) where P'(x) = 0, increasing; a double zero comes once."""
+    from scipy.optimize import brentq
+
+    nodes = [0.0, *layer.inflections(), layer.kinematic_limit]
+    signs = [slope_sign(layer), *(_sign(layer.slope(x), layer) for x in nodes[1:])]
+    for (a, b), (before, after) in zip(pairwise(nodes), pairwise(signs), strict=True):
+        if before * after < 0:
+            start = a if a > 0 or _sign(layer.slope(0.0), layer) else _past_contact(layer, b, before)
+            yield float(brentq(layer.slope, start, b, xtol=1e-15, rtol=1e-15))
+        elif after == 0:
+            yield b
+
+
+def slope_sign(layer: Layer) -> int:
+    """The sign of P' just inside the opening: of its first derivative at x = 0 that is not zero.
+
+    P''' is the push, and once P', P'' and P''' vanish the next one is the stiffness, above 0.
+    """
+    for value in (layer.slope(0.0), layer.curvature(0.0)):
+        if sign := _sign(value, layer):
+            return sign
+    return 1
+
+
+def _sign(value: float, layer: Layer) -> int:
+    return 0 if abs(value) <= ROUNDING * layer.scale else (1 if value > 0 else -1)
+
+
+def _past_contact(layer: Layer, end: float, sign: int) -> float:
+    """A point after the zero at x = 0 where P' has the `sign` that it has just inside."""
+    x = end / 2
+    while layer.slope(x) * sign <= 0:
+        x /= 2
+    return x
+
+
+def _deformed(layer: Layer, x: float) -> Equilibrium:
+    curvature = float(layer.curvature(x))
+    stability = Stability.STABLE if curvature > 0 else Stability.UNSTABLE
+    if x in layer.inflections():
+        stability = Stability.FOLD
+    root = cmath.sqrt(layer.damping**2 - 4 * layer.mass * curvature)
+    rates = ((-layer.damping + root) / (2 * layer.mass), (-layer.damping - root) / (2 * layer.mass))
+    within = x <= math.pi - layer.beta0
+    return Equilibrium(layer.side * x, stability, float(layer.potential(x)), curvature, rates, within)

@@ -1,0 +1,118 @@
+"""One open layer under constant loads, as a one-sided oscillator: what every closed form here starts from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.systems import Constant, Metainterface, System
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """The layer open on one side, in its opening x = s theta >= 0 (`gov_eqn_theta_long` under constant loads):
+
+        mass x'' + damping x' + stiffness x = outward sin(beta0 + x) + vertical cos(beta0 + x)
+
+    with the powers P taken: mass (1+m)^P, damping c^P C, stiffness k^P, outward s (1+h)^P H, vertical (1+v)^P V.
+    """
+
+    side: int
+    beta0: float
+    mass: float
+    damping: float
+    stiffness: float
+    outward: float
+    vertical: float
+
+    @property
+    def kinematic_limit(self) -> float:
+        """The largest opening of the mechanism, 2 (pi - beta0) (errata 20), rad."""
+        return 2 * (math.pi - self.beta0)
+
+    @property
+    def scale(self) -> float:
+        """The size of the moments, stiffness + hypot(H, V), against which rounding is judged."""
+        return self.stiffness + math.hypot(self.outward, self.vertical)
+
+    def push(self, x: Any) -> Any:
+        """The outward moment of the loads at the opening x."""
+        return self.outward * np.sin(self.beta0 + x) + self.vertical * np.cos(self.beta0 + x)
+
+    def potential(self, x: Any) -> Any:
+        """P (`pot_balance0`), zero at x = 0; the differences of sines are taken as products, exact for small x."""
+        half, middle = np.sin(x / 2), self.beta0 + x / 2
+        work = 2 * half * (self.outward * np.sin(middle) + self.vertical * np.cos(middle))
+        return self.stiffness * x * x / 2 - work
+
+    def slope(self, x: Any) -> Any:
+        """dP/dx, the moment that closes the layer."""
+        return self.stiffness * x - self.push(x)
+
+    def curvature(self, x: Any) -> Any:
+        """d2P/dx2; at x = 0 the stiffness kappa of the linearised equation."""
+        return self.stiffness - self.outward * np.cos(self.beta0 + x) + self.vertical * np.sin(self.beta0 + x)
+
+    def inflections(self) -> list[float]:
+        """The openings inside the kinematic limit where d2P/dx2 = 0, in closed form, increasing."""
+        force = math.hypot(self.outward, self.vertical)
+        if force <= self.stiffness:
+            return []
+        angle = math.atan2(self.outward, self.vertical)  # push = force cos(beta0 + x - angle)
+        dip = math.asin(self.stiffness / force)
+        bases = (angle - dip - self.beta0, angle + math.pi + dip - self.beta0)
+        found = {base + 2 * math.pi * n for base in bases for n in range(-2, 3)}
+        return sorted(x for x in found if 1e-14 < x < self.kinematic_limit)
+
+
+def open_layer(system: System, side: int) -> Layer:
+    """The layer of a metainterface that is open on `side` (+1 the lower one, -1 the upper one), under constant loads.
+
+    Raises:
+        ParameterError: another model, a smoothed sign, or a load that varies in time.
+    """
+    model = metainterface(system)
+    forces = constant_loads(system)
+    lower = side > 0
+    across = forces.get("horizontal", 0.0) + lower * forces.get("lower_horizontal", 0.0)
+    along = forces.get("vertical", 0.0) + lower * forces.get("lower_vertical", 0.0)
+    return Layer(
+        side=side,
+        beta0=model.beta0,
+        mass=1 + lower * model.mass_ratio,
+        damping=model.damping * (model.dissipation_ratio if lower else 1.0),
+        stiffness=model.stiffness_ratio if lower else 1.0,
+        outward=side * across,
+        vertical=along,
+    )
+
+
+def layers(system: System) -> tuple[Layer, Layer]:
+    """The lower layer (theta > 0) and the upper one (theta < 0)."""
+    return open_layer(system, 1), open_layer(system, -1)
+
+
+def metainterface(system: System) -> Metainterface:
+    """The system's model, refused unless it is an exact `Metainterface`."""
+    model = system.model
+    if not isinstance(model, Metainterface):
+        raise ParameterError(f"this closed form is for a Metainterface, got a {type(model).__name__}")
+    if model.smoothing is not None:
+        raise ParameterError("this closed form is for the exact sign of theta; drop the model's smoothing")
+    return model
+
+
+def constant_loads(system: System) -> dict[str, float]:
+    """The value of each force channel; a constant displacement of the ground does nothing.
+
+    Raises:
+        ParameterError: a channel that varies in time.
+    """
+    for name, signal in system.load.channels.items():
+        if not isinstance(signal, Constant):
+            raise ParameterError(f"this closed form is for constant loads, but load.{name} varies in time; give it as a number")
+    return {name: s.value for name, s in system.load.channels.items() if isinstance(s, Constant) and "ground" not in name}

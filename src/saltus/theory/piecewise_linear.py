@@ -1,0 +1,132 @@
+"""The free vibration of the linearised, piecewise-linear equation, impact by impact."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.systems import System
+from saltus.systems.checks import check_number
+from saltus.theory.layer import Layer, layers
+from saltus.theory.small_vibrations import vibration
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """One smooth arc in the opening x of a layer, t counted from its start (`linsol_theta1`):
+
+        x(t) = centre + e^(-decay t) [(start - centre) cos(w t) + (velocity + decay (start - centre)) / w sin(w t)]
+
+    It is evaluated as start (...) + velocity (...) + centre (1 - ...), which is exact for short t too.
+    """
+
+    layer: Layer
+    centre: float
+    decay: float  # mu Omega_0
+    frequency: float  # w = sqrt(1 - mu^2) Omega_0
+    start: float
+    velocity: float
+
+    def position(self, t: Any) -> Any:
+        """x(t)."""
+        sine, ratio = np.sin(self.frequency * t), self.decay / self.frequency
+        shrink = np.exp(-self.decay * t)
+        lost = -np.expm1(-self.decay * t) + shrink * (2 * np.sin(self.frequency * t / 2) ** 2 - ratio * sine)
+        return self.start * (1 - lost) + self.velocity * shrink * sine / self.frequency + self.centre * lost
+
+    def speed(self, t: Any) -> Any:
+        """x'(t)."""
+        sine, cosine = np.sin(self.frequency * t), np.cos(self.frequency * t)
+        pull = (self.centre - self.start) * (self.frequency + self.decay**2 / self.frequency)
+        return np.exp(-self.decay * t) * (self.velocity * (cosine - self.decay / self.frequency * sine) + pull * sine)
+
+    def impact_time(self) -> float | None:
+        """The first t > 0 with x(t) = 0, or None if the layer stays open for good.
+
+        x' is zero every pi / w; the first minimum is the lowest one, so without a zero before it there is none at all.
+        """
+        from scipy.optimize import brentq
+
+        half, top = math.pi / self.frequency, 0.0
+        if self.velocity > 0:
+            pull = (self.centre - self.start) * (self.frequency + self.decay**2 / self.frequency)
+            top = math.atan2(self.velocity, self.velocity * self.decay / self.frequency - pull) / self.frequency
+        bottom = top + half
+        if self.position(bottom) >= 0:
+            return None
+        t = float(brentq(self.position, top, bottom, xtol=1e-300, rtol=1e-15))
+        return t - float(self.position(t) / self.speed(t))
+
+
+@dataclass(frozen=True, slots=True)
+class LinearMotion:
+    """A motion of the piecewise-linear equation; call it for theta(tau) and theta'(tau)."""
+
+    impact_times: np.ndarray  # (n,) tau_*^[i]
+    velocity_before: np.ndarray  # (n,) theta' just before each impact
+    velocity_after: np.ndarray  # (n,) theta' just after
+    arcs: tuple[Arc, ...]  # the first from 0, the others from each impact; none from an impact that stops the motion
+    end: float  # the time up to which it is known: the next impact, or infinity if none follows
+
+    def __call__(self, tau: Any) -> tuple[Any, Any]:
+        """theta and theta' at `tau`, any shape, from 0 to `end`; just after an impact the velocity is the one after it.
+
+        Raises:
+            ParameterError: a time before 0 or after `end`.
+        """
+        tau = np.asarray(tau, dtype=float)
+        if np.any((tau < 0) | (tau > self.end)):
+            raise ParameterError(f"tau must lie in [0, {self.end:.6g}], where this motion was computed; ask for more impacts")
+        theta, velocity = np.empty_like(tau), np.empty_like(tau)
+        index = np.searchsorted(self.impact_times, tau, side="right")
+        for i in np.unique(index):
+            here = index == i
+            if i < len(self.arcs):
+                arc, local = self.arcs[i], tau[here] - (self.impact_times[i - 1] if i else 0.0)
+                theta[here], velocity[here] = arc.layer.side * arc.position(local), arc.layer.side * arc.speed(local)
+            else:
+                theta[here] = velocity[here] = 0.0
+        return theta[()], velocity[()]
+
+
+def linear_motion(system: System, theta0: float, impacts: int) -> LinearMotion:
+    """The solution of `gov_eqn_constant_loading_lin` from theta0, at rest, through so many impacts (`linsol_theta1`).
+
+    Any k, m, c, e or r and either sign of theta0; a constant H acts through s H sin(beta0) and the stiffness -s H cos(beta0).
+
+    Raises:
+        ParameterError: theta0 = 0, a layer that is not subcritical (mu < 1 and k^P + V sin(beta0) > 0), no impacts asked for,
+            a load that varies in time.
+    """
+    check_number("theta0", theta0)
+    if theta0 == 0 or impacts < 1:
+        raise ParameterError(f"linear_motion needs theta0 other than 0 and at least 1 impact, got {theta0!r} and {impacts!r}")
+    by_side = {layer.side: layer for layer in layers(system)}
+    side = 1 if theta0 > 0 else -1
+    arcs, times = [_arc(by_side[side], abs(theta0), 0.0)], [0.0]
+    before: list[float] = []
+    after: list[float] = []
+    while (t := arcs[-1].impact_time()) is not None and len(before) < impacts:
+        times.append(times[-1] + t)
+        before.append(side * float(arcs[-1].speed(t)))
+        after.append(float(system.impact.velocity_after(system.model, times[-1], before[-1], side, -side, system.load)))
+        side = -side
+        if after[-1] == 0:
+            t = None
+            break
+        arcs.append(_arc(by_side[side], 0.0, abs(after[-1])))
+    end = math.inf if t is None else times[-1] + t
+    return LinearMotion(np.array(times[1:]), np.array(before), np.array(after), tuple(arcs), end)
+
+
+def _arc(layer: Layer, start: float, velocity: float) -> Arc:
+    vib = vibration(layer)
+    if vib.damping_ratio >= 1:
+        raise ParameterError(f"the damping must be subcritical (mu < 1) for vibrations, got mu = {vib.damping_ratio:.6g}")
+    decay = vib.damping_ratio * vib.frequency
+    frequency = math.sqrt(1 - vib.damping_ratio**2) * vib.frequency
+    return Arc(layer, layer.side * vib.centre, decay, frequency, start, velocity)

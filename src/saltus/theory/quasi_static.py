@@ -1,0 +1,145 @@
+"""Quasi-static loading: the monostable domain of the undeformed state with both of its borders, and static angles."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.systems import Load, Metainterface, System
+from saltus.systems.checks import check_number
+from saltus.theory.equilibria import zeros_of_slope
+from saltus.theory.layer import open_layer
+
+
+def critical_horizontal(beta0: float, vertical: Any) -> Any:
+    """Hcr = abs(V / tan(beta0)), where the undeformed state is lost (the paper's QSB line), any shape of V.
+
+    Raises:
+        ParameterError: V cos(beta0) > 0, where the undeformed state is unstable for every H.
+    """
+    _check_angle(beta0)
+    if np.any(np.asarray(vertical) * math.cos(beta0) > 0):
+        raise ParameterError(f"V cos(beta0) must not be above 0, or theta = 0 is unstable for every H; got V = {vertical!r}")
+    return np.abs(np.asarray(vertical, dtype=float) / math.tan(beta0))[()]
+
+
+def fold_curve(beta0: float, opening: Any) -> tuple[Any, Any]:
+    """The loads (H, V) at which two deformed equilibria of a symmetric system (k = 1) meet at theta = x >= 0, any shape:
+
+        H = x sin(beta0 + x) + cos(beta0 + x),   V = x cos(beta0 + x) - sin(beta0 + x)
+
+    These solve P' = x - H sin(beta0 + x) - V cos(beta0 + x) = 0 and P'' = 0, which are linear in H and V. The curve leaves the
+    line V cos(beta0) = -H sin(beta0) at x = 0, V = -sin(beta0), tangent to it. Its mirror is H -> -H.
+
+    Raises:
+        ParameterError: an opening out of [0, pi - beta0]; at pi - beta0 the curve has a cusp, and beyond it bounds nothing new.
+    """
+    _check_angle(beta0)
+    opening = np.asarray(opening, dtype=float)
+    if np.any((opening < 0) | (opening > math.pi - beta0)):
+        raise ParameterError(f"the opening must lie in [0, {math.pi - beta0:.6g}] rad, the straight line")
+    angle = beta0 + opening
+    return (opening * np.sin(angle) + np.cos(angle))[()], (opening * np.cos(angle) - np.sin(angle))[()]
+
+
+def subcritical_vertical(beta0: float) -> float:
+    """V = -sin(beta0), below which the buckling at Hcr is subcritical (errata 23), for beta0 < pi/2."""
+    _check_angle(beta0, math.pi / 2)
+    return -math.sin(beta0)
+
+
+def unloaded_fold(beta0: float) -> tuple[float, float]:
+    """The V below which deformed equilibria exist without any H (k = 1, beta0 < pi/2, errata 23), and their theta there:
+
+    x = -cot(beta0 + x),   V = -1 / sin(beta0 + x),   the point H = 0 of `fold_curve`
+    """
+    from scipy.optimize import brentq
+
+    _check_angle(beta0, math.pi / 2)
+    opening = float(brentq(lambda x: fold_curve(beta0, x)[0], math.pi / 2 - beta0, math.pi - beta0, xtol=1e-15, rtol=1e-15))
+    return -1 / math.sin(beta0 + opening), opening
+
+
+def fold_horizontal(beta0: float, vertical: Any) -> Any:
+    """The abs(H) above which deformed equilibria exist for -sin(beta0) >= V, any shape of V (k = 1, beta0 < pi/2, errata 23).
+
+    It is `fold_curve` at the opening with dV/dx = -x sin(beta0 + x) < 0, found by bisection; 0 below `unloaded_fold`, where they
+    exist without any H. It is never above Hcr.
+
+    Raises:
+        ParameterError: V above -sin(beta0): the buckling is then supercritical and Hcr itself is the border.
+    """
+    _check_angle(beta0, math.pi / 2)
+    vertical = np.asarray(vertical, dtype=float)
+    if np.any(vertical > -math.sin(beta0)):
+        largest = -math.sin(beta0)
+        raise ParameterError(
+            f"a fold needs V <= -sin(beta0) = {largest:.6g}, above which Hcr is the border; got V = {vertical!r}"
+        )
+    low, high = np.zeros_like(vertical), np.full_like(vertical, unloaded_fold(beta0)[1])
+    for _ in range(60):
+        middle = (low + high) / 2
+        above = fold_curve(beta0, middle)[1] > vertical
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    return np.maximum(fold_curve(beta0, (low + high) / 2)[0], 0.0)[()]
+
+
+def is_monostable(beta0: float, horizontal: Any, vertical: Any) -> Any:
+    """Whether the undeformed state is the only equilibrium of a symmetric system (k = 1) under constant H and V (errata 23).
+
+    True where V cos(beta0) < -abs(H) sin(beta0), the domain of Fig. 8, and, if V < -sin(beta0) with beta0 < pi/2, abs(H) is
+    also below the fold of equilibria. Only the layer that H pushes open, and only before the straight line, needs
+    looking at: the other layer's push at beta0 + x is this one's at 2 pi - beta0 - x, so its equilibria come later.
+    Broadcasts; arrays of bool.
+    """
+    _check_angle(beta0)
+    size, vertical = np.broadcast_arrays(np.abs(np.asarray(horizontal, dtype=float)), np.asarray(vertical, dtype=float))
+    held = vertical * math.cos(beta0) < -size * math.sin(beta0)
+    if beta0 < math.pi / 2:
+        held = held & ((vertical > -math.sin(beta0)) | (size < fold_horizontal(beta0, np.minimum(vertical, -math.sin(beta0)))))
+    return held[()]
+
+
+def paper_monostable(beta0: float, horizontal: Any, vertical: Any) -> Any:
+    """The domain as Fig. 8 states it, V cos(beta0) < -abs(H) sin(beta0): the undeformed state is stable there, but not alone."""
+    _check_angle(beta0)
+    return np.asarray(vertical) * math.cos(beta0) < -np.abs(horizontal) * math.sin(beta0)
+
+
+def static_angle(beta0: float, horizontal: float, vertical: float) -> float:
+    """theta_st, the equilibrium that the undeformed state gives way to as H grows past Hcr to its amplitude, V constant (k = 1).
+
+    The smallest positive zero of P', stable because the loads push open at contact.
+
+    Raises:
+        ParameterError: abs(H) <= Hcr, where the undeformed state holds and theta_st does not exist; no equilibrium
+            before the kinematic limit.
+    """
+    size, critical = abs(horizontal), critical_horizontal(beta0, vertical)
+    if size <= critical:
+        raise ParameterError(f"abs(H) = {size:.6g} must exceed Hcr = {critical:.6g} for theta_st to exist")
+    system = System(model=Metainterface(beta0=beta0), load=Load(horizontal=size, vertical=vertical))
+    angle = next(zeros_of_slope(open_layer(system, 1)), None)
+    if angle is None:
+        raise ParameterError(f"no equilibrium before the kinematic limit under H = {size!r}, V = {vertical!r}")
+    return angle
+
+
+def equivalent_angle(beta0: float, ground_amplitude: Any) -> Any:
+    """theta_eq = arccos(cos(beta0) - zetahat) - beta0, the opening whose horizontal displacement is zetahat, any shape.
+
+    Raises:
+        ParameterError: zetahat out of [0, 1 + cos(beta0)], the largest displacement (`max_disp_condition`).
+    """
+    _check_angle(beta0)
+    amplitude, largest = np.asarray(ground_amplitude, dtype=float), 1 + math.cos(beta0)
+    if not np.all((amplitude >= 0) & (amplitude <= largest)):
+        raise ParameterError(f"zetahat must lie in [0, {largest:.6g}], that is 1 + cos(beta0), got {ground_amplitude!r}")
+    return (np.arccos(np.maximum(math.cos(beta0) - amplitude, -1.0)) - beta0)[()]
+
+
+def _check_angle(beta0: float, below: float = math.pi) -> None:
+    check_number("beta0", beta0, above=0.0, below=below, unit="rad")

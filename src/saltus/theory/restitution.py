@@ -1,0 +1,106 @@
+"""What an impact does to velocity and energy: the restitution of inelastic contact, and r as against e."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.systems import EnergyRestitution, System
+from saltus.systems.checks import check_number
+from saltus.theory.layer import metainterface
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A frictionless, perfectly inelastic impact that ends one side."""
+
+    factor: float  # theta'+ / theta'-, 0 where the motion stops
+    restitution: float  # r = T+ / T- on a ground at rest
+    impulses: tuple[
+        float, float
+    ]  # over theta'-: of the constraints theta_1 >= 0 and theta_2 <= 0, rows one and two of M [[theta']]
+
+
+def inelastic_contact(beta0: float, mass_ratio: float, side: int) -> Contact:
+    """The impact that ends `side` (+1: from lower to upper) from the momentum balance M0 [[theta']] = impulses (errata 25).
+
+    M0 = [[1+m, -cos(2 beta0)], [-cos(2 beta0), 1]] is M of `eomnl` at theta = 0. The layer that arrives is stopped by its
+    constraint; the one that is not hit has no impulse on it, and its row gives its velocity:
+
+        lower to upper:  theta'+ = -cos(2 beta0) theta'-           for every m
+        upper to lower:  theta'+ = -cos(2 beta0) / (1+m) theta'-
+
+    Both keep r = cos^2(2 beta0) / (1+m) of the energy. Ground velocities are continuous, so they drop out of the jump. This
+    opens the other layer the right way for pi/4 < beta0 < 3 pi/4; otherwise its constraint acts too, and both stop (factor 0).
+
+    Raises:
+        ParameterError: beta0 out of (0, pi), m below 0, a side other than +1 and -1.
+    """
+    check_number("beta0", beta0, above=0.0, below=math.pi, unit="rad")
+    check_number("mass_ratio", mass_ratio, at_least=0.0)
+    if side not in (1, -1):
+        raise ParameterError(f"side must be +1 (lower) or -1 (upper), got {side!r}")
+    coupling = -math.cos(2 * beta0)
+    matrix = ((1 + mass_ratio, coupling), (coupling, 1.0))
+    hit, free = (0, 1) if side > 0 else (1, 0)
+    factor = max(coupling / matrix[free][free], 0.0)
+    jump = [0.0, 0.0]
+    jump[hit], jump[free] = -1.0, factor
+    impulses = tuple(row[0] * jump[0] + row[1] * jump[1] for row in matrix)
+    return Contact(factor, factor**2 * matrix[free][free] / matrix[hit][hit], (impulses[0], impulses[1]))
+
+
+def energy_factor(system: System, velocity: float, side: int, e: float, tau: float = 0.0) -> float:
+    """r = T+ / T- of an impact that ends `side` at tau with theta'- = velocity, theta'+ = e theta'- (`rest_def_vel`, errata 5).
+
+    T is the model's kinetic energy, with its ground velocities and the mass that moves on each side; the paper's formula has
+    the vertical ground velocity with one sign on both sides. On a ground at rest r = e^2 / (1+m)^s, with m = 0 the e^2
+    of `rest_def_red`.
+
+    Raises:
+        ParameterError: T- = 0; a model without kinetic energy.
+    """
+    before = float(system.model.kinetic_energy(tau, system.model.contact, velocity, side, system.load))
+    if before == 0:
+        raise ParameterError("r = T+ / T- has no meaning where the kinetic energy before the impact is 0")
+    return float(system.model.kinetic_energy(tau, system.model.contact, e * velocity, -side, system.load)) / before
+
+
+def velocity_factor(system: System, velocity: float, side: int, r: float, tau: float = 0.0) -> float:
+    """e = theta'+ / theta'- of an impact that ends `side` with T+ = r T- (`rest_def`): the inverse of `energy_factor`.
+
+    Raises:
+        ParameterError: velocity = 0, or none solves it (errata 26), with the instant and the velocity.
+    """
+    if velocity == 0:
+        raise ParameterError("e = theta'+ / theta'- has no meaning at velocity 0")
+    after = float(EnergyRestitution(r).velocity_after(system.model, tau, velocity, side, -side, system.load))
+    if math.isnan(after):
+        raise ParameterError(
+            f"no velocity of the same sign keeps r = {r!r} of the energy at tau = {tau!r} from theta' = {velocity!r}"
+        )
+    return after / velocity
+
+
+def energy_jump(system: System, velocity: Any, side: int, e: Any, tau: Any = 0.0) -> Any:
+    """[[T]] over K2 at an impact of the metainterface that ends `side`, theta'+ = e theta'-; it broadcasts (errata 5):
+
+        from lower:  -[(1+m-e^2) v^2 + 2 v ((1+m-e) sin(beta0) zeta' + (1+m+e) cos(beta0) nu')] / 2
+        from upper:  -[(1-(1+m) e^2) v^2 + 2 v ((1-(1+m) e) sin(beta0) zeta' - (1+(1+m) e) cos(beta0) nu')] / 2
+
+    The energy decreases where this is below 0. With nu' other than 0 it changes even at e = 1, m = 0.
+
+    Raises:
+        ParameterError: another model.
+    """
+    model = metainterface(system)
+    velocity, e = np.asarray(velocity, dtype=float), np.asarray(e, dtype=float)
+    zeta, nu = system.load.ground_horizontal.velocity(tau), system.load.ground_vertical.velocity(tau)
+    before, after = (1 + model.mass_ratio, 1.0) if side > 0 else (1.0, 1 + model.mass_ratio)
+    across = (before - after * e) * math.sin(model.beta0) * zeta
+    along = side * (before + after * e) * math.cos(model.beta0) * nu
+    return (-((before - after * e * e) * velocity**2 + 2 * velocity * (across + along)) / 2)[()]

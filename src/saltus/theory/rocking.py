@@ -1,0 +1,106 @@
+"""The free rigid rocking block: its periods, and the energy that an impact takes or gives (paper, appendix A)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.systems.checks import check_number
+
+
+def rocking_period(theta0: Any, *, alpha: float) -> Any:
+    """Exact period of free rocking from theta0, at rest, without losses, in units of 1/p, any shape:
+
+        p T0 = 4 F(chi | cos^2((alpha - theta0) / 2)),
+        tan(chi) = sqrt(sin(alpha - theta0/2) sin(theta0/2)) / (cos(alpha/2) sin((alpha - theta0)/2))
+
+    with F the incomplete elliptic integral of the first kind: alpha - theta is an inverted pendulum (`EOM&Rock`).
+
+    Raises:
+        ParameterError: abs(theta0) >= alpha, from where the block overturns.
+    """
+    from scipy.special import ellipkinc
+
+    size = _amplitude(theta0, alpha)
+    rise = np.sqrt(np.sin(alpha - size / 2) * np.sin(size / 2))
+    chi = np.arctan2(rise, math.cos(alpha / 2) * np.sin((alpha - size) / 2))
+    return 4 * ellipkinc(chi, np.cos((alpha - size) / 2) ** 2)
+
+
+def short_rocking_period(theta0: Any, *, alpha: float) -> Any:
+    """p T0 = 4 sqrt(2 abs(theta0) / sin(alpha)), for abs(theta0) << alpha (appendix A), any shape, in units of 1/p.
+
+    Raises:
+        ParameterError: abs(theta0) >= alpha.
+    """
+    return 4 * np.sqrt(2 * _amplitude(theta0, alpha) / math.sin(alpha))
+
+
+def slender_rocking_period(theta0: Any, *, alpha: float) -> Any:
+    """p T0 = 4 arccosh(1 / (1 - abs(theta0) / alpha)), for slender blocks (Housner 1963), any shape, in units of 1/p.
+
+    It holds for small alpha and every abs(theta0) < alpha, not only close to alpha as the paper says (errata 17); its relative
+    error is of order alpha^2.
+
+    Raises:
+        ParameterError: abs(theta0) >= alpha.
+    """
+    return 4 * np.arccosh(1 / (1 - _amplitude(theta0, alpha) / alpha))
+
+
+def rocking_energy_jump(velocity: Any, *, alpha: float, e: float, ground_velocity: Any = 0.0) -> Any:
+    """[[T]] at an impact with theta'+ = e theta'-, over (4/3) M R^2 p^2 (appendix A, errata 10: the term zeta'^2 cancels):
+
+        [[T]] = -(1 - e) / 2 {(1 + e) theta'^2 + 2 theta' zeta' cos(alpha)}
+
+    Args:
+        velocity: theta'- in the time p t, any shape.
+        ground_velocity: zeta' in the same time, zeta = 3 U_h / (4 R); it broadcasts.
+    """
+    _check(alpha, e)
+    velocity, ground_velocity = np.asarray(velocity, dtype=float), np.asarray(ground_velocity, dtype=float)
+    return (-(1 - e) / 2 * ((1 + e) * velocity**2 + 2 * velocity * ground_velocity * math.cos(alpha)))[()]
+
+
+def rocking_energy_decreases(velocity: Any, *, alpha: float, e: float, ground_velocity: Any = 0.0) -> Any:
+    """Whether the impact lowers the kinetic energy, e < 1 (appendix A): if either condition holds (errata 12), not both:
+
+        theta' zeta' > 0,   or   abs(zeta') < (1 + e) / (2 cos(alpha)) abs(theta')
+
+    Broadcasts; arrays of bool.
+    """
+    _check(alpha, e)
+    velocity, ground_velocity = np.asarray(velocity, dtype=float), np.asarray(ground_velocity, dtype=float)
+    slow_ground = np.abs(ground_velocity) < (1 + e) / (2 * math.cos(alpha)) * np.abs(velocity)
+    return ((e < 1) & ((velocity * ground_velocity > 0) | slow_ground))[()]
+
+
+def housner_restitution(alpha: float) -> float:
+    """r = (1 - (3/2) sin^2(alpha))^2, the energy kept when angular momentum about the new corner is (Housner 1963).
+
+    The velocity factor is its root, above 0 for sin^2(alpha) < 2/3.
+
+    Raises:
+        ParameterError: sin^2(alpha) >= 2/3, where the block would have to bounce back.
+    """
+    _check(alpha, 1.0)
+    factor = 1 - 1.5 * math.sin(alpha) ** 2
+    if factor <= 0:
+        raise ParameterError(f"alpha must be below {math.asin(math.sqrt(2 / 3)):.6g} rad for the block to rock on, got {alpha!r}")
+    return factor**2
+
+
+def _amplitude(theta0: Any, alpha: float) -> Any:
+    _check(alpha, 1.0)
+    size = np.abs(np.asarray(theta0, dtype=float))
+    if not np.all(size < alpha):
+        raise ParameterError(f"abs(theta0) must be below alpha = {alpha:.6g} rad, or the block overturns; got {theta0!r}")
+    return size
+
+
+def _check(alpha: float, e: float) -> None:
+    check_number("alpha", alpha, above=0.0, below=math.pi / 2, unit="rad")
+    check_number("e", e, at_least=0.0, at_most=1.0)

@@ -1,0 +1,164 @@
+"""Small free vibrations under a constant vertical load: frequencies, period, and its decay by impacts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.systems import System
+from saltus.systems.checks import check_number
+from saltus.theory.layer import Layer, layers
+
+
+@dataclass(frozen=True, slots=True)
+class Vibration:
+    """The small vibration of one open layer about its own (virtual) centre (`gov_beta_reduced`)."""
+
+    frequency: float  # apparent angular frequency Omega_0
+    damping_ratio: float  # mu
+    centre: float  # theta of the linearised equilibrium
+
+
+def vibrations(system: System) -> tuple[Vibration, Vibration]:
+    """Omega_0 and mu on the lower layer (p = 1) and on the upper one (p = 2) (`fre_freq_xi`):
+
+        Omega_0 = sqrt(kappa / M),   mu = C_p / (2 sqrt(M kappa)),   kappa = k^P + V sin(beta0),  M = (1+m)^P,  C_p = c^P C
+
+    A constant H adds -s H cos(beta0) to kappa.
+
+    Raises:
+        ParameterError: kappa <= 0, where the layer does not vibrate; another model, or a load that varies in time.
+    """
+    return vibration(layers(system)[0]), vibration(layers(system)[1])
+
+
+def vibration(layer: Layer) -> Vibration:
+    """Omega_0, mu and the centre of one layer, as in `vibrations`."""
+    kappa = float(layer.curvature(0.0))
+    if kappa <= 0:
+        name = "lower" if layer.side > 0 else "upper"
+        raise ParameterError(
+            f"the {name} layer does not vibrate: its linear stiffness k + V sin(beta0) = {kappa:.6g} must be above 0"
+        )
+    frequency = math.sqrt(kappa / layer.mass)
+    centre = layer.side * float(layer.push(0.0)) / kappa
+    return Vibration(frequency, layer.damping / (2 * math.sqrt(layer.mass * kappa)), centre)
+
+
+def linear_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
+    """T0(theta0) of the symmetric undamped system (`t-beta`; k = 1, m = C = 0, e = 1), any shape:
+
+        T0 = 4 / sqrt(kappa) arccos(1 / (1 - kappa abs(theta0) / (V cos(beta0)))),   kappa = 1 + V sin(beta0)
+
+    continued to kappa <= 0, where it is an arccosh and grows without bound as abs(theta0) nears the saddle of `non-trivial`.
+
+    Raises:
+        ParameterError: V cos(beta0) > 0 (theta = 0 is then unstable, `stabeunstabletrivial`), or theta0 at or past the saddle.
+    """
+    kappa, closing = _linear(beta0, vertical)
+    size = np.abs(np.asarray(theta0, dtype=float))
+    if closing <= 0:
+        if closing < -1e-15 or kappa <= 0:
+            raise ParameterError(f"no vibration about theta = 0, stable only for V cos(beta0) below 0, got {-closing:.6g}")
+        period = np.full_like(size, 2 * math.pi / math.sqrt(kappa))
+        return period if period.ndim else float(period)
+    stretch = kappa * size / closing  # the argument of arccos is 1 / (1 + stretch)
+    if np.any(stretch <= -1):
+        raise ParameterError(f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the motion diverges")
+    tangent = np.sqrt(np.abs(stretch) * (2 + stretch))
+    if kappa > 0:
+        period = 4 / math.sqrt(kappa) * np.arctan(tangent)
+    elif kappa < 0:
+        period = 4 / math.sqrt(-kappa) * np.arctanh(tangent)
+    else:
+        period = 4 * np.sqrt(2 * size / closing)
+    return period if period.ndim else float(period)
+
+
+def short_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
+    """T0 for abs(theta0) << abs(V cos(beta0) / (1 + V sin(beta0))) (`t-beta_exp`), any shape:
+
+        T0 = 4 sqrt(2 abs(theta0)) / sqrt(-V cos(beta0)); its relative error is 5/12 of kappa abs(theta0) / (V cos(beta0))
+
+    Raises:
+        ParameterError: V cos(beta0) >= 0.
+    """
+    closing = _linear(beta0, vertical)[1]
+    if closing <= 1e-15:
+        raise ParameterError(f"this expansion needs V cos(beta0) below 0, got {-closing:.6g}")
+    return 4 * np.sqrt(2 * np.abs(theta0)) / math.sqrt(closing)
+
+
+def upright_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
+    """T0 for beta0 close to pi/2 (`t-beta_exp2`), any shape; its error is of order (pi/2 - beta0)^2:
+
+        T0 = 4 / sqrt(1+V) arccos(1 / (1 - (1+V) / V abs(theta0) / (pi/2 - beta0)))
+
+    Raises:
+        ParameterError: V (pi/2 - beta0) >= 0, V = -1, or theta0 at or past the saddle V (pi/2 - beta0) / (1+V).
+    """
+    check_number("beta0", beta0, above=0.0, below=math.pi, unit="rad")
+    check_number("vertical", vertical)
+    closing, kappa = -vertical * (math.pi / 2 - beta0), 1 + vertical
+    if closing <= 0 or kappa == 0:
+        raise ParameterError(f"this expansion needs V (pi/2 - beta0) below 0 and V other than -1, got V = {vertical!r}")
+    stretch = kappa * np.abs(np.asarray(theta0, dtype=float)) / closing
+    if np.any(stretch <= -1):
+        raise ParameterError(f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the motion diverges")
+    angle = np.arccos(1 / (1 + stretch)) / math.sqrt(kappa) if kappa > 0 else np.arccosh(1 / (1 + stretch)) / math.sqrt(-kappa)
+    return 4 * angle
+
+
+def decayed_amplitude(cycle: Any, *, theta0: float, e: float) -> Any:
+    """Amplitude theta_D of the n-th cycle, from peak to peak (`approx1`, errata 8): e^(4 (n-1)) theta0, n = 1, 2, ...
+
+    The paper prints e^(4n). Each impact takes e^2 off the energy, which is proportional to the amplitude while that is small.
+
+    Raises:
+        ParameterError: e out of (0, 1], or n below 1.
+    """
+    return theta0 * _factor(cycle, e) ** 4
+
+
+def decayed_period(cycle: Any, *, period: float, e: float) -> Any:
+    """Duration T_D of the n-th cycle, from peak to peak (`reduced_period`): e^(2 (n-1)) (1+e)^2 T0 / 4, n = 1, 2, ...
+
+    Counted from impact to impact instead, the first lasts (1 + 2e) T0 / 4 from the start (errata 8).
+
+    Args:
+        cycle: n, a number or an array of them.
+        period: T0(theta0) without losses.
+
+    Raises:
+        ParameterError: e out of (0, 1], or n below 1.
+    """
+    return (1 + e) ** 2 / 4 * period * _factor(cycle, e) ** 2
+
+
+def final_time(*, period: float, e: float) -> float:
+    """The time at which small vibrations end (`finaltime`): (1+e) / (4 (1-e)) T0(theta0), the sum of all `decayed_period`.
+
+    Raises:
+        ParameterError: e out of [0, 1): without losses the vibration goes on for ever.
+    """
+    check_number("e", e, at_least=0.0, below=1.0)
+    return (1 + e) / (4 * (1 - e)) * period
+
+
+def _factor(cycle: Any, e: float) -> Any:
+    """e^(n-1)."""
+    check_number("e", e, above=0.0, at_most=1.0)
+    if np.any(np.asarray(cycle) < 1):
+        raise ParameterError(f"cycles are counted from 1, got {cycle!r}")
+    return e ** (np.asarray(cycle, dtype=float) - 1)
+
+
+def _linear(beta0: float, vertical: float) -> tuple[float, float]:
+    """kappa = 1 + V sin(beta0) and -V cos(beta0)."""
+    check_number("beta0", beta0, above=0.0, below=math.pi, unit="rad")
+    check_number("vertical", vertical)
+    return 1 + vertical * math.sin(beta0), -vertical * math.cos(beta0)
