@@ -1,3 +1,96 @@
-"""saltus."""
+"""Exact non-smooth dynamics of a buckling-based metainterface and of its relatives.
+
+The public names are loaded at their first use, so that `import saltus` stays light.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from saltus import flow, systems, theory
+    from saltus.config import load_study
+    from saltus.errors import MotionError, ParameterError, SaltusError, TraceError
+    from saltus.flow import EventKind, Motion, Stop, simulate
+    from saltus.systems import (
+        EnergyRestitution,
+        Harmonic,
+        InelasticImpact,
+        Load,
+        Metainterface,
+        Model,
+        Record,
+        RockingBlock,
+        System,
+        TwoLayer,
+        UnitCell,
+        VelocityReduction,
+        WallOscillator,
+        register,
+    )
+
+_HOMES = {
+    "saltus.errors": ("MotionError", "ParameterError", "SaltusError", "TraceError"),
+    "saltus.config": ("load_study",),
+    "saltus.flow": ("EventKind", "Motion", "Stop", "simulate"),
+    "saltus.systems": (
+        "EnergyRestitution",
+        "Harmonic",
+        "InelasticImpact",
+        "Load",
+        "Metainterface",
+        "Model",
+        "Record",
+        "RockingBlock",
+        "System",
+        "TwoLayer",
+        "UnitCell",
+        "VelocityReduction",
+        "WallOscillator",
+        "register",
+    ),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+_ROOMS = ("flow", "systems", "theory")
+
+__all__ = [
+    "EnergyRestitution",
+    "EventKind",
+    "Harmonic",
+    "InelasticImpact",
+    "Load",
+    "Metainterface",
+    "Model",
+    "Motion",
+    "MotionError",
+    "ParameterError",
+    "Record",
+    "RockingBlock",
+    "SaltusError",
+    "Stop",
+    "System",
+    "TraceError",
+    "TwoLayer",
+    "UnitCell",
+    "VelocityReduction",
+    "WallOscillator",
+    "flow",
+    "load_study",
+    "register",
+    "simulate",
+    "systems",
+    "theory",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME_OF:
+        return getattr(import_module(_HOME_OF[name]), name)
+    if name in _ROOMS:
+        return import_module(f"saltus.{name}")
+    raise AttributeError(f"saltus has no {name!r}; see dir(saltus)")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,53 @@
+"""A motion as an xarray Dataset, with units and provenance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray
+
+    from saltus.flow.motion import Motion
+
+SAMPLES = 200  # a forcing period
+
+
+def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
+    """The sampled states over `time`, the impacts over `crossing`, and in the attributes all that repeats the motion."""
+    import xarray
+
+    from saltus import __version__
+
+    period = motion.system.load.period
+    if times is None:
+        count = 10 * SAMPLES if period is None else int(np.ceil(SAMPLES * (motion.time - motion.start) / period))
+        times = np.linspace(motion.start, motion.time, max(2, count + 1))
+    times = np.atleast_1d(np.asarray(times, dtype=float))
+    position, velocity, side = motion._states(times)
+    names = motion.system.model.coordinates
+    dataset = xarray.Dataset(coords={"time": ("time", times, {"units": "1", "long_name": "dimensionless time tau"})})
+    for i, name in enumerate(names):
+        unit = "rad" if name.startswith("theta") else "1"
+        rate = "velocity" if len(names) == 1 else f"{name}_velocity"
+        dataset[name] = ("time", position[i], {"units": unit})
+        dataset[rate] = ("time", velocity[i], {"units": unit, "long_name": f"d {name} / d tau"})
+    dataset["side"] = ("time", side.astype(np.int8), {"units": "1", "long_name": "side, 0 at rest"})
+    crossings = motion.crossings
+    for name in ("time", "velocity_before", "velocity_after"):
+        dataset[f"crossing_{name}"] = ("crossing", getattr(crossings, name), {"units": "1"})
+    dataset.attrs = {
+        "title": "motion computed by saltus",
+        "saltus_version": __version__,
+        "system": motion.system.to_json(),
+        "tol": motion.tol,
+        "stop": motion.stop.value + (f" ({motion.limit})" if motion.limit else ""),
+        "end_time": motion.time,
+        "phase_known": str(motion.phase_known),
+        "validity": str(motion.validity),
+        "Conventions": "CF-1.8",
+    }
+    if motion.rest_time is not None:
+        dataset.attrs["rest_time"] = motion.rest_time
+    return dataset

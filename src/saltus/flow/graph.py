@@ -1,0 +1,304 @@
+"""Expressions traced from a model: a graph of arithmetic on the time, the state, the side and the parameters.
+
+Python's operators and NumPy's functions build the graph; whatever cannot be expanded in a Taylor series is refused by
+name. Nodes are shared: equal expressions are one object, so that nothing is computed twice.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import TraceError
+
+# What a reset, evaluated at one instant, may use besides the operations that have a Taylor recurrence.
+POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
+LEAVES = ("number", "parameter", "time", "side", "coordinate", "velocity", "acceleration", "record")
+
+ALLOWED = (
+    "+ - * /, powers, NumPy's sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, and abs of the coordinate "
+    "(the sign of the coordinate is `side`)"
+)
+UFUNCS = {
+    **{name: name for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "maximum", "minimum")},
+    **{"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow", "square": "square"},
+    **{name: name for name in ("greater", "less", "greater_equal", "less_equal", "absolute", "negative", "positive")},
+}
+
+
+class Expr:
+    """One node: an operation on other nodes, or a leaf with a value. `degree` bounds its degree in the time (None: no bound)."""
+
+    __slots__ = ("args", "degree", "op", "value")
+    __array_priority__ = 1000
+    _shared: dict[tuple[Any, ...], Expr] = {}  # noqa: RUF012  (one table for all graphs, so equal nodes are one object)
+
+    op: str
+    args: tuple[Expr, ...]
+    value: Any
+    degree: int | None
+
+    def __new__(cls, op: str, args: tuple[Expr, ...] = (), value: Any = None) -> Expr:
+        key = (op, tuple(id(a) for a in args), value, type(value))
+        node = cls._shared.get(key)
+        if node is None:
+            node = super().__new__(cls)
+            node.op, node.args, node.value, node.degree = op, args, value, _degree(op, args)
+            cls._shared[key] = node
+        return node
+
+    def __add__(self, other: Any) -> Expr:
+        return combine("add", self, other)
+
+    def __radd__(self, other: Any) -> Expr:
+        return combine("add", other, self)
+
+    def __sub__(self, other: Any) -> Expr:
+        return combine("sub", self, other)
+
+    def __rsub__(self, other: Any) -> Expr:
+        return combine("sub", other, self)
+
+    def __mul__(self, other: Any) -> Expr:
+        return combine("mul", self, other)
+
+    def __rmul__(self, other: Any) -> Expr:
+        return combine("mul", other, self)
+
+    def __truediv__(self, other: Any) -> Expr:
+        return combine("div", self, other)
+
+    def __rtruediv__(self, other: Any) -> Expr:
+        return combine("div", other, self)
+
+    def __pow__(self, other: Any) -> Expr:
+        return power(self, other)
+
+    def __rpow__(self, other: Any) -> Expr:
+        return power(as_expr(other), self)
+
+    def __neg__(self) -> Expr:
+        return combine("mul", -1.0, self)
+
+    def __pos__(self) -> Expr:
+        return self
+
+    def __abs__(self) -> Expr:
+        if self.op != "coordinate":
+            raise TraceError(f"abs of an expression that is not a coordinate cannot be traced; allowed are {ALLOWED}")
+        return Expr("side") * self
+
+    def __gt__(self, other: Any) -> Expr:
+        return combine("greater", self, other)
+
+    def __lt__(self, other: Any) -> Expr:
+        return combine("less", self, other)
+
+    def __ge__(self, other: Any) -> Expr:
+        return combine("greater_equal", self, other)
+
+    def __le__(self, other: Any) -> Expr:
+        return combine("less_equal", self, other)
+
+    def __bool__(self) -> bool:
+        raise TraceError("a traced model may not branch on its state or parameters (if, and, or, min, max); use `side`")
+
+    def __float__(self) -> float:
+        raise TraceError(f"a traced quantity has no number yet: use NumPy's functions, not math's; allowed are {ALLOWED}")
+
+    __int__ = __index__ = __complex__ = __float__
+
+    def __iter__(self) -> Any:
+        raise TraceError("a traced quantity is a scalar: it cannot be unpacked or looped over")
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Expr:
+        name = UFUNCS.get(ufunc.__name__)
+        if method != "__call__" or kwargs or name is None:
+            raise TraceError(f"np.{ufunc.__name__} cannot be traced; allowed are {ALLOWED}")
+        return _apply(name, inputs)
+
+    def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Expr:
+        if func is np.where and len(args) == 3:
+            return combine("where", *args)
+        raise TraceError(f"np.{func.__name__} cannot be traced; allowed are {ALLOWED}")
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # NumPy and copy probe for these
+            raise AttributeError(name)
+        raise TraceError(f"a traced quantity has no {name!r}; allowed are {ALLOWED}")
+
+    def __repr__(self) -> str:
+        if self.op in LEAVES:
+            return self.op if self.value is None else f"{self.op}[{self.value}]"
+        return f"{self.op}({', '.join(map(repr, self.args))})"
+
+
+def _degree(op: str, args: tuple[Expr, ...]) -> int | None:
+    """The degree in the time of the node's Taylor series, or None where it does not end."""
+    if op in ("number", "parameter", "side"):
+        return 0
+    if op in ("coordinate", "velocity", "acceleration"):
+        return None
+    if op in ("time", "record"):
+        return 1 if op == "time" else 4
+    degrees = [a.degree for a in args]
+    if all(d == 0 for d in degrees):
+        return 0
+    if None in degrees or op not in ("add", "sub", "mul", "div"):
+        return None
+    if op in ("add", "sub"):
+        return max(d for d in degrees if d is not None)
+    if op == "mul":
+        return sum(d for d in degrees if d is not None)
+    return degrees[0] if degrees[1] == 0 else None
+
+
+def number(value: float) -> Expr:
+    """A literal number."""
+    return Expr("number", (), float(value))
+
+
+def as_expr(value: Any) -> Expr:
+    """A node for a number; a node stays itself."""
+    if isinstance(value, Expr):
+        return value
+    if isinstance(value, (int, float, np.integer, np.floating, np.bool_)) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        return number(float(value))
+    raise TraceError(f"a traced model cannot use {value!r} of type {type(value).__name__}; allowed are {ALLOWED}")
+
+
+def combine(op: str, *operands: Any) -> Expr:
+    """The node `op(operands)`, simplified where a literal 0 or 1, or literals alone, allow it."""
+    args = tuple(as_expr(a) for a in operands)
+    values = [a.value if a.op == "number" else None for a in args]
+    if all(v is not None for v in values):
+        with np.errstate(all="ignore"):
+            return number(_numeric(op, values))
+    if op == "add" and 0.0 in values:
+        return args[1 - values.index(0.0)]
+    if op == "sub" and values[1] == 0.0:
+        return args[0]
+    if op == "mul" and 0.0 in values:
+        return number(0.0)
+    if op == "mul" and 1.0 in values:
+        return args[1 - values.index(1.0)]
+    if op == "div" and values[1] == 1.0:
+        return args[0]
+    if op == "div" and values[0] == 0.0:
+        return number(0.0)
+    return Expr(op, args)
+
+
+def power(base: Any, exponent: Any) -> Expr:
+    """base ** exponent: products for small whole exponents, a recurrence for constant ones, exp(exponent log(base)) else."""
+    base, exponent = as_expr(base), as_expr(exponent)
+    if exponent.op == "number":
+        whole = int(exponent.value) if np.isfinite(exponent.value) else 0
+        if exponent.value == 0.5:
+            return combine("sqrt", base)
+        if exponent.value == whole and abs(whole) <= 16:
+            return _whole_power(base, whole)
+    if exponent.degree == 0:
+        return combine("pow", base, exponent)
+    return combine("exp", exponent * combine("log", base))
+
+
+def _whole_power(base: Expr, exponent: int) -> Expr:
+    if exponent < 0:
+        return 1.0 / _whole_power(base, -exponent)
+    result, square = number(1.0), base
+    while exponent:
+        if exponent & 1:
+            result = result * square
+        exponent >>= 1
+        if exponent:
+            square = square * square
+    return result
+
+
+def _apply(name: str, inputs: tuple[Any, ...]) -> Expr:
+    if name == "absolute":
+        return abs(as_expr(inputs[0]))
+    if name == "negative":
+        return -as_expr(inputs[0])
+    if name == "positive":
+        return as_expr(inputs[0])
+    if name == "square":
+        return as_expr(inputs[0]) * inputs[0]
+    if name == "pow":
+        return power(*inputs)
+    if name == "tan":
+        return combine("sin", *inputs) / combine("cos", *inputs)
+    return combine(name, *inputs)
+
+
+def _numeric(op: str, values: list[Any]) -> float:
+    names = {"sub": "subtract", "mul": "multiply", "div": "divide", "pow": "power"}
+    return float(getattr(np, names.get(op, op))(*values))
+
+
+def ordered(roots: list[Expr]) -> list[Expr]:
+    """Every node below the roots, each once, its operands before it."""
+    order: list[Expr] = []
+    seen: set[int] = set()
+    stack = [(root, False) for root in reversed(roots)]
+    while stack:
+        node, ready = stack.pop()
+        if ready:
+            order.append(node)
+        elif id(node) not in seen:
+            seen.add(id(node))
+            stack.append((node, True))
+            stack.extend((a, False) for a in reversed(node.args))
+    return order
+
+
+def substitute(root: Expr, leaves: dict[Expr, Any]) -> Expr:
+    """The expression with some leaves replaced."""
+    made: dict[int, Expr] = {id(old): as_expr(new) for old, new in leaves.items()}
+    for node in ordered([root]):
+        if id(node) not in made:
+            made[id(node)] = combine(node.op, *(made[id(a)] for a in node.args)) if node.args else node
+    return made[id(root)]
+
+
+def differentiate(root: Expr, leaf: Expr) -> Expr:
+    """The partial derivative of an expression with respect to one leaf."""
+    made: dict[int, Expr] = {}
+    for node in ordered([root]):
+        if node is leaf:
+            made[id(node)] = number(1.0)
+        elif not node.args:
+            made[id(node)] = number(0.0)
+        else:
+            made[id(node)] = _chain(node, [made[id(a)] for a in node.args])
+    return made[id(root)]
+
+
+def _chain(node: Expr, d: list[Expr]) -> Expr:
+    """The derivative of a node from those of its operands."""
+    a, b = node.args[0], node.args[-1]
+    rules: dict[str, Any] = {
+        "add": lambda: d[0] + d[1],
+        "sub": lambda: d[0] - d[1],
+        "mul": lambda: d[0] * b + a * d[1],
+        "div": lambda: (d[0] - node * d[1]) / b,
+        "pow": lambda: b * power(a, b - 1) * d[0],
+        "sqrt": lambda: d[0] / (2.0 * node),
+        "exp": lambda: node * d[0],
+        "log": lambda: d[0] / a,
+        "sin": lambda: combine("cos", a) * d[0],
+        "cos": lambda: -combine("sin", a) * d[0],
+        "sinh": lambda: combine("cosh", a) * d[0],
+        "cosh": lambda: combine("sinh", a) * d[0],
+        "tanh": lambda: (1.0 - node * node) * d[0],
+        "where": lambda: combine("where", a, d[1], d[2]),
+        "maximum": lambda: combine("where", combine("greater", a, b), d[0], d[1]),
+        "minimum": lambda: combine("where", combine("less", a, b), d[0], d[1]),
+    }
+    if all(x.op == "number" and x.value == 0.0 for x in d):
+        return number(0.0)
+    if node.op not in rules:
+        raise TraceError(f"{node.op} has no derivative")
+    return as_expr(rules[node.op]())

@@ -1,0 +1,178 @@
+"""What a simulation returns: the end state, the events, the dense output, and whether the mechanism could move so."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.flow.validity import Validity, check_validity
+from saltus.systems import System
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class Stop(StrEnum):
+    """Why a motion ended."""
+
+    HORIZON = "horizon"  # the time asked for
+    REST = "rest"  # the time asked for, at rest
+    LIMIT = "limit"  # a margin of the model reached zero
+
+
+class EventKind(StrEnum):
+    """What happens at an instant of a motion."""
+
+    CROSSING = "crossing"  # an impact: the gap closes with a speed
+    GRAZING = "grazing"  # the gap touches zero without a speed, to within the working precision
+    REST = "rest"  # the system comes to rest at contact, at once or as the limit of impacts
+    RELEASE = "release"  # it leaves contact from rest
+    CHATTER = "chatter"  # impacts without loss became too small to follow; the phase is lost from here on
+    LIMIT = "limit"  # a margin reached zero
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One event: its time, and the velocities before and after it (equal where nothing jumps)."""
+
+    time: float
+    kind: EventKind
+    side: int
+    velocity_before: float
+    velocity_after: float
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """The impacts of a motion, as arrays of one length."""
+
+    time: np.ndarray
+    side: np.ndarray  # before the impact
+    velocity_before: np.ndarray
+    velocity_after: np.ndarray
+
+    def __len__(self) -> int:
+        return self.time.size
+
+
+@dataclass(frozen=True, eq=False)
+class DenseOutput:
+    """The steps of a motion: step i starts at `start[i]` on `side[i]` (0: at rest) and holds the coordinates' Taylor series.
+
+    `series` has shape (steps, degrees of freedom, order + 2), in powers of the time since the step's start.
+    """
+
+    start: np.ndarray
+    length: np.ndarray
+    side: np.ndarray
+    series: np.ndarray
+
+    def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates and velocities, each (degrees of freedom, n), and sides (n,); at an impact, those after it."""
+        step = np.clip(np.searchsorted(self.start, times, side="right") - 1, 0, None)
+        tau = times - self.start[step]
+        powers = np.arange(self.series.shape[2])
+        coefficients = self.series[step]
+        slopes = coefficients[:, :, 1:] * powers[1:]
+        return _evaluate(coefficients, tau), _evaluate(slopes, tau), self.side[step]
+
+
+def _evaluate(coefficients: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """Horner's scheme for many series at once: (n, dof, order) at (n,) gives (dof, n)."""
+    value = coefficients[:, :, -1]
+    for k in range(coefficients.shape[2] - 2, -1, -1):
+        value = value * tau[:, None] + coefficients[:, :, k]
+    return value.T
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """An exact motion of a system.
+
+    The coordinate at the end has the model's own name: `motion.theta`, or `motion.x` for a wall oscillator; all of them are in
+    `motion.position`. With several degrees of freedom positions and velocities are tuples.
+    """
+
+    system: System
+    tol: float
+    start: float
+    time: float  # at the end
+    position: Any
+    velocity: Any
+    side: int  # +1 or -1, and 0 at rest
+    stop: Stop
+    limit: str | None  # the margin that stopped it
+    periods: int  # whole forcing periods since time 0
+    events: Sequence[Event]
+    crossings: Crossings
+    dense: DenseOutput | None
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or name == "system" or name not in self.system.model.coordinates:
+            raise AttributeError(f"a Motion has no {name!r}")
+        position = np.atleast_1d(self.position)
+        return float(position[self.system.model.coordinates.index(name)])
+
+    def __repr__(self) -> str:
+        names = self.system.model.coordinates
+        state = ", ".join(f"{n}={x:.12g}" for n, x in zip(names, np.atleast_1d(self.position), strict=True))
+        where = f"{self.stop.value} ({self.limit})" if self.limit else self.stop.value
+        return f"Motion(time={self.time:.12g}, {state}, velocity={self.velocity}, crossings={len(self.crossings)}, stop={where})"
+
+    @property
+    def rest_time(self) -> float | None:
+        """The time from which the system rests until the end, or None."""
+        if self.stop is not Stop.REST:
+            return None
+        return next(e.time for e in reversed(self.events) if e.kind is EventKind.REST)
+
+    @property
+    def phase_known(self) -> bool:
+        """Whether the phase is exact: False once impacts without loss were averaged (see `EventKind.CHATTER`)."""
+        return not any(e.kind is EventKind.CHATTER for e in self.events)
+
+    def at(self, times: Any) -> tuple[Any, Any]:
+        """Coordinate and velocity at any times of the motion, at the method's accuracy; after the impact at an impact.
+
+        Returns:
+            Two floats for one time, two arrays (n,) for n times; (degrees of freedom, n) where there are several.
+
+        Raises:
+            ParameterError: a time outside the motion, or a motion computed with dense=False.
+        """
+        asked = np.atleast_1d(np.asarray(times, dtype=float))
+        position, velocity, _ = self._states(asked)
+        if len(self.system.model.coordinates) == 1:
+            position, velocity = position[0], velocity[0]
+        if np.ndim(times) == 0:
+            return (float(position[0]), float(velocity[0])) if position.ndim == 1 else (position[:, 0], velocity[:, 0])
+        return position, velocity
+
+    def _states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        if self.dense is None:
+            raise ParameterError("this motion was computed with dense=False, so only its end and its events are known")
+        slack = 1e-12 * max(1.0, abs(self.time))
+        if times.size and not (times.min() >= self.start - slack and times.max() <= self.time + slack):
+            raise ParameterError(f"times must lie in [{self.start:g}, {self.time:g}], the span of the motion")
+        if self.dense.start.size == 0:
+            position, velocity = np.atleast_1d(self.position), np.atleast_1d(self.velocity)
+            tile = np.ones(times.size)
+            return position[:, None] * tile, velocity[:, None] * tile, self.side * tile
+        return self.dense.states(times)
+
+    @cached_property
+    def validity(self) -> Validity:
+        """Whether the mechanism could move so: limits passed, and the share of time with a wrong reaction (errata 20, 21)."""
+        return check_validity(self)
+
+    def to_xarray(self, times: Any = None) -> xarray.Dataset:
+        """The motion as a dataset with units and provenance; by default 200 samples a forcing period (or 2000 in all)."""
+        from saltus.flow.dataset import to_dataset
+
+        return to_dataset(self, times)

@@ -1,0 +1,172 @@
+"""The first root of a polynomial on [0, 1]: exclusion, Bernstein subdivision, bracketed Newton.
+
+This text is compiled together with each kernel (see `compile.py`), so it uses plain loops and the decorator `jit`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.flow.jit import jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+NONE, SIMPLE = 0, 1
+NEVER = 2.0  # later than any u in [0, 1]
+NARROW = 2.0**-26  # square root of the working precision: two roots closer than this are one tangency
+NOISE = 4.0 * 2.0**-52  # rounding of a Bernstein coefficient, relative to the sum of the polynomial's terms
+DEPTH = 64  # boxes that wait; a bisection to NARROW leaves one behind at each of 26 levels
+
+
+@jit
+def horner(c, n, x):
+    """sum_{k=0..n} c[k] x^k."""
+    value = c[n]
+    for k in range(n - 1, -1, -1):
+        value = value * x + c[k]
+    return value
+
+
+@jit
+def horner_slope(c, n, x):
+    """The derivative of sum_{k=0..n} c[k] x^k."""
+    value = n * c[n]
+    for k in range(n - 1, 0, -1):
+        value = value * x + k * c[k]
+    return value
+
+
+@jit
+def excluded(p, n):
+    """Whether p > 0 on [0, 1] for certain: min(p0 + p1 u + p2 u^2) exceeds the sum of abs(p_k), k >= 3."""
+    rest = 0.0
+    for k in range(3, n + 1):
+        rest += abs(p[k])
+    low = min(p[0], p[0] + p[1] + p[2])
+    if p[2] > 0.0 and 0.0 < -p[1] < 2.0 * p[2]:
+        low = p[0] - p[1] * p[1] / (4.0 * p[2])
+    return low > rest
+
+
+@jit
+def to_bernstein(p, n, b):
+    """Bernstein coefficients on [0, 1]: b_i = sum_k C(i,k)/C(n,k) p_k, by repeated sums as in Pascal's triangle."""
+    binomial = 1.0
+    for k in range(n + 1):
+        b[k] = p[k] / binomial
+        binomial = binomial * (n - k) / (k + 1)
+    for r in range(1, n + 1):
+        for i in range(n, r - 1, -1):
+            b[i] += b[i - 1]
+
+
+@jit
+def variations(b, n):
+    """Sign variations of the coefficients (zeros left out): at most so many roots, and as many up to an even number."""
+    count, last = 0, 0
+    for i in range(n + 1):
+        sign = 1 if b[i] > 0.0 else (-1 if b[i] < 0.0 else 0)
+        if sign != 0:
+            if last != 0 and sign != last:
+                count += 1
+            last = sign
+    return count
+
+
+@jit
+def leading_sign(b, n):
+    """The sign of the first coefficient that is not zero: the sign of the polynomial just after 0."""
+    for i in range(n + 1):
+        if b[i] != 0.0:
+            return 1 if b[i] > 0.0 else -1
+    return 0
+
+
+@jit
+def newton(p, n, low, high):
+    """The root of p in [low, high], p(low) > 0 >= p(high): Newton's steps, bisection where one leaves the bracket."""
+    at_low, at_high = horner(p, n, low), horner(p, n, high)
+    u = 0.5 * (low + high)
+    if at_low > 0.0 > at_high:
+        u = low + (high - low) * (at_low / (at_low - at_high))
+    for _ in range(200):
+        value = horner(p, n, u)
+        if value > 0.0:
+            low = u
+        else:
+            high = u
+        slope = horner_slope(p, n, u)
+        following = u - value / slope if slope != 0.0 else 0.5 * (low + high)
+        if not low <= following <= high:  # equality is a converged step: refusing it costs nine digits
+            following = 0.5 * (low + high)
+        if abs(following - u) <= 2.0**-53 * following or high - low <= 2.0**-53 * high:
+            return following
+        u = following
+    return u
+
+
+@jit
+def first_root(p, n):
+    """The first root in (0, 1] of a polynomial of degree n that starts positive.
+
+    Returns (kind, u, touch): SIMPLE and the root, or NONE; and the first place before it where p touches zero to within
+    the working precision without going through (a grazing), or NEVER.
+    """
+    if excluded(p, n):
+        return NONE, NEVER, NEVER
+    size = 0.0
+    for k in range(n + 1):
+        size += abs(p[k])
+    noise = NOISE * size
+    boxes = np.empty((DEPTH, n + 1))
+    left, width = np.empty(DEPTH), np.empty(DEPTH)
+    to_bernstein(p, n, boxes[0])
+    left[0], width[0] = 0.0, 1.0
+    top, touch = 1, NEVER
+    while top > 0:
+        top -= 1
+        b, low, wide = boxes[top], left[top], width[top]
+        count = variations(b, n)
+        if b[0] <= 0.0 and low > 0.0:  # a root exactly where two boxes meet
+            if leading_sign(b, n) <= 0:
+                return SIMPLE, low, touch
+            touch = min(touch, low)
+        if count == 0:
+            continue
+        if count == 1 and b[0] > 0.0:
+            return SIMPLE, newton(p, n, low, low + wide), touch
+        largest = 0.0
+        for i in range(n + 1):
+            largest = max(largest, abs(b[i]))
+        if wide < NARROW or largest <= noise or top + 2 > DEPTH:
+            if b[n] < 0.0:
+                return SIMPLE, newton(p, n, low, low + wide), touch
+            touch = min(touch, low + 0.5 * wide)
+            continue
+        half = 0.5 * wide
+        split(boxes, top, n)
+        left[top], width[top] = low + half, half
+        left[top + 1], width[top + 1] = low, half
+        top += 2
+    return NONE, NEVER, touch
+
+
+@jit
+def split(boxes, top, n):
+    """Bisect the box at `top` by de Casteljau: its right half takes its place, its left half goes on top, to be next."""
+    right, first = boxes[top], boxes[top + 1]
+    for i in range(n + 1):
+        first[i] = right[0]
+        for k in range(n - i):
+            right[k] = 0.5 * (right[k] + right[k + 1])
+
+
+@jit
+def scale_gap(g, skip, order, h, p):
+    """p_k = g_{k + skip} h^k for k = 0..order - skip, else 0: the series on [0, 1] without its known root at 0."""
+    power = 1.0
+    for k in range(p.size):
+        p[k] = 0.0
+    for k in range(order - skip + 1):
+        p[k] = g[k + skip] * power
+        power *= h

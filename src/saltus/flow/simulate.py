@@ -1,0 +1,277 @@
+"""Simulation: from a system and a state to a motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import MotionError, ParameterError, near
+from saltus.flow import kernel as k
+from saltus.flow.compile import compiled
+from saltus.flow.motion import Crossings, DenseOutput, Event, EventKind, Motion, Stop
+from saltus.flow.trace import record_table, trace
+from saltus.systems import System
+from saltus.systems.checks import check_number
+
+BUFFER = 4096  # steps, and events, that one call of the kernel may record
+MOST_EVENTS = 20_000_000  # beyond this an accumulation of impacts is not being resolved but endured
+EVENT_KINDS = (
+    EventKind.CROSSING,
+    EventKind.GRAZING,
+    EventKind.REST,
+    EventKind.RELEASE,
+    EventKind.CHATTER,
+    EventKind.LIMIT,
+)  # in the order of the kernel's numbers
+
+
+@dataclass(frozen=True)
+class Program:
+    """A system ready to run: its compiled kernel and its numbers."""
+
+    kernel: ModuleType
+    parameters: np.ndarray
+    breaks: np.ndarray
+    table: np.ndarray
+    limits: tuple[str, ...]
+
+
+@lru_cache(maxsize=64)
+def program(system: System, limits: tuple[str, ...] = ()) -> Program:
+    """Trace and compile a system; a structure seen before is loaded, and numbers never compile anything."""
+    traced = trace(system, limits)
+    breaks, table = record_table(traced.records)
+    return Program(compiled(traced), np.array(traced.values, dtype=float), breaks, table, tuple(traced.margins))
+
+
+def simulate(
+    system: System,
+    *,
+    velocity: Any = 0.0,
+    periods: float | None = None,
+    duration: float | None = None,
+    tol: float = 1e-12,
+    time: float = 0.0,
+    side: int | None = None,
+    stop_at: Iterable[str] = (),
+    dense: bool = True,
+    **coordinates: float,
+) -> Motion:
+    """The exact motion of a system from a state, event by event, by Taylor series.
+
+    Args:
+        system: what moves.
+        velocity: the velocity at the start (a tuple where there are several coordinates).
+        periods, duration: how long, in forcing periods or in dimensionless time; one of them.
+        tol: the error that one step may make, relative to the state, in [1e-15, 1e-6].
+        time: the dimensionless time at the start.
+        side: +1 or -1, the side to leave by where the motion from rest at contact is not unique.
+        stop_at: margins of the model that end the motion, such as "kinematic_limit"; its own `stops` always do.
+        dense: keep the motion between the events; False saves memory over very many periods.
+        coordinates: the state at the start by the model's names: theta=0.3, or x=0.0 for a wall oscillator.
+
+    Raises:
+        ParameterError: an argument without meaning.
+        MotionError: the motion is not unique, an impact has no solution, or the numbers overflow; with the instant.
+    """
+    position, speeds = _start_state(system, velocity, coordinates)
+    limits = tuple(dict.fromkeys((*system.model.stops, *stop_at)))
+    check_number("tol", tol, at_least=1e-15, at_most=1e-6)
+    check_number("time", time)
+    if side not in (None, 1, -1):
+        raise ParameterError(f"side must be +1 or -1, got {side!r}")
+    run = program(system, limits)
+    where, state, settings = _prepare(system, run, position, speeds, periods, duration, float(time), tol)
+    where[k.FORCED], where[k.DENSE] = side or 0, int(dense)
+    return _collect(system, run, where, state, settings, float(time), *_advance(system, run, where, state, settings))
+
+
+def _start_state(system: System, velocity: Any, coordinates: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    names = system.model.coordinates
+    for name in coordinates:
+        if name not in names:
+            raise ParameterError(f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names)}")
+    missing = [name for name in names if name not in coordinates]
+    if missing:
+        raise ParameterError(f"the state at the start needs {missing[0]}=...")
+    for name in names:
+        check_number(name, coordinates[name])
+    speeds = np.atleast_1d(velocity)
+    if speeds.shape != (len(names),):
+        raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}")
+    for value in speeds:
+        check_number("velocity", value)
+    return np.array([coordinates[name] for name in names], dtype=float), speeds.astype(float)
+
+
+def _prepare(
+    system: System,
+    run: Program,
+    position: np.ndarray,
+    speeds: np.ndarray,
+    periods: float | None,
+    duration: float | None,
+    time: float,
+    tol: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The kernel's state at the start: counters, numbers and settings (see `kernel.py`)."""
+    where, state = np.zeros(12, dtype=np.int64), np.concatenate([[0.0, 0.0], position, speeds])
+    length = system.load.period
+    if (periods is None) == (duration is None):
+        raise ParameterError("say how long: either periods=... or duration=...")
+    span = periods if duration is None else duration
+    check_number("periods" if duration is None else "duration", span, at_least=0.0)
+    assert span is not None
+    if length is None:
+        if periods is not None:
+            raise ParameterError("the load has no frequency, so there are no forcing periods; give duration=... instead")
+        state[k.TIME], end, last, first = time, time + span, 0, 0
+        length = 0.0
+    else:
+        first, local = divmod(time, length)
+        if periods is None:
+            whole, end = divmod(local + span, length)
+        else:
+            whole, end = math.floor(periods), local + (periods - math.floor(periods)) * length
+        state[k.TIME], last = local, int(first + whole)
+    # A load without a frequency has no periods to count: its one leg is number 0, and `LAST` = 0 says so to the kernel.
+    where[k.PERIOD], where[k.LAST], where[k.ORDER] = int(first), last, taylor_order(tol)
+    where[k.PIECE] = np.searchsorted(run.breaks, time, side="right")
+    _choose_side(system, where, position, speeds)
+    return where, state, np.array([length, end, tol])
+
+
+def taylor_order(tol: float) -> int:
+    """The order that pays at a tolerance: 10 at 1e-6, 15 at 1e-10, 20 at 1e-14."""
+    return round(10 + 1.25 * (-math.log10(tol) - 6))
+
+
+def _choose_side(system: System, where: np.ndarray, position: np.ndarray, speeds: np.ndarray) -> None:
+    """The mode and the side of a state: by the gap, at contact by the velocity, and at rest there by the accelerations."""
+    model = system.model
+    where[k.MODE], where[k.SIDE] = k.ARC, 1
+    if not model.sides:
+        return
+    gaps = {s: float(model.gap(position[0], s)) for s in model.sides}
+    inside = [s for s, gap in gaps.items() if gap > 0]
+    if inside:
+        where[k.SIDE] = inside[0]
+    elif min(gaps.values()) < 0:
+        name = model.coordinates[0]
+        raise ParameterError(f"{name} = {position[0]:g} lies beyond the contact at {name} = {float(model.contact):g}")
+    elif speeds[0] == 0.0:
+        where[k.MODE] = k.CONTACT
+    else:
+        into = [s for s in model.sides if model.gap(position[0] + np.sign(speeds[0]), s) > 0]
+        where[k.SIDE] = (into or list(model.sides))[0]
+        where[k.MODE] = k.CONTACT if into else k.ARC  # an arc that starts outward at contact begins with its impact
+
+
+def _advance(
+    system: System, run: Program, where: np.ndarray, state: np.ndarray, settings: np.ndarray
+) -> tuple[int, list[list[np.ndarray]], list[list[np.ndarray]]]:
+    """Call the kernel until the motion ends, emptying its buffers in between."""
+    dof, order = len(system.model.coordinates), int(where[k.ORDER])
+    size = BUFFER if where[k.DENSE] else 8
+    steps = (np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
+    events = (np.empty((BUFFER, 4), dtype=np.int64), np.empty((BUFFER, 3)))
+    kept_steps: list[list[np.ndarray]] = []
+    kept_events: list[list[np.ndarray]] = []
+    total = 0
+    while True:
+        status = run.kernel.advance(where, state, settings, run.parameters, run.breaks, run.table, steps, events)
+        kept_steps.append([a[: where[k.STEPS]].copy() for a in steps])
+        kept_events.append([a[: where[k.EVENTS]].copy() for a in events])
+        total += int(where[k.EVENTS])
+        where[k.STEPS] = where[k.EVENTS] = 0
+        if status not in (k.FULL, k.PAUSED):
+            _refuse(system, status, where, state, settings)
+            return status, kept_steps, kept_events
+        if total > MOST_EVENTS:
+            raise MotionError(
+                f"more than {MOST_EVENTS} impacts before time {_global_time(where, state, settings):.6g}: they accumulate "
+                "too slowly to be followed; raise the loss at impact, or ask for a shorter time"
+            )
+
+
+def _global_time(where: np.ndarray, state: np.ndarray, settings: np.ndarray) -> float:
+    return float(where[k.PERIOD] * settings[k.LENGTH] + state[k.TIME])
+
+
+def _refuse(system: System, status: int, where: np.ndarray, state: np.ndarray, settings: np.ndarray) -> None:
+    """Turn a status that is not an end into a sentence."""
+    at = f"at time {_global_time(where, state, settings):.9g}"
+    velocity = state[k.STATE + len(system.model.coordinates)]
+    if status == k.NOT_UNIQUE:
+        raise MotionError(
+            f"the motion from rest at contact {at} is not unique: the accelerations of both sides point away from it; "
+            "choose one with side=+1 or side=-1"
+        )
+    if status == k.NO_IMPACT:
+        raise MotionError(
+            f"{system.impact!r} has no velocity after the impact {at} with velocity {velocity:.6g} before it: no value of the "
+            "sign that leads on meets the law (errata 26); use VelocityReduction there"
+        )
+    if status == k.NOT_FINITE:
+        raise MotionError(f"the motion leaves the range of numbers {at}; its velocity was last {velocity:.6g}")
+    if status == k.STALLED:
+        raise MotionError(f"the steps shrink to nothing {at}: the acceleration is singular there")
+
+
+def _collect(
+    system: System,
+    run: Program,
+    where: np.ndarray,
+    state: np.ndarray,
+    settings: np.ndarray,
+    start: float,
+    status: int,
+    steps: list[list[np.ndarray]],
+    events: list[list[np.ndarray]],
+) -> Motion:
+    """The motion from the kernel's last state and its records."""
+    length = settings[k.LENGTH]
+    labels, values = (np.concatenate([chunk[i] for chunk in events]) for i in (0, 1))
+    times = labels[:, 0] * length + values[:, 0]
+    hit = labels[:, 1] == k.CROSSING
+    crossings = Crossings(times[hit], labels[hit, 2].astype(np.int8), values[hit, 1], values[hit, 2])
+    held = where[k.MODE] in (k.REST, k.CHATTER)
+    stop, limit = (Stop.REST if where[k.MODE] == k.REST else Stop.HORIZON), None
+    if status == k.LIMITED:
+        stop, limit = Stop.LIMIT, run.limits[labels[-1, 3]]
+    dof = len(system.model.coordinates)
+    position, velocity = state[k.STATE : k.STATE + dof], state[k.STATE + dof :]
+    return Motion(
+        system=system,
+        tol=float(settings[k.TOLERANCE]),
+        start=start,
+        time=_global_time(where, state, settings),
+        position=float(position[0]) if dof == 1 else tuple(position.tolist()),
+        velocity=float(velocity[0]) if dof == 1 else tuple(velocity.tolist()),
+        side=0 if held else int(where[k.SIDE]),
+        stop=stop,
+        limit=limit,
+        periods=int(where[k.PERIOD]),
+        events=EventList(times, labels, values),
+        crossings=crossings,
+        dense=_dense(steps, length) if where[k.DENSE] else None,
+    )
+
+
+def _dense(steps: list[list[np.ndarray]], length: float) -> DenseOutput:
+    labels, spans, series = (np.concatenate([chunk[i] for chunk in steps]) for i in (0, 1, 2))
+    return DenseOutput(labels[:, 0] * length + spans[:, 0], spans[:, 1], labels[:, 1], series)
+
+
+class EventList(list[Event]):
+    """The events of a motion in order of time."""
+
+    def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray) -> None:
+        rows = zip(times.tolist(), labels[:, 1:3].tolist(), values[:, 1:].tolist(), strict=True)
+        super().__init__(Event(t, EVENT_KINDS[kind], side, before, after) for t, (kind, side), (before, after) in rows)
