@@ -19,7 +19,7 @@ TOLERANCES = (1e-15, 1e-6)
 class Settings:
     """How a study is simulated; what is None is left to `saltus.simulate`."""
 
-    state: dict[str, float] = field(default_factory=dict)  # the coordinates at the start, by name; 0 where left out
+    state: dict[str, float] = field(default_factory=dict)  # the coordinates at the start, by name
     velocity: float | tuple[float, ...] = 0.0
     periods: float | None = None  # of the load; or else
     duration: float | None = None  # in the dimensionless time tau
@@ -45,7 +45,7 @@ def read_settings(source: Source, system: System, data: Any) -> Settings:
     coordinates = system.model.coordinates
     values = check_table(source, ("simulate",), data, _table(coordinates, margin_names(system)))
     _check_horizon(source, system, values)
-    state = {name: values.pop(name) for name in coordinates if name in values}
+    state = {name: values.pop(name, 0.0) for name in coordinates}
     return Settings(state=state, **values)
 
 

@@ -1,0 +1,130 @@
+"""The commands and their help; the work is in the module of each command, imported when it runs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from saltus.cli.guard import INTERRUPTED, INTERRUPTION, guarded
+
+app = typer.Typer(
+    rich_markup_mode="rich",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+STUDY = """A study is a TOML file; ten lines suffice:
+
+[cyan]\\[model][/]
+[cyan]type = "Metainterface"[/]
+[cyan]beta0 = "80 deg"[/]
+[cyan]damping = 0.1[/]
+[cyan]\\[load][/]
+[cyan]frequency = 1.0[/]
+[cyan]horizontal = { amplitude = 0.5 }[/]
+[cyan]vertical = -0.5[/]
+[cyan]\\[simulate][/]
+[cyan]theta = 0.3[/]
+[cyan]periods = 20[/]"""
+
+Study = Annotated[
+    Path, typer.Argument(metavar="STUDY.TOML", help="The study: a model, its loads, its impact law, and how to simulate it.")
+]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from saltus import __version__
+
+        print(f"saltus {__version__}")
+        raise typer.Exit
+
+
+@app.callback(epilog=STUDY)
+def saltus(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    """Exact non-smooth dynamics of the buckling-based metainterface and of its relatives.
+
+    First steps:
+
+    [cyan]saltus reproduce[/]             the paper's figures, tables and claims, into results/
+    [cyan]saltus simulate study.toml[/]   the motion of a system of your own
+    [cyan]saltus info study.toml[/]       what is known of it in closed form
+    """
+
+
+@app.command(epilog=STUDY)
+def simulate(
+    study: Study,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The folder to write to.", show_default="results/<name of the study>")
+    ] = None,
+    plot: Annotated[bool, typer.Option(help="Draw the time history and the phase portrait.")] = True,
+) -> None:
+    """Compute a motion, exactly from impact to impact; write it and draw it.
+
+    Writes motion.nc (netCDF, with units and provenance), motion.png and motion.pdf, and prints a summary: the state at the end,
+    the impacts, why the motion ended, and whether the mechanism could follow it.
+
+    Example: [cyan]saltus simulate study.toml --output runs/first[/]
+    """
+    with guarded():
+        from saltus.cli.simulate import simulate_study
+
+        simulate_study(study, output, plot)
+
+
+@app.command()
+def info(study: Study) -> None:
+    """Print what is known of a system before it moves.
+
+    Its equilibria and their stability, its natural frequencies and periods, the critical loads, the limits of the mechanism, and
+    whether it is symmetric. Needs no \\[simulate] in the study.
+
+    Example: [cyan]saltus info study.toml[/]
+    """
+    with guarded():
+        from saltus.cli.info import print_info
+
+        print_info(study)
+
+
+@app.command()
+def reproduce(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAMES]...", help="Parts of the paper, such as fig04 or table1; all if none is named."),
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The folder to write to.")] = Path("results"),
+    force: Annotated[bool, typer.Option("--force", help="Make again what is up to date.")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="List the parts and stop.")] = False,
+) -> None:
+    """Compute and draw the paper: figures, tables, and every claim beside the value found here.
+
+    What is up to date is skipped. The results are PNG, PDF and netCDF files, and a report to open.
+
+    Example: [cyan]saltus reproduce[/] for everything, [cyan]saltus reproduce fig04 fig07[/] for two figures
+    """
+    with guarded():
+        from saltus.cli.reproduce import list_parts, reproduce_paper
+
+        if list_:
+            list_parts()
+        else:
+            reproduce_paper(names or [], output, force)
+
+
+def main() -> None:
+    """The entry point of the command `saltus`."""
+    try:
+        app()
+    except KeyboardInterrupt:  # outside any command, such as while importing one
+        print(f"saltus: {INTERRUPTION}", file=sys.stderr)
+        sys.exit(INTERRUPTED)

@@ -1,0 +1,95 @@
+"""The closed forms that `saltus info` prints for a metainterface."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+
+from saltus.cli.facts import SMALL, Block, angle, attempt, mean_load, number
+from saltus.errors import ParameterError
+from saltus.systems import Metainterface, System, VelocityReduction
+from saltus.theory import (
+    critical_horizontal,
+    equilibria,
+    fold_horizontal,
+    high_frequency_onset,
+    linear_period,
+    peaks,
+    subcritical_vertical,
+    unloaded_fold,
+    vibrations,
+)
+
+
+def metainterface(system: System, start: float | None) -> Iterator[Block]:
+    """Equilibria under the mean load, vibrations and periods, critical loads, limits of the mechanism."""
+    model = system.model
+    assert isinstance(model, Metainterface)
+    model = dataclasses.replace(model, smoothing=None)
+    still = System(model=model, load=mean_load(system.load), impact=system.impact)
+    yield _equilibria(still)
+    yield _vibrations(still, model, start or SMALL)
+    yield _critical_loads(still, model, system.load.frequency)
+    yield _limits(model)
+
+
+def _equilibria(system: System) -> Block:
+    rows: list[tuple[str, ...]] = []
+    for e in equilibria(system):
+        place = "" if e.within_line else "beyond the straight line"
+        rows.append((number(e.theta), f"{math.degrees(e.theta):.6g}", e.stability.value, number(e.energy), place))
+    title = (
+        f"Equilibria under the mean load (H = {float(system.load.horizontal(0.0)):g}, V = {float(system.load.vertical(0.0)):g})"
+    )
+    return Block(title, rows, ("theta (rad)", "(deg)", "", "energy P / K2", ""))
+
+
+def _vibrations(system: System, model: Metainterface, start: float) -> Block:
+    rows: list[tuple[str, ...]] = []
+    try:
+        for name, v in zip(("lower", "upper"), vibrations(system), strict=True):
+            rows.append((f"apparent frequency, {name} layer", f"{number(v.frequency)}, damping ratio {number(v.damping_ratio)}"))
+    except ParameterError as error:
+        rows.append(("apparent frequencies", f"none: {error}"))
+    free = system.with_({"model.damping": 0.0, "impact": VelocityReduction(1.0)})
+    rows.append((f"undamped free period from theta = {start:g} rad", attempt(lambda: number(peaks(free, start).period))))
+    vertical = float(system.load.vertical(0.0))
+    if _alike(model) and not any(getattr(system.load, name)(0.0) for name in system.load.channels if name != "vertical"):
+        small = attempt(lambda: number(linear_period(start, beta0=model.beta0, vertical=vertical)))
+        rows.append(("the same, small angles: T0 (t-beta)", small))
+    forth, back = (float(model.inelastic_factor(side)) for side in (1, -1))
+    factors = number(forth) if forth == back else f"{number(forth)} from lower to upper, {number(back)} back"
+    rows.append(("velocity factor of an inelastic impact", factors))
+    return Block("Vibrations", rows)
+
+
+def _alike(model: Metainterface) -> bool:
+    """Whether the layers are equal where a closed form for k = 1, m = 0 asks for it."""
+    return (model.stiffness_ratio, model.mass_ratio) == (1.0, 0.0)
+
+
+def _critical_loads(system: System, model: Metainterface, frequency: float | None) -> Block:
+    beta0, vertical = model.beta0, float(system.load.vertical(0.0))
+    rows: list[tuple[str, ...]] = [
+        ("Hcr = |V / tan(beta0)|, the undeformed state is lost", attempt(lambda: number(critical_horizontal(beta0, vertical))))
+    ]
+    if _alike(model) and beta0 < math.pi / 2:
+        least = subcritical_vertical(beta0)
+        rows.append(("the buckling at Hcr is subcritical for V below", number(least)))
+        rows.append(("deformed equilibria exist without any H for V below", number(unloaded_fold(beta0)[0])))
+        if vertical <= least:
+            rows.append(("fold of equilibria, at |H|", attempt(lambda: number(fold_horizontal(beta0, vertical)))))
+    if _alike(model) and model.dissipation_ratio == 1 and model.damping > 0 and frequency is not None:
+        damping = model.damping
+        onset = attempt(lambda: number(high_frequency_onset(frequency, beta0=beta0, vertical=vertical, damping=damping)))
+        rows.append(("period-1 motion exists above H amplitude (fast load, e = 1)", onset))
+    return Block("Critical loads", rows)
+
+
+def _limits(model: Metainterface) -> Block:
+    opening = math.pi - model.beta0
+    return Block(
+        "Limits of the mechanism, |theta|",
+        [("straight line, pi - beta0", angle(opening)), ("kinematic limit, 2 (pi - beta0)", angle(2 * opening))],
+    )

@@ -1,0 +1,40 @@
+"""What goes wrong is told in one sentence, with an exit status, and without a traceback."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NoReturn
+
+import typer
+
+from saltus.errors import SaltusError
+
+BAD_INPUT = 2
+INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+INTERRUPTION = "interrupted; no file was left half-written"
+
+
+@contextmanager
+def guarded() -> Iterator[None]:
+    """Turn an error that a user can act on, or an interruption, into a sentence on stderr and an exit status."""
+    try:
+        yield
+    except SaltusError as error:
+        stop(str(error), BAD_INPUT)
+    except KeyboardInterrupt:
+        stop(INTERRUPTION, INTERRUPTED)
+    except BrokenPipeError:  # `saltus info ... | head`: typer ends this quietly
+        raise
+    except OSError as error:
+        place = f"{error.filename} " if error.filename else ""
+        stop(f"{place}cannot be read or written ({(error.strerror or str(error)).lower()})", BAD_INPUT)
+    except MemoryError:
+        stop("there is not enough memory for this; ask for fewer samples or periods", BAD_INPUT)
+
+
+def stop(sentence: str, status: int) -> NoReturn:
+    """Say `sentence` on stderr and end with `status`."""
+    print(f"saltus: {sentence}", file=sys.stderr, flush=True)
+    raise typer.Exit(status)

@@ -1,0 +1,34 @@
+"""`saltus info`: what is known of a system before it moves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from saltus.cli.facts import Block, describe
+
+
+def print_info(path: Path) -> None:
+    """Print what is known of the system in the study at `path`."""
+    from saltus.config import load_study
+
+    study = load_study(path)
+    console = Console(highlight=False)
+    console.print(f"[bold]{type(study.system.model).__name__}[/] ", end="")
+    console.print(f"from {path}", markup=False, soft_wrap=True)
+    start = study.simulate.state.get("theta") if study.simulate else None
+    for block in describe(study.system, start):
+        console.print()
+        console.print(block.title, style="bold", markup=False)
+        console.print(_table(block))
+
+
+def _table(block: Block) -> Table:
+    table = Table(box=None, pad_edge=False, show_header=bool(block.heads))
+    for head in block.heads or ("", ""):
+        table.add_column(head, header_style="dim", overflow="fold")
+    for row in block.rows:
+        table.add_row(*row)
+    return table

@@ -1,0 +1,80 @@
+"""`saltus simulate`: a study's motion, computed, written and summarised."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+if TYPE_CHECKING:
+    from saltus.config import Study
+    from saltus.flow import Motion
+
+MOST_SAMPLES = 1_000_000  # written unless the study asks for more
+
+
+def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
+    """Run the study at `path`, write its motion into `output`, and print a summary.
+
+    Raises:
+        SaltusError: a bad study, a folder that cannot be written to (before anything is computed), a motion that cannot go on.
+    """
+    from saltus.cli.summary import print_summary
+    from saltus.config import load_study
+    from saltus.files import check_writable
+
+    study = load_study(path)
+    study.settings()
+    output = Path("results") / study.name if output is None else output
+    check_writable(output)
+    console, messages = Console(highlight=False), Console(stderr=True, highlight=False)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=messages, transient=True) as progress:
+        task = progress.add_task("")
+        tell = _teller(messages, progress, task)
+        tell(f"computing {path}")
+        motion = study.run()
+        tell(f"writing to {output}")
+        files = write_motion(motion, study, output, plot)
+    print_summary(motion, console)
+    console.print(f"Results are in {output}: {', '.join(file.name for file in files)}", markup=False, soft_wrap=True)
+
+
+def _teller(console: Console, progress: Progress, task: Any) -> Any:
+    """Say what goes on: beside the clock on a terminal, line by line elsewhere."""
+
+    def tell(what: str) -> None:
+        progress.update(task, description=what.replace("[", r"\["))
+        if not console.is_terminal:
+            print(what, file=console.file, flush=True)
+
+    return tell
+
+
+def write_motion(motion: Motion, study: Study, output: Path, plot: bool) -> list[Path]:
+    """Write motion.nc and, with `plot`, motion.png and motion.pdf, each whole or not at all; their paths."""
+    from saltus.files import write_dataset, write_figure
+
+    dataset = motion.to_xarray(sample_times(motion, study.settings().samples))
+    dataset.attrs["study"] = study.source.path.name
+    files = [write_dataset(output / "motion.nc", dataset)]
+    if plot:
+        from saltus.plots.motion import draw_motion
+        from saltus.plots.style import style
+
+        figure = draw_motion(dataset)
+        with style():
+            files += write_figure(output / "motion", figure)
+    return files
+
+
+def sample_times(motion: Motion, samples: int | None) -> Any:
+    """Evenly spaced times over a motion, or None for its own choice where that is no more than `MOST_SAMPLES`."""
+    import numpy as np
+
+    period = motion.system.load.period
+    if samples is None and (period is None or 200 * (motion.time - motion.start) / period <= MOST_SAMPLES):
+        return None
+    return np.linspace(motion.start, motion.time, MOST_SAMPLES if samples is None else samples)

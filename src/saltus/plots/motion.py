@@ -1,0 +1,123 @@
+"""One motion: its time history and its phase portrait."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from saltus.plots.marks import limit_lines
+from saltus.plots.style import DOUBLE_COLUMN, FAINT, INK, STABLE, UNSTABLE, new_figure, styled
+
+if TYPE_CHECKING:
+    import xarray
+
+SYMBOLS = {"theta": r"\theta", "theta_1": r"\theta_1", "theta_2": r"\theta_2"}
+LINES: tuple[dict[str, Any], ...] = ({"color": STABLE, "ls": "-"}, {"color": UNSTABLE, "ls": (0, (4, 1.5))})
+
+
+@styled
+def draw_motion(dataset: xarray.Dataset) -> Figure:
+    """The coordinates over time, and velocities over coordinates, of a motion as `Motion.to_xarray` gives it.
+
+    The phase portrait shows the whole motion in grey and its last forcing period on top; without a forcing period, the whole.
+    An open circle marks the start, a full one the end. Green lines mark the limits of the mechanism that are reached.
+    """
+    figure = new_figure(DOUBLE_COLUMN, 68.0)
+    history, portrait = figure.subplots(1, 2, width_ratios=(1.75, 1))
+    names = coordinates(dataset)
+    period = _forcing_period(dataset)
+    for name, line in zip(names, LINES, strict=False):
+        time, position, velocity = arcs(dataset, name)
+        label = f"${symbol(name)}$" if len(names) > 1 else None
+        history.plot(time, position, lw=0.9, label=label, **line)
+        _portrait(portrait, (time, position, velocity), period, line)
+    _labels(history, portrait, dataset, names)
+    limit = _limit_angle(dataset)
+    if limit is not None:
+        for ax, axis in ((history, "y"), (portrait, "x")):
+            for angle in (limit, 2 * limit):
+                limit_lines(ax, angle, axis=axis)
+    return figure
+
+
+def coordinates(dataset: xarray.Dataset) -> list[str]:
+    """The names of the coordinates in a motion's dataset."""
+    return [str(name) for name in dataset.data_vars if rate_of(dataset, str(name)) in dataset and name != "side"]
+
+
+def rate_of(dataset: xarray.Dataset, name: str) -> str:
+    """The name of the velocity that belongs to a coordinate."""
+    several = f"{name}_velocity"
+    return several if several in dataset or name == "velocity" or dataset[name].dims != ("time",) else "velocity"
+
+
+def symbol(name: str) -> str:
+    """The coordinate's symbol in mathematical text."""
+    return SYMBOLS.get(name, name if len(name) == 1 else rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}")
+
+
+def arcs(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time, position and velocity with the impacts put in between the samples, parted by NaN where the velocity jumps."""
+    time, position, velocity = (dataset[n].values for n in ("time", name, rate_of(dataset, name)))
+    if rate_of(dataset, name) != "velocity" or "crossing_time" not in dataset:
+        return time, position, velocity
+    at = dataset["crossing_time"].values
+    before, after = (dataset[f"crossing_velocity_{when}"].values for when in ("before", "after"))
+    # Samples at the very instant of an impact show the state after it, and so follow it.
+    times = np.concatenate([at, at, at, time])
+    order = np.argsort(times, kind="stable")
+    there = np.interp(at, time, position)
+    positions = np.concatenate([there, there, there, position])
+    velocities = np.concatenate([before, np.full(at.size, np.nan), after, velocity])
+    return times[order], positions[order], velocities[order]
+
+
+def _portrait(ax: Any, arc: tuple[np.ndarray, np.ndarray, np.ndarray], period: float | None, line: dict[str, Any]) -> None:
+    time, position, velocity = arc
+    late = time >= time[-1] - period * (1 + 1e-9) if period else np.full(time.size, True)
+    if not late.all():
+        ax.plot(position, velocity, color=FAINT, lw=0.6, zorder=1)
+    ax.plot(position[late], velocity[late], lw=1.1, zorder=2, **line)
+    known = np.flatnonzero(np.isfinite(velocity))
+    for index, face in ((known[0], "white"), (known[-1], INK)):
+        ax.plot(position[index], velocity[index], marker="o", ms=4, mfc=face, mec=INK, mew=0.8, ls="none", zorder=3)
+
+
+def _labels(history: Any, portrait: Any, dataset: xarray.Dataset, names: list[str]) -> None:
+    unit = dataset[names[0]].attrs.get("units", "1")
+    tail = "" if unit == "1" else f" ({unit})"
+    places = ", ".join(f"${symbol(name)}$" for name in names)
+    speeds = ", ".join(rf"$\dot{{{symbol(name)}}}$" for name in names)
+    history.set(xlabel=r"$\tau$", ylabel=f"{places}{tail}", xlim=(float(dataset.time[0]), _end(dataset)))
+    portrait.set(xlabel=f"{places}{tail}", ylabel=f"{speeds}{tail}")
+    for ax in (history, portrait):
+        ax.axhline(0.0, color=FAINT, lw=0.5, zorder=0)
+    portrait.axvline(0.0, color=FAINT, lw=0.5, zorder=0)
+    if len(names) > 1:
+        history.legend(loc="upper right", ncols=len(names))
+
+
+def _end(dataset: xarray.Dataset) -> float:
+    """The end of the time axis, which is never empty."""
+    first, last = float(dataset.time[0]), float(dataset.time[-1])
+    return last if last > first else first + 1.0
+
+
+def _system(dataset: xarray.Dataset) -> dict[str, Any]:
+    system: dict[str, Any] = json.loads(dataset.attrs.get("system", "{}"))
+    return system
+
+
+def _forcing_period(dataset: xarray.Dataset) -> float | None:
+    frequency = _system(dataset).get("load", {}).get("frequency")
+    return 2 * math.pi / frequency if frequency else None
+
+
+def _limit_angle(dataset: xarray.Dataset) -> float | None:
+    """The straight line pi - beta0 of a metainterface, rad."""
+    model = _system(dataset).get("model", {})
+    return math.pi - model["beta0"] if model.get("type") in ("Metainterface", "TwoLayer") else None
