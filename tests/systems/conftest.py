@@ -29,11 +29,15 @@ class _AnyLoad:
         return _Channel(name)
 
 
+def _method(function):
+    return lambda self: function(self)
+
+
 @pytest.fixture
 def symbols(monkeypatch):
     """`symbols.model(model)` has a positive symbol for every number; `symbols.load` and `symbols.t` complete it."""
     for name in ("sin", "cos", "tanh", "sqrt"):
-        monkeypatch.setattr(sp.Expr, name, lambda self, f=getattr(sp, name): f(self), raising=False)
+        monkeypatch.setattr(sp.Expr, name, _method(getattr(sp, name)), raising=False)
 
     def model(concrete):
         return substitute(concrete, lambda path, value: sp.Symbol(path, positive=True))

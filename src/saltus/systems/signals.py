@@ -68,7 +68,11 @@ class Harmonic(Signal):
     def __post_init__(self) -> None:
         for name in ("amplitude", "mean", "phase"):
             settle_number(self, name, label=f"Harmonic.{name}")
-        if isinstance(self.order, bool) or self.order != int(self.order) or self.order < 1:
+        try:
+            whole = not isinstance(self.order, bool) and self.order == int(self.order) >= 1
+        except (TypeError, ValueError, OverflowError):
+            whole = False
+        if not whole:
             raise ParameterError(f"Harmonic.order must be a whole number of at least 1, got {self.order!r}")
         object.__setattr__(self, "order", int(self.order))
 

@@ -1,0 +1,248 @@
+"""A system: written and read back, its dotted paths, changed copies, and what is refused."""
+
+import math
+import pickle
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from saltus.errors import ParameterError
+from saltus.systems import (
+    IMPACTS,
+    MODELS,
+    EnergyRestitution,
+    Harmonic,
+    InelasticImpact,
+    Load,
+    Metainterface,
+    Model,
+    Record,
+    RockingBlock,
+    System,
+    TwoLayer,
+    VelocityReduction,
+    WallOscillator,
+    register,
+)
+
+finite = st.floats(-1e6, 1e6)
+positive = st.floats(1e-6, 1e6)
+at_least_0 = st.floats(0, 1e6)
+angle = st.floats(1e-3, 3.14)
+ratios = {"damping": at_least_0, "stiffness_ratio": positive, "mass_ratio": at_least_0, "dissipation_ratio": at_least_0}
+models = st.one_of(
+    st.builds(Metainterface, beta0=angle, **ratios),
+    st.builds(Metainterface, beta0=angle, damping=at_least_0, smoothing=positive),
+    st.builds(TwoLayer, beta0=angle, **ratios),
+    st.builds(RockingBlock, alpha=st.floats(1e-3, 1.57)),
+    st.builds(WallOscillator, stiffness=at_least_0, damping=at_least_0, wall=finite),
+)
+impacts = st.one_of(
+    st.builds(VelocityReduction, st.floats(0, 1)), st.builds(EnergyRestitution, positive), st.just(InelasticImpact())
+)
+harmonics = st.builds(Harmonic, finite, finite, finite, st.integers(1, 9))
+
+
+@st.composite
+def records(draw, quantities):
+    steps = draw(st.lists(st.floats(0.01, 10), min_size=4, max_size=8))
+    values = draw(st.lists(finite, min_size=len(steps), max_size=len(steps)))
+    return Record(np.cumsum(steps), values, draw(st.sampled_from(quantities)), draw(finite), draw(st.sampled_from(["", "q.csv"])))
+
+
+@st.composite
+def systems(draw):
+    model = draw(models)
+    channels = {}
+    for name in draw(st.lists(st.sampled_from(model.channels), unique=True)):
+        ground = name.startswith("ground_")
+        record = records(["displacement", "velocity", "acceleration"] if ground else ["force"])
+        single = st.one_of(finite, harmonics, record)
+        channels[name] = draw(st.one_of(single, st.builds(lambda a, b: a + b, harmonics, single)))
+    return System(model=model, load=Load(frequency=draw(positive), **channels), impact=draw(impacts))
+
+
+EXAMPLE = System(
+    model=Metainterface(beta0=1.4, damping=0.1),
+    load=Load(frequency=1.0, horizontal=Harmonic(amplitude=0.5) + 0.2, vertical=-0.5),
+    impact=VelocityReduction(0.9),
+)
+
+
+@settings(deadline=None, max_examples=60)
+@given(systems())
+def test_every_system_survives_json_toml_and_pickling(system):
+    assert System.from_json(system.to_json()) == system
+    assert System.from_toml(system.to_toml()) == system
+    assert pickle.loads(pickle.dumps(system)) == system
+    again = System.from_json(system.to_json())
+    assert hash(again) == hash(system)
+    assert again.to_json() == system.to_json()
+
+
+@settings(deadline=None, max_examples=60)
+@given(systems(), st.data())
+def test_every_number_has_a_path_that_reads_and_replaces_it(system, data):
+    paths = system.parameters
+    path = data.draw(st.sampled_from(sorted(paths)))
+    assert system.get(path) == paths[path]
+    assert system.with_({path: system.get(path)}) == system
+    if not path.endswith(("order", "smoothing")):
+        changed = system.with_({path: 0.25})
+        assert changed.get(path) == 0.25
+        others = {p: v for p, v in changed.parameters.items() if p != path}
+        assert others == {p: v for p, v in paths.items() if p != path}
+
+
+def test_paths_of_an_example_are_listed():
+    assert set(EXAMPLE.parameters) >= {
+        "model.beta0",
+        "model.damping",
+        "load.frequency",
+        "load.horizontal.0.amplitude",
+        "load.horizontal.1",
+        "load.vertical",
+        "impact.e",
+    }
+    assert EXAMPLE.get("load.vertical") == -0.5
+    assert EXAMPLE.with_({"load.vertical": Harmonic(0.1)}).get("load.vertical.amplitude") == 0.1
+    assert EXAMPLE.with_(impact=EnergyRestitution(0.5)).get("impact.r") == 0.5
+    assert EXAMPLE.get("impact.e") == 0.9  # the original is as it was
+    assert EXAMPLE.with_({"load.lower_vertical": 0.3}).get("load.lower_vertical") == 0.3
+
+
+@pytest.mark.parametrize(
+    ("path", "hint"),
+    [
+        ("model.beta", "'beta0'"),
+        ("model.dampng", "'damping'"),
+        ("lod.frequency", "'load'"),
+        ("load.horizontal.0.amplitud", "'amplitude'"),
+        ("impact.r", "known here: e"),
+        ("model.beta0.x", "has no 'x'"),
+        ("load.vertical.amplitude", "has no 'amplitude'"),
+        ("", "no parameter ''"),
+    ],
+)
+def test_a_wrong_path_is_answered_with_the_near_ones(path, hint):
+    with pytest.raises(ParameterError, match=re.escape(hint)):
+        EXAMPLE.with_({path: 1.0})
+    with pytest.raises(ParameterError, match="no parameter"):
+        EXAMPLE.get(path)
+
+
+def test_get_names_near_whole_paths():
+    with pytest.raises(ParameterError, match=r"no parameter 'load.frequncy'; did you mean 'load.frequency'"):
+        EXAMPLE.get("load.frequncy")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: EXAMPLE.with_({"model.damping": -1.0}), r"damping must lie in \[0, inf\), got -1.0"),
+        (lambda: EXAMPLE.with_({"load.horzontal": 1.0}), "does not read load.horzontal; did you mean 'horizontal'"),
+        (lambda: EXAMPLE.with_({"load.frequency": None}), "load.frequency must be given"),
+        (lambda: System(model=RockingBlock(alpha=0.3), load=Load(vertical=1.0)), "RockingBlock does not read load.vertical"),
+        (lambda: System(model=WallOscillator(), load=Load(horizontal=1.0)), "known here: force, frequency"),
+        (lambda: System(model=Metainterface), "System.model must be a Model"),
+        (lambda: System(model=EXAMPLE.model, load={"vertical": 1}), "System.load must be a Load"),
+        (lambda: System(model=EXAMPLE.model, impact=0.9), "System.impact must be a ImpactLaw"),
+        (lambda: System.from_dict({"load": {}}), "a system needs a model"),
+        (lambda: System.from_dict({"model": {"beta0": 1.0}}), "model.type is missing"),
+        (lambda: System.from_dict({"model": {"type": "Metainterfce"}}), "did you mean 'Metainterface'"),
+        (lambda: System.from_dict({"model": {"type": "Metainterface"}}), "model.beta0 is missing"),
+        (lambda: System.from_dict({"model": {"type": "TwoLayer", "beta0": 1.0, "dampng": 1}}), "did you mean 'damping'"),
+        (lambda: System.from_dict({"modl": {}}), "did you mean 'model'"),
+        (lambda: System.from_dict({"model": 3}), "model must be a table"),
+        (lambda: System.from_dict({**EXAMPLE.to_dict(), "impact": {"type": "Bounce"}}), "not a known impact law"),
+        (lambda: System.from_dict({**EXAMPLE.to_dict(), "load": {"vertical": {"amplitud": 1}}}), "'amplitude'"),
+    ],
+)
+def test_impossible_systems_are_refused_in_a_sentence(make, message):
+    with pytest.raises(ParameterError, match=message):
+        make()
+
+
+@pytest.mark.parametrize("cls", [Metainterface, TwoLayer])
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"beta0": 80.0}, r"beta0 must lie in \(0, pi\) rad, got 80.0 \(degrees\?\)"),
+        ({"beta0": 0.0}, r"beta0 must lie in \(0, pi\) rad, got 0.0$"),
+        ({"beta0": math.pi}, r"beta0 must lie in \(0, pi\) rad"),
+        ({"beta0": math.nan}, "got nan"),
+        ({"beta0": math.inf}, "got inf"),
+        ({"beta0": "1.4"}, "beta0 must be a number"),
+        ({"beta0": True}, "beta0 must be a number"),
+        ({"beta0": 1.4, "damping": -0.1}, r"damping must lie in \[0, inf\), got -0.1"),
+        ({"beta0": 1.4, "damping": math.nan}, "damping"),
+        ({"beta0": 1.4, "stiffness_ratio": 0.0}, r"stiffness_ratio must lie in \(0, inf\), got 0.0"),
+        ({"beta0": 1.4, "mass_ratio": -1.0}, "mass_ratio"),
+        ({"beta0": 1.4, "dissipation_ratio": -1.0}, "dissipation_ratio"),
+    ],
+)
+def test_impossible_parameters_are_refused_in_a_sentence(cls, fields, message):
+    with pytest.raises(ParameterError, match=message):
+        cls(**fields)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: RockingBlock(alpha=math.pi / 2), r"alpha must lie in \(0, pi/2\) rad"),
+        (lambda: RockingBlock(alpha=20.0), r"got 20.0 \(degrees\?\)"),
+        (lambda: WallOscillator(stiffness=-1.0), "stiffness"),
+        (lambda: WallOscillator(damping=-1.0), "damping"),
+        (lambda: WallOscillator(wall=math.inf), "wall must be finite, got inf"),
+        (lambda: Metainterface(beta0=1.4, smoothing=0.0), r"smoothing must lie in \(0, inf\)"),
+    ],
+)
+def test_impossible_parameters_of_the_other_models_are_refused(make, message):
+    with pytest.raises(ParameterError, match=message):
+        make()
+
+
+def test_numpy_numbers_are_stored_as_plain_ones():
+    model = Metainterface(beta0=np.deg2rad(80), damping=np.float32(0.5), mass_ratio=1)
+    assert type(model.beta0) is type(model.damping) is type(model.mass_ratio) is float
+    assert "np." not in repr(model)
+
+
+def test_mirrored_systems_keep_everything_but_the_horizontal_load():
+    mirrored = EXAMPLE.mirrored()
+    assert mirrored.mirrored() == EXAMPLE
+    assert mirrored.get("load.horizontal.0.amplitude") == -0.5
+    assert mirrored.get("load.vertical") == -0.5
+    assert System(model=Metainterface(beta0=1.4, mass_ratio=0.5), load=EXAMPLE.load).mirrored() is None
+
+
+def test_models_and_laws_of_ones_own_are_registered_by_name():
+    class Pendulum(Model):
+        pass
+
+    class Sticky(VelocityReduction):
+        pass
+
+    try:
+        assert register(Pendulum) is Pendulum
+        assert register(Sticky) is Sticky
+        assert MODELS["Pendulum"] is Pendulum
+        assert IMPACTS["Sticky"] is Sticky
+        with pytest.raises(ParameterError, match="register takes a Model or an ImpactLaw"):
+            register(dict)
+    finally:
+        MODELS.pop("Pendulum", None)
+        IMPACTS.pop("Sticky", None)
+
+
+def test_a_bare_model_says_what_it_lacks():
+    class Bare(Model):
+        pass
+
+    with pytest.raises(NotImplementedError, match="Bare must define acceleration"):
+        Bare().acceleration(0.0, 0.0, 0.0, 1, Load())
+    with pytest.raises(ParameterError, match="Bare defines no kinetic_energy"):
+        EnergyRestitution(0.5).velocity_after(Bare(), 0.0, 1.0, 1, -1, Load())
