@@ -25,10 +25,12 @@ def check_number(
     Raises:
         ParameterError: with the name, the range and the value, and a hint where degrees look likely.
     """
+    number = isinstance(value, (float, int, np.floating, np.integer)) and not isinstance(value, bool)
     wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
-    if isinstance(value, bool) or not isinstance(value, (float, int, np.floating, np.integer)):
-        raise ParameterError(f"{name} must be {wanted.replace('lie in', 'a number in')}, got {value!r}")
-    inside = (
+    if not number:
+        kind = wanted.replace("lie in", "be a number in").replace("be finite", "be a finite number")
+        raise ParameterError(f"{name} must {kind}, got {value!r}")
+    inside: bool = (
         math.isfinite(value)
         and (above is None or value > above)
         and (below is None or value < below)
