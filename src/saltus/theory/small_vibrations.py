@@ -13,6 +13,8 @@ from saltus.systems import System
 from saltus.systems.checks import check_number
 from saltus.theory.layer import Layer, layers
 
+UPRIGHT = 1e-15  # moments V cos(beta0) below this are the rounding of cos(pi/2)
+
 
 @dataclass(frozen=True, slots=True)
 class Vibration:
@@ -61,8 +63,8 @@ def linear_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
     """
     kappa, closing = _linear(beta0, vertical)
     size = np.abs(np.asarray(theta0, dtype=float))
-    if closing <= 0:
-        if closing < -1e-15 or kappa <= 0:
+    if closing <= UPRIGHT:
+        if closing < -UPRIGHT or kappa <= 0:
             raise ParameterError(f"no vibration about theta = 0, stable only for V cos(beta0) below 0, got {-closing:.6g}")
         period = np.full_like(size, 2 * math.pi / math.sqrt(kappa))
         return period if period.ndim else float(period)
@@ -73,7 +75,7 @@ def linear_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
     if kappa > 0:
         period = 4 / math.sqrt(kappa) * np.arctan(tangent)
     elif kappa < 0:
-        period = 4 / math.sqrt(-kappa) * np.arctanh(tangent)
+        period = 4 / math.sqrt(-kappa) * np.log1p((tangent - stretch) / (1 + stretch))
     else:
         period = 4 * np.sqrt(2 * size / closing)
     return period if period.ndim else float(period)
@@ -82,13 +84,13 @@ def linear_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
 def short_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
     """T0 for abs(theta0) << abs(V cos(beta0) / (1 + V sin(beta0))) (`t-beta_exp`), any shape:
 
-        T0 = 4 sqrt(2 abs(theta0)) / sqrt(-V cos(beta0)); its relative error is 5/12 of kappa abs(theta0) / (V cos(beta0))
+        T0 = 4 sqrt(2 abs(theta0)) / sqrt(-V cos(beta0)), the next factor being 1 + 5/12 kappa abs(theta0) / (V cos(beta0))
 
     Raises:
         ParameterError: V cos(beta0) >= 0.
     """
     closing = _linear(beta0, vertical)[1]
-    if closing <= 1e-15:
+    if closing <= UPRIGHT:
         raise ParameterError(f"this expansion needs V cos(beta0) below 0, got {-closing:.6g}")
     return 4 * np.sqrt(2 * np.abs(theta0)) / math.sqrt(closing)
 
