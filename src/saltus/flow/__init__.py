@@ -5,7 +5,7 @@ their own. Nothing is smoothed. `simulate` is the way in; `Motion` is what it re
 """
 
 from saltus.flow.motion import Crossings, DenseOutput, Event, EventKind, Motion, Stop
-from saltus.flow.simulate import simulate
+from saltus.flow.simulation import simulate
 from saltus.flow.validity import Validity
 
 __all__ = ["Crossings", "DenseOutput", "Event", "EventKind", "Motion", "Stop", "Validity", "simulate"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from saltus.flow.graph import Expr, ordered
+from saltus.flow.graph import Expr, ordered, substitute
 from saltus.flow.trace import Trace
 
 CONTEXT = "env, piece"  # what every generated function may read: parameters, constants, records and their current piece
@@ -28,23 +28,22 @@ class Emitter:
         self.most_rows = 1
 
     def source(self) -> str:
-        """The functions `series`, `contact_series`, `reset`, ... and the table of constants, with their sizes."""
+        """The functions `series`, `contact_series`, `reset`, `contact_damping`, `constants` and `geometry`, and their sizes."""
         trace = self.trace
-        two_sided = trace.next_side is not None and any(n.op == "side" for n in ordered([trace.next_side]))
-        functions = [self._series(), self._contact_series()]
-        functions += [
-            self._pointwise("gap_rate", "side", [trace.gap_rate]),
-            self._pointwise("contact_point", "", [trace.contact]),
-            self._pointwise("contact_damping", "t, origin, side", [trace.contact_damping]),
-            self._pointwise("reset", "t, origin, v0, side", [trace.next_side, trace.velocity_after]),
+        sides = 0 if trace.next_side is None else 2 if any(n.op == "side" for n in ordered([trace.next_side])) else 1
+        functions = [
+            self._series(),
+            self._contact_series(),
+            self._pointwise("RESET", "reset", "t, origin, v0, side", [trace.next_side, trace.velocity_after]),
+            self._pointwise("CONTACT_DAMPING", "contact_damping", "t, origin, side", [trace.contact_damping]),
+            self._geometry(),
         ]
         sizes = {
             "DOF": len(trace.acceleration),
             "STOPS": len(trace.margins),
             "ROWS": self.most_rows,
-            "CONSTANTS": max(1, len(self.constants)),
-            "HAS_CONTACT": trace.gap is not None,
-            "TWO_SIDED": two_sided,
+            "SIDES": sides,
+            "CONSTANT_COUNT": max(1, len(self.constants)),
         }
         head = [f"{name} = {value!r}" for name, value in sizes.items()]
         return "\n".join([*head, "", "", *functions, self._constants()])
@@ -57,22 +56,32 @@ class Emitter:
     def _constants(self) -> str:
         """The function that fills the table `c` from the parameters `p`, once for a motion."""
         names = {node: f"c[{i}]" for node, i in self.constants.items()}
-        lines = ["@jit", "def constants(p, c):"]
+        lines = ["@cached_jit(CONSTANTS)", "def constants(p, c):"]
         for node in ordered(list(self.constants)):
             if node.op in ("number", "parameter"):
                 continue
             if node not in names:  # an operand of a constant that nothing else needs
                 names[node] = f"x{len(names)}"
             lines.append(f"    {names[node]} = {_scalar(node, lambda n: names.get(n) or _leaf(n))}")
-        return "\n".join([*lines, "    return c", ""])
+        return "\n".join([*lines, "    return", ""])
 
     def _constant(self, node: Expr) -> str:
         if node.op in ("number", "parameter"):
             return _leaf(node)
         return f"c[{self.constants.setdefault(node, len(self.constants))}]"
 
-    def _pointwise(self, name: str, arguments: str, roots: list[Expr | None]) -> str:
+    def _geometry(self) -> str:
+        """The function that gives the coordinate at contact and the gap's rate there on both sides."""
+        point, rate = self.trace.contact, self.trace.gap_rate
+        lines = ["@cached_jit(GEOMETRY)", "def geometry(env, out):", UNPACK]
+        if point is not None and rate is not None:
+            sides = [substitute(rate, {Expr("side"): s}) for s in (1.0, -1.0)]
+            lines += [f"    out[{i}] = {self._constant(root)}" for i, root in enumerate([point, *sides])]
+        return "\n".join([*lines, "", ""])
+
+    def _pointwise(self, signature: str, name: str, arguments: str, roots: list[Expr | None]) -> str:
         """A function of one instant that returns the values of `roots`."""
+        decorator = f"@cached_jit({signature})"
         names: dict[Expr, str] = {}
 
         def ref(node: Expr) -> str:
@@ -80,14 +89,14 @@ class Emitter:
 
         head = f"def {name}({arguments + ', ' if arguments else ''}{CONTEXT}):"
         if roots[0] is None:
-            return "\n".join(["@jit", head, f"    return {', '.join(['0.0'] * len(roots))}", "", ""])
+            return "\n".join([decorator, head, f"    return {', '.join(['0.0'] * len(roots))}", "", ""])
         lines = []
         for node in ordered([r for r in roots if r is not None]):
             if not self._is_constant(node) and node.args:
                 names[node] = f"x{len(names)}"
                 lines.append(f"    {names[node]} = {_scalar(node, ref)}")
         results = ", ".join(ref(r) for r in roots if r is not None)
-        return "\n".join(["@jit", head, UNPACK, *lines, f"    return {results}", "", ""])
+        return "\n".join([decorator, head, UNPACK, *lines, f"    return {results}", "", ""])
 
     # --- series --------------------------------------------------------------------------------------------------------
 
@@ -95,11 +104,13 @@ class Emitter:
         """The Taylor coefficients of the coordinates, velocities, accelerations, the gap and the margins from one state."""
         trace = self.trace
         writer = _SeriesWriter(self)
+        others = [*([trace.gap] if trace.gap is not None else []), *trace.margins.values()]
+        writer.plan([*trace.acceleration, *others])
         for root in trace.acceleration:
             writer.add(root)
         for i, root in enumerate(trace.acceleration):
             writer.store(f"a[{i}, k]", root)
-        for root in [*([trace.gap] if trace.gap is not None else []), *trace.margins.values()]:
+        for root in others:
             writer.add(root)
         if trace.gap is not None:
             writer.store("g[k]", trace.gap)
@@ -108,16 +119,17 @@ class Emitter:
         for i in range(len(trace.acceleration)):
             writer.both(f"q[{i}, k + 1] = v[{i}, k] / (k + 1)")
             writer.both(f"v[{i}, k + 1] = a[{i}, k] / (k + 1)")
-        return writer.function(f"def series(t, origin, side, {CONTEXT}, q, v, a, g, m, w, order):")
+        return writer.function("SERIES", f"def series(t, origin, side, {CONTEXT}, q, v, a, g, m, w, order):")
 
     def _contact_series(self) -> str:
         """The Taylor coefficients in the time of the gap's second derivative at rest at contact."""
         writer = _SeriesWriter(self)
         root = self.trace.contact_acceleration
         if root is not None:
+            writer.plan([root])
             writer.add(root)
             writer.store("b[k]", root)
-        return writer.function(f"def contact_series(t, origin, side, {CONTEXT}, b, w, order):")
+        return writer.function("CONTACT_SERIES", f"def contact_series(t, origin, side, {CONTEXT}, b, w, order):")
 
 
 class _SeriesWriter:
@@ -130,12 +142,13 @@ class _SeriesWriter:
         self.later: list[str] = []
         self.names: dict[Expr, str] = {}
         self.rows = 0
+        self.convolved: set[Expr] = set()  # nodes whose earlier coefficients are needed again
 
-    def function(self, head: str) -> str:
+    def function(self, signature: str, head: str) -> str:
         self.emitter.most_rows = max(self.emitter.most_rows, self.rows)
         indent = [f"    {line}" for line in [*self.scalars, "k = 0", *self.first]]
         loop = ["    for k in range(1, order + 1):", *(f"        {line}" for line in self.later)] if self.later else []
-        return "\n".join(["@jit", head, UNPACK, *indent, *loop, "", ""])
+        return "\n".join([f"@cached_jit({signature})", head, UNPACK, *indent, *loop, "", ""])
 
     def both(self, line: str) -> None:
         self.first.append(line)
@@ -152,9 +165,11 @@ class _SeriesWriter:
             return self.emitter._constant(node) if self.emitter._is_constant(node) else self.names.get(node) or _leaf(node)
         if node.op in ("coordinate", "velocity", "acceleration"):
             return f"{node.op[0].replace('c', 'q')}[{node.value}, {k}]"
-        return f"{self.names[node]}, {k}]"
+        name = self.names[node]
+        return f"{name}, {k}]" if name.startswith("w[") else name
 
     def add(self, root: Expr) -> None:
+        """Emit what a root needs; call `plan` with all roots first."""
         for node in ordered([root]):
             if node in self.names or node.op in ("coordinate", "velocity", "acceleration"):
                 continue
@@ -162,6 +177,15 @@ class _SeriesWriter:
                 self._add_scalar(node)
             else:
                 self._add_row(node)
+
+    def plan(self, roots: list[Expr]) -> None:
+        """Find the nodes that need a row: a sum, or a product with a scalar, that no convolution reads is a local variable."""
+        for node in ordered(roots):
+            series = [a for a in node.args if a.degree != 0]
+            if node.op not in ("add", "sub", "mul", "div") or (node.op == "mul" and len(series) == 2):
+                self.convolved.update(series)
+            elif node.op == "div" and node.args[1].degree != 0:
+                self.convolved.update((node, node.args[1]))
 
     def _add_scalar(self, node: Expr) -> None:
         if node.args and not self.emitter._is_constant(node):
@@ -176,7 +200,8 @@ class _SeriesWriter:
         if node.op in PAIRS:
             self._pair(node)
             return
-        self.names[node] = self._row()
+        local = node.op in ("add", "sub", "mul", "div") and node not in self.convolved
+        self.names[node] = f"y{len(self.names)}" if local else self._row()
         if node.op == "time":
             self.first.append(f"{self.names[node]}, 0] = t")
             self.later.append(f"{self.names[node]}, k] = 1.0 if k == 1 else 0.0")
@@ -206,24 +231,26 @@ class _SeriesWriter:
         return f"range({bottom}, {top})"
 
     def _sum(self, node: Expr, span: str, term: str, before: str = "", after: str = "") -> None:
-        self.later += ["x = 0.0", f"for j in {span}:", f"    x += {term}", f"{self.names[node]}, k] = {before}x{after}"]
+        self.later += ["x = 0.0", f"for j in {span}:", f"    x += {term}", f"{self.coefficient(node, 'k')} = {before}x{after}"]
 
 
 def _linear(writer: _SeriesWriter, node: Expr) -> None:
     a, b = node.args
     sign = INFIX[node.op]
-    writer.first.append(f"{writer.names[node]}, 0] = {writer.coefficient(a, '0')} {sign} {writer.coefficient(b, '0')}")
+    writer.first.append(f"{writer.coefficient(node, '0')} = {writer.coefficient(a, '0')} {sign} {writer.coefficient(b, '0')}")
     left = "" if a.degree == 0 else writer.coefficient(a, "k")
     right = "" if b.degree == 0 else f" {sign} {writer.coefficient(b, 'k')}"
-    writer.later.append(f"{writer.names[node]}, k] = {left}{right}")
+    writer.later.append(f"{writer.coefficient(node, 'k')} = {left}{right}")
 
 
 def _product(writer: _SeriesWriter, node: Expr) -> None:
     a, b = node.args
-    writer.first.append(f"{writer.names[node]}, 0] = {writer.coefficient(a, '0')} * {writer.coefficient(b, '0')}")
+    writer.first.append(f"{writer.coefficient(node, '0')} = {writer.coefficient(a, '0')} * {writer.coefficient(b, '0')}")
     if a.degree == 0 or b.degree == 0:
         factor, series = (a, b) if a.degree == 0 else (b, a)
-        writer.later.append(f"{writer.names[node]}, k] = {writer.coefficient(factor, '0')} * {writer.coefficient(series, 'k')}")
+        writer.later.append(
+            f"{writer.coefficient(node, 'k')} = {writer.coefficient(factor, '0')} * {writer.coefficient(series, 'k')}"
+        )
     else:
         span = writer._bounded(a, other=b)
         writer._sum(node, span, f"{writer.coefficient(a, 'j')} * {writer.coefficient(b, 'k - j')}")
@@ -232,10 +259,10 @@ def _product(writer: _SeriesWriter, node: Expr) -> None:
 def _quotient(writer: _SeriesWriter, node: Expr) -> None:
     a, b = node.args
     bottom = writer.coefficient(b, "0")
-    writer.first.append(f"{writer.names[node]}, 0] = {writer.coefficient(a, '0')} / {bottom}")
+    writer.first.append(f"{writer.coefficient(node, '0')} = {writer.coefficient(a, '0')} / {bottom}")
     top = "0.0" if a.degree == 0 else writer.coefficient(a, "k")
     if b.degree == 0:
-        writer.later.append(f"{writer.names[node]}, k] = {top} / {bottom}")
+        writer.later.append(f"{writer.coefficient(node, 'k')} = {top} / {bottom}")
     else:
         term = f"{writer.coefficient(b, 'j')} * {writer.names[node]}, k - j]"
         writer._sum(node, writer._bounded(b, low=1), term, f"({top} - ", f") / {bottom}")

@@ -20,10 +20,14 @@ ALLOWED = (
     "+ - * /, powers, NumPy's sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, and abs of the coordinate "
     "(the sign of the coordinate is `side`)"
 )
-UFUNCS = {
-    **{name: name for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "maximum", "minimum")},
-    **{"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow", "square": "square"},
-    **{name: name for name in ("greater", "less", "greater_equal", "less_equal", "absolute", "negative", "positive")},
+_SAME = "sqrt exp log sin cos tan sinh cosh tanh maximum minimum greater less greater_equal less_equal absolute negative positive"
+UFUNCS = {name: name for name in _SAME.split()} | {
+    "add": "add",
+    "subtract": "sub",
+    "multiply": "mul",
+    "divide": "div",
+    "power": "pow",
+    "square": "square",
 }
 
 

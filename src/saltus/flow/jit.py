@@ -1,11 +1,43 @@
-"""The one way in which saltus compiles: numba, without Python's exceptions for division, and with fused multiply-adds."""
+"""The one way in which saltus compiles: numba, without Python's exceptions for division, and with fused multiply-adds.
+
+The kernel is compiled once and calls the functions of a structure through pointers, so their types are fixed here.
+"""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
-from numba import njit
+from numba import njit, types
+from numba.core.errors import NumbaExperimentalFeatureWarning
 
-jit: Callable[[Any], Any] = njit(error_model="numpy", fastmath={"contract", "nsz"})
-cached_jit: Callable[[Any], Any] = njit(error_model="numpy", fastmath={"contract", "nsz"}, cache=True)
+# Calls through pointers are called experimental by numba; the test suite runs every kernel through them.
+warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
+
+OPTIONS = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
+jit: Callable[[Any], Any] = njit(**OPTIONS)
+
+
+def cached_jit(signature: Any) -> Callable[[Any], Any]:
+    """Compile for one signature at once, and keep the result on disk."""
+    decorator: Callable[[Any], Any] = njit(signature, cache=True, **OPTIONS)
+    return decorator
+
+
+_f, _i = types.float64, types.int64
+_f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
+_i1, _i2 = (types.Array(_i, n, "C") for n in (1, 2))
+ENV = types.Tuple((_f1, _f1, _f1, _f3))  # parameters, constants, record breakpoints, record table
+
+CONSTANTS = types.void(_f1, _f1)
+GEOMETRY = types.void(ENV, _f1)
+SERIES = types.void(_f, _f, _f, ENV, _i, _f2, _f2, _f2, _f1, _f2, _f2, _i)
+CONTACT_SERIES = types.void(_f, _f, _f, ENV, _i, _f1, _f2, _i)
+RESET = types.UniTuple(_f, 2)(_f, _f, _f, _f, ENV, _i)
+CONTACT_DAMPING = _f(_f, _f, _f, ENV, _i)
+
+_functions = [types.FunctionType(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING)]
+MODEL = types.Tuple((*_functions, _f1))
+STEP_BUFFERS, EVENT_BUFFERS = types.Tuple((_i2, _f2, _f3)), types.Tuple((_i2, _f2))
+ADVANCE = _i(_i1, _f1, _f1, ENV, MODEL, STEP_BUFFERS, EVENT_BUFFERS)

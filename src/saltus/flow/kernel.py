@@ -1,12 +1,13 @@
 """The robust scalar flow: arcs, impacts, rest and release, accumulations of impacts, chatter.
 
-This text is compiled together with the functions that `emit.py` generates for one structure (`series`, `contact_series`, `reset`,
-`gap_rate`, `contact_point`, `contact_damping`, `constants`) and with `roots.py`, so it uses plain loops and the decorator `jit`.
+Together with `roots.py` it is compiled once, for every model: the functions that `emit.py` generates for one structure,
+`series`, `contact_series`, `reset` and `contact_damping`, are its arguments. It uses plain loops and the decorator `jit`.
 
 A motion is in one of four modes. ARC: a smooth motion on one side. CONTACT: at the contact, to be decided. REST: held at the
 contact until an acceleration points outward. CHATTER: impacts without loss, too small and too many to follow one by one.
 
-`env` = (parameters, constants, record breakpoints, record table); `work` = (q, v, a, g, m, w, poly, b), the Taylor coefficients of
+`env` = (parameters, constants, record breakpoints, record table); `model` = (the four functions, the coordinate at contact and
+the gap's rate of change with the coordinate there on sides +1 and -1); `work` = (q, v, a, g, m, w, poly, b), the Taylor coefficients of
 coordinates, velocities, accelerations, gap and margins, the workspace of their recurrences, a scaled polynomial, and the
 contact accelerations of both sides.
 """
@@ -17,7 +18,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.jit import cached_jit, jit
+from saltus.flow.jit import ADVANCE, cached_jit, jit
 from saltus.flow.roots import NEVER, SIMPLE, first_root, horner, scale_gap
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -25,7 +26,21 @@ from saltus.flow.roots import NEVER, SIMPLE, first_root, horner, scale_gap
 ARC, CONTACT, REST, CHATTER = 0, 1, 2, 3  # modes
 DONE, FULL, PAUSED, NOT_UNIQUE, NO_IMPACT, NOT_FINITE, STALLED, LIMITED = 0, 1, 2, 3, 4, 5, 6, 7  # why `advance` returns
 CROSSING, GRAZING, RESTING, RELEASE, CHATTERING, LIMIT = 0, 1, 2, 3, 4, 5  # events
-PERIOD, MODE, SIDE, SKIP, PIECE, STEPS, EVENTS, LAST, ORDER, DENSE, FORCED, HELD = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11  # where
+PERIOD, MODE, SIDE, SKIP, PIECE, STEPS, EVENTS, LAST, ORDER, DENSE, FORCED, HELD = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+    9,
+    10,
+    11,
+)  # in `where`,
+DOF, STOPS, ROWS, SIDES = 12, 13, 14, 15  # and the structure's: coordinates, margins, workspace rows, sides of the contact
 TIME, SPEED, STATE = 0, 1, 2  # in `state`: local time, chatter speed, then the coordinates and the velocities
 LENGTH, END, TOLERANCE = 0, 1, 2  # in `settings`: the forcing period, the local time at the end, the tolerance
 
@@ -37,29 +52,6 @@ LOSSLESS = 1e-12  # a loss of speed over two impacts below this is rounding
 BATCH = 100_000  # passes of the loop before the caller may look (Ctrl-C)
 GAUSS_NODES = np.array([0.0694318442029737, 0.3300094782075719, 0.6699905217924281, 0.9305681557970263])
 GAUSS_WEIGHTS = np.array([0.1739274225687269, 0.3260725774312731, 0.3260725774312731, 0.1739274225687269])
-
-
-@jit
-def anchor(breaks, piece):
-    """The time that a record's piece counts from."""
-    return breaks[max(piece - 1, 0)]
-
-
-@jit
-def expand_record(coefficients, start, t, row):
-    """Taylor coefficients at `t` of a record's piece, given in powers of the time since `start`."""
-    width = coefficients.size
-    for k in range(width):
-        row[k] = coefficients[k]
-    for k in range(width - 1):  # repeated synthetic division: p(x + t - start)
-        for j in range(width - 2, k - 1, -1):
-            row[j] += (t - start) * row[j + 1]
-
-
-@jit
-def record_value(coefficients, start, t):
-    """A record's piece at `t`."""
-    return horner(coefficients, coefficients.size - 1, t - start)
 
 
 @jit
@@ -100,10 +92,16 @@ def record_step(where, steps, side, t, h, q):
 
 
 @jit
-def hold(where, state, env, q):
+def rate_of(model, side):
+    """The gap's rate of change with the coordinate at contact, on a side."""
+    return model[4][1] if side > 0.0 else model[4][2]
+
+
+@jit
+def hold(where, state, env, model, q):
     """Put the system at rest at contact."""
-    state[STATE] = contact_point(env, where[PIECE])
-    state[STATE + DOF] = 0.0
+    state[STATE] = model[4][0]
+    state[STATE + where[DOF]] = 0.0
     for k in range(q.shape[1]):
         q[0, k] = 0.0
     q[0, 0] = state[STATE]
@@ -119,7 +117,7 @@ def leading(coefficients, start, order):
 
 
 @jit
-def leave_or_stay(where, state, env, work, origin):
+def leave_or_stay(where, state, env, model, work, origin):
     """Decide where a system at rest at contact goes: on an ARC, or into REST. False if that is not unique.
 
     On each side the first non-zero Taylor coefficient of the gap decides. If both point outward the motion is not unique,
@@ -128,11 +126,11 @@ def leave_or_stay(where, state, env, work, origin):
     q, v, a, g, m, w, _, _ = work
     order, outward = where[ORDER], 0
     for s in (1, -1):
-        if s == -1 and not TWO_SIDED:
+        if s == -1 and where[SIDES] < 2:
             continue
-        hold(where, state, env, q)
+        hold(where, state, env, model, q)
         v[0, 0] = 0.0
-        series(state[TIME], origin, float(s), env, where[PIECE], q, v, a, g, m, w, order)
+        model[0](state[TIME], origin, float(s), env, where[PIECE], q, v, a, g, m, w, order)
         skip = leading(g, 2, order)
         if skip < order and g[skip] > 0.0 and (outward == 0 or where[FORCED] != where[SIDE]):
             outward += 1
@@ -144,92 +142,92 @@ def leave_or_stay(where, state, env, work, origin):
 
 
 @jit
-def contact_pull(side, env, piece, work, t, origin):
+def contact_pull(side, env, model, piece, work, t, origin):
     """The second derivative of the gap at rest at contact on one side, and its rate of change."""
     b, w = work[7], work[5]
-    contact_series(t, origin, side, env, piece, b[0], w, 1)
+    model[1](t, origin, side, env, piece, b[0], w, 1)
     return b[0, 0], b[0, 1]
 
 
 @jit
-def accumulation(where, env, work, speed, t, origin, tol):
-    """What a small impact at the contact is the end of: (mode, time left, the next impact's factor).
+def accumulation(where, env, model, work, speed, t, origin, tol):
+    """What a small impact at the contact is the end of: (mode, time left).
 
     ARC: of nothing. REST: of a Zeno accumulation. From the gap's speed v on side s the time left is
-    2 v (1/abs(a_s) + e1/abs(a_n)) / (1 - e1 e2), with a_s, a_n the contact accelerations on this and on the next side and e1, e2 the
-    factors of the next two impacts; its error is of the order of the time left, squared, times the relative rate of change of
-    the accelerations. CHATTER: of impacts without loss, below CHATTER_SPEED.
+    2 v (1/abs(a_s) + e1/abs(a_n)) / (1 - e1 e2), with a_s, a_n the contact accelerations on this and on the next side and e1, e2
+    the factors of the next two impacts; its error is of the order of the time left, squared, times the relative rate of
+    change of the accelerations. CHATTER: of impacts without loss, below CHATTER_SPEED.
     """
     side, piece = float(where[SIDE]), where[PIECE]
-    here, slope_here = contact_pull(side, env, piece, work, t, origin)
+    here, slope_here = contact_pull(side, env, model, piece, work, t, origin)
     if here >= 0.0:
-        return ARC, 0.0, 0.0
-    next_side, after = reset(t, origin, -speed / gap_rate(side, env, piece), side, env, piece)
-    there, slope_there = contact_pull(next_side, env, piece, work, t, origin)
+        return ARC, 0.0
+    next_side, after = model[2](t, origin, -speed / rate_of(model, side), side, env, piece)
+    there, slope_there = contact_pull(next_side, env, model, piece, work, t, origin)
     if there >= 0.0 or after != after:
-        return ARC, 0.0, 0.0
-    next_speed = gap_rate(next_side, env, piece) * after
+        return ARC, 0.0
+    next_speed = rate_of(model, next_side) * after
     first, second = next_speed / speed, 0.0
     if first > 0.0:
-        third_side, last = reset(t, origin, -after, next_side, env, piece)
-        second = gap_rate(third_side, env, piece) * last / next_speed
+        third_side, last = model[2](t, origin, -after, next_side, env, piece)
+        second = rate_of(model, third_side) * last / next_speed
     loss = 1.0 - first * second
     if abs(loss) < LOSSLESS:
-        return CHATTER if speed < CHATTER_SPEED else ARC, 0.0, first
+        return CHATTER if speed < CHATTER_SPEED else ARC, 0.0
     if not loss > 0.0:
-        return ARC, 0.0, 0.0
+        return ARC, 0.0
     left = 2.0 * speed * (1.0 / abs(here) + first / abs(there)) / loss
     change = 1.0 + abs(slope_here / here) + abs(slope_there / there)
-    return REST if 0.1 * left * left * change <= tol else ARC, left, first
+    return REST if 0.1 * left * left * change <= tol else ARC, left
 
 
 @jit
-def decide(where, state, settings, env, work, steps, events, origin, t_end):
+def decide(where, state, settings, env, model, work, steps, events, origin, t_end):
     """At contact: find the next mode. Returns PAUSED to go on, or why the motion ends."""
     q = work[0]
-    t, velocity = state[TIME], state[STATE + DOF]
+    t, velocity = state[TIME], state[STATE + where[DOF]]
     if velocity == 0.0:
-        if not leave_or_stay(where, state, env, work, origin):
+        if not leave_or_stay(where, state, env, model, work, origin):
             return NOT_UNIQUE
         if where[MODE] == REST and where[HELD] == 0:
             record_event(where, events, RESTING, 0, 0, t, 0.0, 0.0)
         if where[MODE] == ARC and where[HELD] != 0:
             record_event(where, events, RELEASE, where[SIDE], where[SKIP], t, 0.0, 0.0)
         where[HELD] = 1 if where[MODE] == REST else 0
-        hold(where, state, env, q)
+        hold(where, state, env, model, q)
         return PAUSED
     where[MODE], where[SKIP], where[HELD] = ARC, 1, 0
-    speed = gap_rate(float(where[SIDE]), env, where[PIECE]) * velocity
+    speed = rate_of(model, float(where[SIDE])) * velocity
     if speed < SLOW:
-        mode, left, factor = accumulation(where, env, work, speed, t, origin, settings[TOLERANCE])
+        mode, left = accumulation(where, env, model, work, speed, t, origin, settings[TOLERANCE])
         if mode == REST:
             record_event(where, events, RESTING, 0, 0, t + left, 0.0, 0.0)
-            hold(where, state, env, q)
+            hold(where, state, env, model, q)
             state[TIME] = min(t + left, t_end)
             record_step(where, steps, 0, t, state[TIME] - t, q)
         if mode == CHATTER:
             record_event(where, events, CHATTERING, where[SIDE], 0, t, velocity, velocity)
-            hold(where, state, env, q)
+            hold(where, state, env, model, q)
             state[SPEED], where[SKIP] = speed, 0
         where[MODE], where[HELD] = mode, 0 if mode == ARC else 1
     return PAUSED
 
 
 @jit
-def impact(where, state, env, events, t, origin, before):
+def impact(where, state, env, model, events, t, origin, before):
     """Apply the reset at time `t` to the velocity `before`. Returns PAUSED, or NO_IMPACT with the velocity left in the state."""
     side, piece = float(where[SIDE]), where[PIECE]
-    state[TIME], state[STATE], state[STATE + DOF] = t, contact_point(env, piece), before
+    state[TIME], state[STATE], state[STATE + where[DOF]] = t, model[4][0], before
     where[MODE], where[SKIP], where[HELD] = CONTACT, 0, 0
-    if gap_rate(side, env, piece) * before >= 0.0:  # a triple contact to within the working precision: no speed is left
-        state[STATE + DOF] = 0.0
+    if rate_of(model, side) * before >= 0.0:  # a triple contact to within the working precision: no speed is left
+        state[STATE + where[DOF]] = 0.0
         record_event(where, events, GRAZING, where[SIDE], 0, t, before, 0.0)
         return PAUSED
-    next_side, after = reset(t, origin, before, side, env, piece)
-    if not gap_rate(next_side, env, piece) * after >= 0.0:
+    next_side, after = model[2](t, origin, before, side, env, piece)
+    if not rate_of(model, next_side) * after >= 0.0:
         return NO_IMPACT
     record_event(where, events, CROSSING, where[SIDE], int(next_side), t, before, after)
-    where[SIDE], state[STATE + DOF] = int(next_side), after
+    where[SIDE], state[STATE + where[DOF]] = int(next_side), after
     return PAUSED
 
 
@@ -247,24 +245,24 @@ def contact_root(g, skip, order, h, poly):
 
 
 @jit
-def arc(where, state, settings, env, work, steps, events, origin, target):
+def arc(where, state, settings, env, model, work, steps, events, origin, target):
     """One step of a smooth motion, up to the first zero of the gap or of a margin. Returns PAUSED, or why the motion ends."""
     q, v, a, g, m, w, poly, _ = work
     order, t, size = where[ORDER], state[TIME], 0.0
-    for i in range(DOF):
-        q[i, 0], v[i, 0] = state[STATE + i], state[STATE + DOF + i]
+    for i in range(where[DOF]):
+        q[i, 0], v[i, 0] = state[STATE + i], state[STATE + where[DOF] + i]
         size = max(size, abs(q[i, 0]), abs(v[i, 0]))
-    series(t, origin, float(where[SIDE]), env, where[PIECE], q, v, a, g, m, w, order)
+    model[0](t, origin, float(where[SIDE]), env, where[PIECE], q, v, a, g, m, w, order)
     natural = step_size(v, order, size, settings[TOLERANCE])
     h = min(natural, target - t)
     hit, first, touch = -1, NEVER, NEVER
-    if HAS_CONTACT:
+    if where[SIDES] > 0:
         kind, u, touch = contact_root(g, where[SKIP], order, h, poly)
         if kind == SIMPLE:
-            hit, first = STOPS, u
+            hit, first = where[STOPS], u
         elif 0.75 < touch <= 1.0 and h == natural:  # keep a touch away from the end of a step, where it would be seen twice
             h, touch = 0.5 * h, NEVER
-    for j in range(STOPS):
+    for j in range(where[STOPS]):
         if m[j, 0] <= 0.0:
             hit, first = j, 0.0
         else:
@@ -277,66 +275,66 @@ def arc(where, state, settings, env, work, steps, events, origin, target):
     tau = first * h if hit >= 0 else h
     record_step(where, steps, where[SIDE], t, tau, q)
     finite = True
-    for i in range(DOF):
-        state[STATE + i], state[STATE + DOF + i] = horner(q[i], order, tau), horner(v[i], order, tau)
-        finite = finite and math.isfinite(state[STATE + i]) and math.isfinite(state[STATE + DOF + i])
+    for i in range(where[DOF]):
+        state[STATE + i], state[STATE + where[DOF] + i] = horner(q[i], order, tau), horner(v[i], order, tau)
+        finite = finite and math.isfinite(state[STATE + i]) and math.isfinite(state[STATE + where[DOF] + i])
     if not finite or not h >= 0.0:
         return NOT_FINITE
     state[TIME] = target if hit < 0 and h == target - t else t + tau
     where[SKIP] = 0
-    if hit == STOPS:
-        return impact(where, state, env, events, state[TIME], origin, state[STATE + DOF])
+    if hit == where[STOPS]:
+        return impact(where, state, env, model, events, state[TIME], origin, state[STATE + where[DOF]])
     if hit >= 0:
-        record_event(where, events, LIMIT, where[SIDE], hit, state[TIME], state[STATE + DOF], state[STATE + DOF])
+        record_event(where, events, LIMIT, where[SIDE], hit, state[TIME], state[STATE + where[DOF]], state[STATE + where[DOF]])
         return LIMITED
     return PAUSED if state[TIME] > t or h == target - t else STALLED
 
 
 @jit
-def chatter_sums(where, env, work, h, x, factor, t, origin):
-    """sum of v_s / abs(a_s) gamma_s, sum of v_s / abs(a_s) and sum of v_s^3 / abs(a_s) for unit speed, at the fraction x of a step."""
+def chatter_sums(where, env, model, work, h, x, factor, t, origin):
+    """The sums over both sides of g v / abs(a), v / abs(a) and v^3 / abs(a), g the damping, for unit speed, at x of a step."""
     b, order = work[7], where[ORDER]
     damping, duration, action = 0.0, 0.0, 0.0
     for i in range(2):
-        side = float(where[SIDE]) if i == 0 or not TWO_SIDED else -float(where[SIDE])
+        side = float(where[SIDE]) if i == 0 or where[SIDES] < 2 else -float(where[SIDE])
         ratio = 1.0 if i == 0 else factor
         pull = abs(horner(b[i], order, x * h))
-        damping += ratio / pull * contact_damping(t + x * h, origin, side, env, where[PIECE])
+        damping += ratio / pull * model[3](t + x * h, origin, side, env, where[PIECE])
         duration += ratio / pull
         action += ratio**3 / pull
     return damping, duration, action
 
 
 @jit
-def chatter_decay(where, state, env, work, h, origin):
+def chatter_decay(where, state, env, model, work, h, origin):
     """Advance the chatter speed over a step: the action v^3 sum 1/abs(a_s) decays at the rate of the mean damping."""
     t, order, b = state[TIME], where[ORDER], work[7]
     side = float(where[SIDE])
     for i in range(2):
-        s = side if i == 0 or not TWO_SIDED else -side
-        contact_series(t, origin, s, env, where[PIECE], b[i], work[5], order)
-    next_side, after = reset(t, origin, -state[SPEED] / gap_rate(side, env, where[PIECE]), side, env, where[PIECE])
-    factor = gap_rate(next_side, env, where[PIECE]) * after / state[SPEED]
+        s = side if i == 0 or where[SIDES] < 2 else -side
+        model[1](t, origin, s, env, where[PIECE], b[i], work[5], order)
+    next_side, after = model[2](t, origin, -state[SPEED] / rate_of(model, side), side, env, where[PIECE])
+    factor = rate_of(model, next_side) * after / state[SPEED]
     decay = 0.0
     for j in range(GAUSS_NODES.size):
-        damping, duration, _ = chatter_sums(where, env, work, h, GAUSS_NODES[j], factor, t, origin)
+        damping, duration, _ = chatter_sums(where, env, model, work, h, GAUSS_NODES[j], factor, t, origin)
         decay += GAUSS_WEIGHTS[j] * h * damping / duration
-    _, _, before = chatter_sums(where, env, work, h, 0.0, factor, t, origin)
-    _, _, after_action = chatter_sums(where, env, work, h, 1.0, factor, t, origin)
+    _, _, before = chatter_sums(where, env, model, work, h, 0.0, factor, t, origin)
+    _, _, after_action = chatter_sums(where, env, model, work, h, 1.0, factor, t, origin)
     state[SPEED] *= (math.exp(-decay) * before / after_action) ** (1.0 / 3.0)
 
 
 @jit
-def held(where, state, settings, env, work, steps, origin, target):
+def held(where, state, settings, env, model, work, steps, origin, target):
     """One step of REST or CHATTER, up to the first instant at which a contact acceleration points outward."""
     q, _, _, _, _, w, poly, b = work
     order, t = where[ORDER], state[TIME]
     h, first = target - t, NEVER
-    for i in range(2 if TWO_SIDED else 1):
-        contact_series(t, origin, 1.0 - 2.0 * i, env, where[PIECE], b[i], w, order)
+    for i in range(2 if where[SIDES] == 2 else 1):
+        model[1](t, origin, 1.0 - 2.0 * i, env, where[PIECE], b[i], w, order)
         h = min(h, step_size(b[i : i + 1], order, max(1.0, abs(b[i, 0])), settings[TOLERANCE]))
     clipped = h == target - t
-    for i in range(2 if TWO_SIDED else 1):
+    for i in range(2 if where[SIDES] == 2 else 1):
         skip = leading(b[i], 0, order)
         if skip < order and b[i, skip] > 0.0:
             first = 0.0
@@ -348,29 +346,29 @@ def held(where, state, settings, env, work, steps, origin, target):
             first = min(first, u) if kind == SIMPLE else first
     tau = min(first, 1.0) * h
     if where[MODE] == CHATTER and tau > 0.0:
-        chatter_decay(where, state, env, work, tau, origin)
-    hold(where, state, env, q)
+        chatter_decay(where, state, env, model, work, tau, origin)
+    hold(where, state, env, model, q)
     record_step(where, steps, 0, t, tau, q)
     if first <= 1.0:
         where[MODE], where[SKIP] = CONTACT, 0
     state[TIME] = target if clipped and first > 1.0 else t + tau
 
 
-@cached_jit
-def advance(where, state, settings, p, breaks, table, steps, events):
+@cached_jit(ADVANCE)
+def advance(where, state, settings, env, model, steps, events):
     """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the reason.
 
     All of the motion's state is in `where` and `state`, so a call goes on where the last one stopped.
     """
     order = where[ORDER]
-    env = (p, constants(p, np.empty(CONSTANTS)), breaks, table)
+    dof, breaks = where[DOF], env[2]
     work = (
-        np.zeros((DOF, order + 2)),
-        np.zeros((DOF, order + 2)),
-        np.zeros((DOF, order + 2)),
+        np.zeros((dof, order + 2)),
+        np.zeros((dof, order + 2)),
+        np.zeros((dof, order + 2)),
         np.zeros(order + 2),
-        np.zeros((max(STOPS, 1), order + 2)),
-        np.zeros((ROWS, order + 6)),
+        np.zeros((max(where[STOPS], 1), order + 2)),
+        np.zeros((where[ROWS], order + 6)),
         np.zeros(order + 2),
         np.zeros((2, order + 2)),
     )
@@ -392,11 +390,11 @@ def advance(where, state, settings, p, breaks, table, steps, events):
             target = min(target, breaks[where[PIECE]] - origin)
         status = PAUSED
         if where[MODE] == ARC:
-            status = arc(where, state, settings, env, work, steps, events, origin, target)
-        elif HAS_CONTACT and where[MODE] == CONTACT:
-            status = decide(where, state, settings, env, work, steps, events, origin, t_end)
-        elif HAS_CONTACT:
-            held(where, state, settings, env, work, steps, origin, target)
+            status = arc(where, state, settings, env, model, work, steps, events, origin, target)
+        elif where[SIDES] > 0 and where[MODE] == CONTACT:
+            status = decide(where, state, settings, env, model, work, steps, events, origin, t_end)
+        elif where[SIDES] > 0:
+            held(where, state, settings, env, model, work, steps, origin, target)
         if status != PAUSED:
             return status
     return PAUSED

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError
+from saltus.flow.dense import DenseOutput
 from saltus.flow.validity import Validity, check_validity
 from saltus.systems import System
 
@@ -59,36 +60,6 @@ class Crossings:
 
     def __len__(self) -> int:
         return self.time.size
-
-
-@dataclass(frozen=True, eq=False)
-class DenseOutput:
-    """The steps of a motion: step i starts at `start[i]` on `side[i]` (0: at rest) and holds the coordinates' Taylor series.
-
-    `series` has shape (steps, degrees of freedom, order + 2), in powers of the time since the step's start.
-    """
-
-    start: np.ndarray
-    length: np.ndarray
-    side: np.ndarray
-    series: np.ndarray
-
-    def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coordinates and velocities, each (degrees of freedom, n), and sides (n,); at an impact, those after it."""
-        step = np.clip(np.searchsorted(self.start, times, side="right") - 1, 0, None)
-        tau = times - self.start[step]
-        powers = np.arange(self.series.shape[2])
-        coefficients = self.series[step]
-        slopes = coefficients[:, :, 1:] * powers[1:]
-        return _evaluate(coefficients, tau), _evaluate(slopes, tau), self.side[step]
-
-
-def _evaluate(coefficients: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """Horner's scheme for many series at once: (n, dof, order) at (n,) gives (dof, n)."""
-    value = coefficients[:, :, -1]
-    for k in range(coefficients.shape[2] - 2, -1, -1):
-        value = value * tau[:, None] + coefficients[:, :, k]
-    return value.T
 
 
 @dataclass(frozen=True, eq=False)

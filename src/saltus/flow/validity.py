@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.flow.dense import evaluate
+
 if TYPE_CHECKING:
     from saltus.flow.motion import Motion
 
@@ -87,21 +89,14 @@ def _margins(motion: Motion, tau: np.ndarray, step: np.ndarray) -> dict[str, Any
     if dense is None or dense.start.size == 0:
         zero = np.zeros(len(system.model.coordinates))
         state = [zero, zero, zero]
-        t, side = motion.start, float(motion.side or 1)
+        t, side = np.asarray(motion.start), np.asarray(motion.side or 1)
     else:
         coefficients = dense.series[step]
         state = []
-        for order in range(3):
-            state.append(_evaluate(coefficients, tau))
+        for _ in range(3):
+            state.append(evaluate(coefficients, tau))
             coefficients = coefficients[:, :, 1:] * np.arange(1, coefficients.shape[2])
         t, side = dense.start[step] + tau, np.where(dense.side[step] == 0, 1, dense.side[step])
     if len(system.model.coordinates) == 1:
         state = [x[0] for x in state]
     return system.model.margins(t, state[0], state[1], state[2], side, system.load)
-
-
-def _evaluate(coefficients: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    value = coefficients[:, :, -1]
-    for k in range(coefficients.shape[2] - 2, -1, -1):
-        value = value * tau[:, None] + coefficients[:, :, k]
-    return value.T

@@ -31,8 +31,8 @@ class Metainterface(Model):
     Margins, which a motion may be asked to stop at: `line_limit`, pi - beta0 - abs(theta) (`line_cond`, n = 1);
     `kinematic_limit`, 2 (pi - beta0) - abs(theta), where the slider closes again (errata 20); `reaction`, the closed
     layer's reaction with the sign that keeps it closed (errata 21): with the lower layer open
-    -R2 = cos(2 beta0 + theta) theta'' - sin(2 beta0 + theta) theta'^2 + (H - zeta'') sin beta0 - (V - nu'') cos beta0 >= 0, with the
-    upper one open R1 = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2
+    -R2 = cos(2 beta0 + theta) theta'' - sin(2 beta0 + theta) theta'^2 + (H - zeta'') sin beta0 - (V - nu'') cos beta0
+    >= 0, with the upper one open R1 = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2
     - [(1+h) H - (1+m) zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one of `eomnl`.
     """
 

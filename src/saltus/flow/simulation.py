@@ -13,7 +13,7 @@ import numpy as np
 
 from saltus.errors import MotionError, ParameterError, near
 from saltus.flow import kernel as k
-from saltus.flow.compile import compiled
+from saltus.flow.compile import load_kernel, load_structure
 from saltus.flow.motion import Crossings, DenseOutput, Event, EventKind, Motion, Stop
 from saltus.flow.trace import record_table, trace
 from saltus.systems import System
@@ -35,10 +35,9 @@ EVENT_KINDS = (
 class Program:
     """A system ready to run: its compiled kernel and its numbers."""
 
-    kernel: ModuleType
-    parameters: np.ndarray
-    breaks: np.ndarray
-    table: np.ndarray
+    structure: ModuleType
+    env: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # parameters, constants, record breakpoints, record table
+    model: tuple[Any, ...]  # the structure's functions and the geometry of its contact
     limits: tuple[str, ...]
 
 
@@ -46,8 +45,13 @@ class Program:
 def program(system: System, limits: tuple[str, ...] = ()) -> Program:
     """Trace and compile a system; a structure seen before is loaded, and numbers never compile anything."""
     traced = trace(system, limits)
-    breaks, table = record_table(traced.records)
-    return Program(compiled(traced), np.array(traced.values, dtype=float), breaks, table, tuple(traced.margins))
+    structure = load_structure(traced)
+    constants, geometry = np.zeros(structure.CONSTANT_COUNT), np.zeros(3)
+    env = (np.array(traced.values, dtype=float), constants, *record_table(traced.records))
+    structure.constants(env[0], constants)
+    structure.geometry(env, geometry)
+    functions = (structure.series, structure.contact_series, structure.reset, structure.contact_damping)
+    return Program(structure, env, (*functions, geometry), tuple(traced.margins))
 
 
 def simulate(
@@ -121,7 +125,7 @@ def _prepare(
     tol: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The kernel's state at the start: counters, numbers and settings (see `kernel.py`)."""
-    where, state = np.zeros(12, dtype=np.int64), np.concatenate([[0.0, 0.0], position, speeds])
+    where, state = np.zeros(16, dtype=np.int64), np.concatenate([[0.0, 0.0], position, speeds])
     length = system.load.period
     if (periods is None) == (duration is None):
         raise ParameterError("say how long: either periods=... or duration=...")
@@ -131,8 +135,8 @@ def _prepare(
     if length is None:
         if periods is not None:
             raise ParameterError("the load has no frequency, so there are no forcing periods; give duration=... instead")
-        state[k.TIME], end, last, first = time, time + span, 0, 0
-        length = 0.0
+        # No periods to count: one leg, number 0, from `time` to the end.
+        state[k.TIME], end, last, first, length = time, time + span, 0, 0.0, 0.0
     else:
         first, local = divmod(time, length)
         if periods is None:
@@ -140,9 +144,10 @@ def _prepare(
         else:
             whole, end = math.floor(periods), local + (periods - math.floor(periods)) * length
         state[k.TIME], last = local, int(first + whole)
-    # A load without a frequency has no periods to count: its one leg is number 0, and `LAST` = 0 says so to the kernel.
     where[k.PERIOD], where[k.LAST], where[k.ORDER] = int(first), last, taylor_order(tol)
-    where[k.PIECE] = np.searchsorted(run.breaks, time, side="right")
+    where[k.PIECE] = np.searchsorted(run.env[2], time, side="right")
+    structure = run.structure
+    where[[k.DOF, k.STOPS, k.ROWS, k.SIDES]] = structure.DOF, structure.STOPS, structure.ROWS, structure.SIDES
     _choose_side(system, where, position, speeds)
     return where, state, np.array([length, end, tol])
 
@@ -183,9 +188,9 @@ def _advance(
     events = (np.empty((BUFFER, 4), dtype=np.int64), np.empty((BUFFER, 3)))
     kept_steps: list[list[np.ndarray]] = []
     kept_events: list[list[np.ndarray]] = []
-    total = 0
+    total, advance = 0, load_kernel().advance
     while True:
-        status = run.kernel.advance(where, state, settings, run.parameters, run.breaks, run.table, steps, events)
+        status = advance(where, state, settings, run.env, run.model, steps, events)
         kept_steps.append([a[: where[k.STEPS]].copy() for a in steps])
         kept_events.append([a[: where[k.EVENTS]].copy() for a in events])
         total += int(where[k.EVENTS])
