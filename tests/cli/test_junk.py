@@ -13,8 +13,9 @@ from saltus.errors import ParameterError
 
 NAMES = (
     "type beta0 damping stiffness_ratio smoothing alpha wall frequency horizontal vertical amplitude order phase mean file time "
-    "value quantity scale e r theta x velocity periods duration tol side stop_at samples Metainterface RockingBlock WallOscillator "
-    "TwoLayer VelocityReduction EnergyRestitution InelasticImpact force acceleration line_limit __class__ self saltus:x os:path a.py:B"
+    "value quantity scale e r theta x velocity periods duration tol side stop_at samples Metainterface RockingBlock "
+    "WallOscillator TwoLayer VelocityReduction EnergyRestitution InelasticImpact force acceleration line_limit "
+    "__class__ self saltus:x os:path a.py:B"
 )
 WORDS = st.sampled_from(NAMES.split(" "))
 NUMBERS = st.sampled_from([0, 1, -1, 0.5, 1e-8, 20, 1e308, -0.0, math.nan, math.inf, 10**30, True, 2**63 - 1])

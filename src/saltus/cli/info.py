@@ -9,6 +9,8 @@ from rich.table import Table
 
 from saltus.cli.facts import Block, describe
 
+LEAST_START = 1e-6  # rad; below it a free vibration is too small to speak of
+
 
 def print_info(path: Path) -> None:
     """Print what is known of the system in the study at `path`."""
@@ -18,7 +20,8 @@ def print_info(path: Path) -> None:
     console = Console(highlight=False)
     console.print(f"[bold]{type(study.system.model).__name__}[/] ", end="")
     console.print(f"from {path}", markup=False, soft_wrap=True)
-    start = study.simulate.state.get("theta") if study.simulate else None
+    theta = study.simulate.state.get("theta", 0.0) if study.simulate else 0.0
+    start = theta if abs(theta) >= LEAST_START else None
     for block in describe(study.system, start):
         console.print()
         console.print(block.title, style="bold", markup=False)

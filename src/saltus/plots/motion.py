@@ -70,10 +70,18 @@ def arcs(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray, np
     # Samples at the very instant of an impact show the state after it, and so follow it.
     times = np.concatenate([at, at, at, time])
     order = np.argsort(times, kind="stable")
-    there = np.interp(at, time, position)
+    there = np.full(at.size, _contact(at, before, (time, position, velocity)))
     positions = np.concatenate([there, there, there, position])
     velocities = np.concatenate([before, np.full(at.size, np.nan), after, velocity])
     return times[order], positions[order], velocities[order]
+
+
+def _contact(at: np.ndarray, before: np.ndarray, samples: tuple[np.ndarray, np.ndarray, np.ndarray]) -> float:
+    """Where all impacts happen, from the last samples before them and the velocities there."""
+    time, position, velocity = samples
+    last = np.clip(np.searchsorted(time, at, side="left") - 1, 0, None)
+    guesses = position[last] + (velocity[last] + before) / 2 * (at - time[last])
+    return float(np.median(guesses)) if at.size else 0.0  # some have further impacts in between
 
 
 def _portrait(ax: Any, arc: tuple[np.ndarray, np.ndarray, np.ndarray], period: float | None, line: dict[str, Any]) -> None:

@@ -1,0 +1,5 @@
+"""`python -m saltus` is the command `saltus`."""
+
+from saltus.cli import main
+
+main()

@@ -1,0 +1,59 @@
+"""Running the command line in this process, and in one of its own."""
+
+import signal
+import subprocess
+
+import pytest
+from typer.testing import CliRunner
+
+
+def _heed_interrupts():
+    """A process started from a background job ignores SIGINT unless told otherwise."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@pytest.fixture
+def started():
+    """Start processes; whatever is left of them is killed at the end."""
+    processes = []
+
+    def start(command, **options):
+        processes.append(subprocess.Popen(command, text=True, preexec_fn=_heed_interrupts, **options))
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def saltus():
+    """Run `saltus` with arguments, in this process; a traceback fails the test."""
+    from saltus.cli.app import app
+
+    def run(*arguments):
+        result = CliRunner().invoke(app, [str(a) for a in arguments], prog_name="saltus", env={"COLUMNS": "160", "NO_COLOR": "1"})
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        return result
+
+    return run
+
+
+@pytest.fixture
+def refused(saltus):
+    """Run `saltus` and return the one sentence with which it refuses, with exit status 2."""
+
+    def run(*arguments):
+        result = saltus(*arguments)
+        assert result.exit_code == 2
+        assert result.stdout == ""
+        # What goes on is told on stderr as well, before the sentence.
+        *told, sentence = result.stderr.splitlines()
+        assert all(line.startswith("computing ") for line in told if line)
+        assert sentence.startswith("saltus: ")
+        return sentence
+
+    return run

@@ -1,0 +1,50 @@
+"""Help that teaches, and is immediate."""
+
+import subprocess
+import sys
+
+import pytest
+
+import saltus as package
+
+HEAVY = ("numpy", "scipy", "numba", "xarray", "matplotlib", "pydantic")
+
+
+@pytest.mark.parametrize("command", ["simulate", "info", "reproduce"])
+def test_every_command_shows_an_example(saltus, command):
+    result = saltus(command, "--help")
+    assert result.exit_code == 0
+    assert f"Example: saltus {command}" in result.stdout
+
+
+def test_the_first_page_names_the_commands_and_shows_a_study(saltus, tmp_path):
+    result = saltus("--help")
+    for command in ("saltus reproduce", "saltus simulate study.toml", "saltus info study.toml"):
+        assert command in result.stdout
+    shown = result.stdout[result.stdout.index("[model]") :]
+    (tmp_path / "study.toml").write_text("\n".join(line.strip() for line in shown.splitlines()))
+    from saltus.config import load_study
+
+    assert load_study(tmp_path / "study.toml").settings().periods == 20  # what help shows is a study
+
+
+def test_the_version(saltus):
+    assert saltus("--version").stdout == f"saltus {package.__version__}\n"
+
+
+def test_help_imports_nothing_heavy():
+    script = (
+        "import sys; sys.argv = ['saltus', '--help']\nfrom saltus.cli import main\n"
+        f"try:\n    main()\nexcept SystemExit:\n    print('heavy:', *(set({HEAVY!r}) & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.splitlines()[-1] == "heavy:"
+
+
+@pytest.mark.parametrize(
+    "arguments", [["simulte"], ["simulate"], ["simulate", "a.toml", "--outputs", "b"], ["reproduce", "--nope"]]
+)
+def test_wrong_use_ends_with_status_2(saltus, arguments):
+    result = saltus(*arguments)
+    assert result.exit_code == 2
+    assert "Usage: saltus" in result.stderr
