@@ -1,5 +1,6 @@
-"""References for the closed forms: the linearised equation, and an independent integrator: SciPy's DOP853 on one side at a time, restarted at each impact."""
+"""References for the closed forms: SciPy's DOP853 restarted at each impact, and the linearised equation."""
 
+import math
 from dataclasses import dataclass, field
 
 from scipy.integrate import solve_ivp

@@ -14,20 +14,21 @@ from saltus.systems.checks import check_number
 def rocking_period(theta0: Any, *, alpha: float) -> Any:
     """Exact period of free rocking from theta0, at rest, without losses, in units of 1/p, any shape:
 
-        p T0 = 4 F(chi | cos^2((alpha - theta0) / 2)),
-        tan(chi) = sqrt(sin(alpha - theta0/2) sin(theta0/2)) / (cos(alpha/2) sin((alpha - theta0)/2))
+        p T0 = 4 u R_F(c^2 s^2, s^2 (c^2 + u^2), u^2 + c^2 s^2),
+        u^2 = sin(alpha - theta0/2) sin(theta0/2),   c = cos(alpha/2),   s = sin((alpha - theta0)/2)
 
-    with F the incomplete elliptic integral of the first kind: alpha - theta is an inverted pendulum (`EOM&Rock`).
+    with R_F Carlson's symmetric elliptic integral: alpha - theta is an inverted pendulum (`EOM&Rock`). It is Legendre's
+    F(chi | cos^2((alpha - theta0)/2)) with tan(chi) = u / (c s), in a form that keeps its digits as theta0 nears alpha.
 
     Raises:
         ParameterError: abs(theta0) >= alpha, from where the block overturns.
     """
-    from scipy.special import ellipkinc
+    from scipy.special import elliprf
 
     size = _amplitude(theta0, alpha)
-    rise = np.sqrt(np.sin(alpha - size / 2) * np.sin(size / 2))
-    chi = np.arctan2(rise, math.cos(alpha / 2) * np.sin((alpha - size) / 2))
-    return 4 * ellipkinc(chi, np.cos((alpha - size) / 2) ** 2)
+    u2, c2 = np.sin(alpha - size / 2) * np.sin(size / 2), math.cos(alpha / 2) ** 2
+    s2 = np.sin((alpha - size) / 2) ** 2
+    return 4 * np.sqrt(u2) * elliprf(c2 * s2, s2 * (c2 + u2), u2 + c2 * s2)
 
 
 def short_rocking_period(theta0: Any, *, alpha: float) -> Any:
