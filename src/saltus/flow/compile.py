@@ -12,8 +12,15 @@ import inspect
 import os
 import sys
 import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numba import types
 
 from saltus.flow import jit, kernel, records, roots
 from saltus.flow.emit import Emitter
@@ -46,14 +53,57 @@ def cache_directory() -> Path:
     return fallback
 
 
-def load_kernel() -> ModuleType:
-    """The kernel that advances every model: `advance` of `kernel.py`."""
-    return _load("kernel", "".join(_body(module) for module in (roots, kernel)))
+class Pointer(types.WrapperAddressProtocol):  # type: ignore[misc]
+    """A compiled function as an argument for another one; its address is looked up once, not at every call."""
+
+    def __init__(self, function: Any) -> None:
+        (self._signature,) = function.nopython_signatures
+        result = function.get_compile_result(self._signature)
+        self._address = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
+
+    def __wrapper_address__(self) -> int:
+        return int(self._address)
+
+    def signature(self) -> Any:
+        """The function's numba signature."""
+        return self._signature
 
 
-def load_structure(trace: Trace) -> ModuleType:
+@dataclass(frozen=True)
+class Structure:
+    """The compiled functions of a traced structure, and its sizes."""
+
+    module: ModuleType
+    functions: tuple[Pointer, ...]  # series, contact_series, reset, contact_damping: what the kernel calls
+
+    def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """The arguments `env` and `model` of the kernel for given numbers (see `kernel.py`)."""
+        constants, geometry = np.zeros(self.module.CONSTANT_COUNT), np.zeros(3)
+        self.module.constants(parameters, constants)
+        env = (parameters, constants, *records)
+        self.module.geometry(env, geometry)
+        return env, (*self.functions, geometry)
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int]:
+        """Coordinates, margins, rows of the workspace, sides of the contact."""
+        return self.module.DOF, self.module.STOPS, self.module.ROWS, self.module.SIDES
+
+
+@cache
+def load_kernel() -> Callable[..., int]:
+    """The kernel that advances every model, `advance` of `kernel.py`, called without numba's dispatch on argument types."""
+    advance = _load("kernel", "".join(_body(module) for module in (roots, kernel))).advance
+    (result,) = advance.overloads.values()
+    entry: Callable[..., int] = result.entry_point
+    return entry
+
+
+def load_structure(trace: Trace) -> Structure:
     """The functions of a trace's structure, as `emit.py` generates them."""
-    return _load("structure", _body(records) + Emitter(trace).source())
+    module = _load("structure", _body(records) + Emitter(trace).source())
+    names = ("series", "contact_series", "reset", "contact_damping")
+    return Structure(module, tuple(Pointer(getattr(module, name)) for name in names))
 
 
 def _body(module: ModuleType) -> str:

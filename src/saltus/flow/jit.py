@@ -15,7 +15,7 @@ from numba.core.errors import NumbaExperimentalFeatureWarning
 # Calls through pointers are called experimental by numba; the test suite runs every kernel through them.
 warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
 
-OPTIONS = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
+OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
 jit: Callable[[Any], Any] = njit(**OPTIONS)
 
 

@@ -6,10 +6,10 @@ Together with `roots.py` it is compiled once, for every model: the functions tha
 A motion is in one of four modes. ARC: a smooth motion on one side. CONTACT: at the contact, to be decided. REST: held at the
 contact until an acceleration points outward. CHATTER: impacts without loss, too small and too many to follow one by one.
 
-`env` = (parameters, constants, record breakpoints, record table); `model` = (the four functions, the coordinate at contact and
-the gap's rate of change with the coordinate there on sides +1 and -1); `work` = (q, v, a, g, m, w, poly, b), the Taylor coefficients of
-coordinates, velocities, accelerations, gap and margins, the workspace of their recurrences, a scaled polynomial, and the
-contact accelerations of both sides.
+`env` = (parameters, constants, record breakpoints, record table). `model` = (the four functions; the coordinate at contact
+and the gap's rate of change with the coordinate there on sides +1 and -1). `work` = (q, v, a, g, m, w, poly, b): the Taylor coefficients
+of coordinates, velocities, accelerations, gap and margins, the workspace of their recurrences, a scaled polynomial, and
+the contact accelerations of both sides.
 """
 
 from __future__ import annotations

@@ -5,19 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from saltus.errors import MotionError, ParameterError, near
 from saltus.flow import kernel as k
-from saltus.flow.compile import load_kernel, load_structure
+from saltus.flow.compile import Structure, load_kernel, load_structure
 from saltus.flow.motion import Crossings, DenseOutput, Event, EventKind, Motion, Stop
-from saltus.flow.trace import record_table, trace
+from saltus.flow.trace import Trace, record_table, trace
 from saltus.systems import System
 from saltus.systems.checks import check_number
+from saltus.systems.parameters import children, is_number, numbers
 
 BUFFER = 4096  # steps, and events, that one call of the kernel may record
 MOST_EVENTS = 20_000_000  # beyond this an accumulation of impacts is not being resolved but endured
@@ -35,23 +34,32 @@ EVENT_KINDS = (
 class Program:
     """A system ready to run: its compiled kernel and its numbers."""
 
-    structure: ModuleType
-    env: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # parameters, constants, record breakpoints, record table
+    structure: Structure
+    env: tuple[Any, ...]  # parameters, constants, record breakpoints, record table
     model: tuple[Any, ...]  # the structure's functions and the geometry of its contact
     limits: tuple[str, ...]
 
 
-@lru_cache(maxsize=64)
 def program(system: System, limits: tuple[str, ...] = ()) -> Program:
-    """Trace and compile a system; a structure seen before is loaded, and numbers never compile anything."""
-    traced = trace(system, limits)
-    structure = load_structure(traced)
-    constants, geometry = np.zeros(structure.CONSTANT_COUNT), np.zeros(3)
-    env = (np.array(traced.values, dtype=float), constants, *record_table(traced.records))
-    structure.constants(env[0], constants)
-    structure.geometry(env, geometry)
-    functions = (structure.series, structure.contact_series, structure.reset, structure.contact_damping)
-    return Program(structure, env, (*functions, geometry), tuple(traced.margins))
+    """A system ready to run. Its structure is traced and compiled, or found; its numbers are only read."""
+    key = (structure_key(system), limits)
+    if key not in _structures:
+        traced = trace(system, limits)
+        _structures[key] = traced, load_structure(traced)
+    traced, structure = _structures[key]
+    parameters = np.array([value for _, value in numbers(system)])
+    return Program(structure, *structure.prepare(parameters, record_table(system, traced.records)), tuple(traced.margins))
+
+
+_structures: dict[Any, tuple[Trace, Structure]] = {}
+
+
+def structure_key(node: Any) -> Any:
+    """What a system's structure depends on: the types of its parts and whatever in them is not a number."""
+    parts = children(node)
+    if not parts:
+        return type(node) if is_number(node) or isinstance(node, np.ndarray) else node
+    return type(node), tuple((name, structure_key(part)) for name, part in parts.items())
 
 
 def simulate(
@@ -146,8 +154,7 @@ def _prepare(
         state[k.TIME], last = local, int(first + whole)
     where[k.PERIOD], where[k.LAST], where[k.ORDER] = int(first), last, taylor_order(tol)
     where[k.PIECE] = np.searchsorted(run.env[2], time, side="right")
-    structure = run.structure
-    where[[k.DOF, k.STOPS, k.ROWS, k.SIDES]] = structure.DOF, structure.STOPS, structure.ROWS, structure.SIDES
+    where[[k.DOF, k.STOPS, k.ROWS, k.SIDES]] = run.structure.sizes
     _choose_side(system, where, position, speeds)
     return where, state, np.array([length, end, tol])
 
@@ -188,7 +195,7 @@ def _advance(
     events = (np.empty((BUFFER, 4), dtype=np.int64), np.empty((BUFFER, 3)))
     kept_steps: list[list[np.ndarray]] = []
     kept_events: list[list[np.ndarray]] = []
-    total, advance = 0, load_kernel().advance
+    total, advance = 0, load_kernel()
     while True:
         status = advance(where, state, settings, run.env, run.model, steps, events)
         kept_steps.append([a[: where[k.STEPS]].copy() for a in steps])

@@ -31,8 +31,7 @@ class LoadTime:
 
     def record(self, record: Record, order: int) -> Expr:
         """The `order`-th derivative of a record at t, times its scale."""
-        data = record.symbolic_source  # type: ignore[attr-defined]
-        row = (data, order)
+        row = (record.path, order)  # type: ignore[attr-defined]
         if row not in self._trace.records:
             self._trace.records.append(row)
         return combine("mul", record.scale, Expr("record", (), self._trace.records.index(row)))
@@ -56,8 +55,7 @@ class Trace:
     """
 
     parameters: list[str] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-    records: list[tuple[Record, int]] = field(default_factory=list)
+    records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative
     acceleration: list[Expr] = field(default_factory=list)
     gap: Expr | None = None
     gap_rate: Expr | None = None
@@ -71,8 +69,7 @@ class Trace:
     def symbol(self, path: str, value: float) -> Expr:
         """The symbol of the number at a dotted path."""
         self.parameters.append(path)
-        self.values.append(value)
-        return Expr("parameter", (), len(self.values) - 1)
+        return Expr("parameter", (), len(self.parameters) - 1)
 
 
 def trace(system: System, stop_at: tuple[str, ...] = ()) -> Trace:
@@ -84,7 +81,7 @@ def trace(system: System, stop_at: tuple[str, ...] = ()) -> Trace:
     """
     result = Trace()
     twin = substitute_numbers(system, result.symbol)
-    _attach_records(system, twin)
+    _name_records(twin.load)
     model, load, t = twin.model, twin.load, LoadTime(result)
     dof = len(model.coordinates)
     coordinates = tuple(Expr("coordinate", (), i) for i in range(dof))
@@ -102,14 +99,14 @@ def trace(system: System, stop_at: tuple[str, ...] = ()) -> Trace:
     return result
 
 
-def _attach_records(system: Any, twin: Any) -> None:
-    """Tell every symbolic record which samples it stands for (its arrays are not numbers, so they were kept)."""
-    for name, signal in system.load.channels.items():
-        symbolic = twin.load.channels[name]
-        pairs = zip(getattr(signal, "terms", (signal,)), getattr(symbolic, "terms", (symbolic,)), strict=True)
-        for original, copy in pairs:
-            if isinstance(original, Record):
-                object.__setattr__(copy, "symbolic_source", original)
+def _name_records(load: Any) -> None:
+    """Tell every record of a symbolic load its path: its samples are looked up when the numbers are known."""
+    for name, signal in load.channels.items():
+        if isinstance(signal, Record):
+            object.__setattr__(signal, "path", f"load.{name}")
+        for i, term in enumerate(getattr(signal, "terms", ())):
+            if isinstance(term, Record):
+                object.__setattr__(term, "path", f"load.{name}.{i}")
 
 
 def _trace_contact(result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v: tuple[Expr, ...], side: Expr) -> None:
@@ -158,15 +155,16 @@ def _check(result: Trace, model: str) -> None:
                 raise TraceError(f"{model}.gap may depend on the coordinate, the side and the parameters only")
 
 
-def record_table(records: list[tuple[Record, int]]) -> tuple[np.ndarray, np.ndarray]:
-    """The records of a trace on their common breakpoints.
+def record_table(system: System, rows: list[tuple[str, int]]) -> tuple[np.ndarray, np.ndarray]:
+    """The records that a trace reads, given by path and order of the derivative, on their common breakpoints.
 
     Returns:
         breakpoints (m,) and coefficients (rows, m + 1, RECORD_WIDTH): piece i of a row holds between the breakpoints i - 1 and
         i, in ascending powers of the time since breakpoint i - 1 (the first piece: since breakpoint 0). Scales are left out.
     """
-    if not records:
+    if not rows:
         return np.empty(0), np.empty((0, 1, RECORD_WIDTH))
+    records = [(system.get(path), order) for path, order in rows]
     breaks = np.unique(np.concatenate([record.time for record, _ in records]))
     table = np.zeros((len(records), breaks.size + 1, RECORD_WIDTH))
     for row, (record, order) in zip(table, records, strict=True):
