@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 
 import tomli_w
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from saltus.config import load_study
@@ -62,3 +62,14 @@ def test_damaged_studies(tables, data):
     good = tomli_w.dumps({"model": {"type": "Metainterface", "beta0": 1.4}, **tables}).encode()
     at = data.draw(st.integers(0, len(good)))
     attempt(good[:at] + data.draw(st.binary(max_size=2)) + good[at + data.draw(st.integers(0, 3)) :])
+
+
+@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(STUDIES)
+def test_the_command_line_answers_junk_without_a_traceback(saltus, tables):
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "study.toml"
+        path.write_bytes(tomli_w.dumps(tables).encode())
+        result = saltus("info", path)
+    assert result.exit_code in (0, 2)
+    assert result.exit_code == 0 or len(result.stderr.splitlines()) == 1

@@ -31,7 +31,7 @@ def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
     check_writable(output)
     console, messages = Console(highlight=False), Console(stderr=True, highlight=False)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=messages, transient=True) as progress:
+    with Progress(*columns, console=messages, transient=True, disable=not messages.is_terminal) as progress:
         task = progress.add_task("")
         tell = _teller(messages, progress, task)
         tell(f"computing {path}")

@@ -43,6 +43,8 @@ def _state(motion: Motion) -> list[tuple[str, str]]:
 
 
 def _events(motion: Motion) -> list[tuple[str, str]]:
+    if not motion.system.model.sides:  # nothing to hit
+        return []
     crossings = motion.crossings
     last = (
         f", the last at {crossings.time[-1]:.12g} with speed {abs(crossings.velocity_before[-1]):.6g}" if len(crossings) else ""

@@ -154,3 +154,7 @@ def test_an_interrupt_ends_with_status_130_and_leaves_nothing(started, study, tm
     assert err.strip().splitlines() == ["saltus: interrupted; no file was left half-written"]
     assert out == ""
     assert not (tmp_path / "out").exists()
+
+
+def test_the_example_model_is_also_a_script():
+    subprocess.run([sys.executable, EXAMPLES / "duffing.py"], check=True, timeout=300, capture_output=True)
