@@ -53,7 +53,7 @@ def cache_directory() -> Path:
     return fallback
 
 
-class Pointer(types.WrapperAddressProtocol):  # type: ignore[misc]
+class Pointer(types.WrapperAddressProtocol):
     """A compiled function as an argument for another one; its address is looked up once, not at every call."""
 
     def __init__(self, function: Any) -> None:

@@ -6,10 +6,10 @@ Together with `roots.py` it is compiled once, for every model: the functions tha
 A motion is in one of four modes. ARC: a smooth motion on one side. CONTACT: at the contact, to be decided. REST: held at the
 contact until an acceleration points outward. CHATTER: impacts without loss, too small and too many to follow one by one.
 
-`env` = (parameters, constants, record breakpoints, record table). `model` = (the four functions; the coordinate at contact
-and the gap's rate of change with the coordinate there on sides +1 and -1). `work` = (q, v, a, g, m, w, poly, b): the Taylor coefficients
-of coordinates, velocities, accelerations, gap and margins, the workspace of their recurrences, a scaled polynomial, and
-the contact accelerations of both sides.
+`env` = (parameters, constants, record breakpoints, record table). `model` = (the four functions; the coordinate at contact and
+the gap's rate of change with the coordinate there, on sides +1 and -1). `work` = (q, v, a, g, m, w, poly, b): the Taylor
+coefficients of coordinates, velocities, accelerations, gap and margins, the workspace of their recurrences, a scaled
+polynomial, and the contact accelerations of both sides.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ TIME, SPEED, STATE = 0, 1, 2  # in `state`: local time, chatter speed, then the 
 LENGTH, END, TOLERANCE = 0, 1, 2  # in `settings`: the forcing period, the local time at the end, the tolerance
 
 SMALLEST = 1e-6  # size below which a step's error is absolute, not relative
-ZERO = 1e-13  # an acceleration at contact below this is zero: it is a difference of loads of order 1
+ZERO = 1e-14  # an acceleration at contact below this is zero: it is a difference of loads of order 1
 SLOW = 1e-2  # a faster impact cannot be the end of an accumulation, and is not tested for it
 CHATTER_SPEED = 1e-5  # the averaged law is then wrong by 5e-5 of the speed; following on takes 1e5 impacts a unit of time
 LOSSLESS = 1e-12  # a loss of speed over two impacts below this is rounding
@@ -98,7 +98,7 @@ def rate_of(model, side):
 
 
 @jit
-def hold(where, state, env, model, q):
+def hold(where, state, model, q):
     """Put the system at rest at contact."""
     state[STATE] = model[4][0]
     state[STATE + where[DOF]] = 0.0
@@ -117,24 +117,28 @@ def leading(coefficients, start, order):
 
 
 @jit
+def contact_accelerations(where, env, model, work, t, origin):
+    """Fill `b` with the Taylor series in time of the gap's second derivative at rest at contact, on side +1 and on side -1."""
+    for i in range(min(where[SIDES], 2)):
+        model[1](t, origin, 1.0 - 2.0 * i, env, where[PIECE], work[7][i], work[5], where[ORDER])
+
+
+@jit
 def leave_or_stay(where, state, env, model, work, origin):
     """Decide where a system at rest at contact goes: on an ARC, or into REST. False if that is not unique.
 
-    On each side the first non-zero Taylor coefficient of the gap decides. If both point outward the motion is not unique,
-    unless the caller has named the side.
+    On each side the first non-zero Taylor coefficient of the contact acceleration decides; `SKIP` names the side, if any, on
+    which it has just been found to be zero. If both sides point outward the motion is not unique, unless the caller has
+    named the side.
     """
-    q, v, a, g, m, w, _, _ = work
-    order, outward = where[ORDER], 0
-    for s in (1, -1):
-        if s == -1 and where[SIDES] < 2:
-            continue
-        hold(where, state, env, model, q)
-        v[0, 0] = 0.0
-        model[0](state[TIME], origin, float(s), env, where[PIECE], q, v, a, g, m, w, order)
-        skip = leading(g, 2, order)
-        if skip < order and g[skip] > 0.0 and (outward == 0 or where[FORCED] != where[SIDE]):
+    b, order, released, outward = work[7], where[ORDER], where[SKIP], 0
+    contact_accelerations(where, env, model, work, state[TIME], origin)
+    for i in range(where[SIDES]):
+        side = 1 - 2 * i
+        skip = leading(b[i], 1 if released == side else 0, order)
+        if skip < order and b[i, skip] > 0.0 and (outward == 0 or where[FORCED] != where[SIDE]):
             outward += 1
-            where[SIDE], where[SKIP] = s, skip
+            where[SIDE], where[SKIP] = side, skip + 2
     if outward == 2 and where[FORCED] != where[SIDE]:
         return False
     where[MODE] = ARC if outward > 0 else REST
@@ -194,7 +198,7 @@ def decide(where, state, settings, env, model, work, steps, events, origin, t_en
         if where[MODE] == ARC and where[HELD] != 0:
             record_event(where, events, RELEASE, where[SIDE], where[SKIP], t, 0.0, 0.0)
         where[HELD] = 1 if where[MODE] == REST else 0
-        hold(where, state, env, model, q)
+        hold(where, state, model, q)
         return PAUSED
     where[MODE], where[SKIP], where[HELD] = ARC, 1, 0
     speed = rate_of(model, float(where[SIDE])) * velocity
@@ -202,12 +206,12 @@ def decide(where, state, settings, env, model, work, steps, events, origin, t_en
         mode, left = accumulation(where, env, model, work, speed, t, origin, settings[TOLERANCE])
         if mode == REST:
             record_event(where, events, RESTING, 0, 0, t + left, 0.0, 0.0)
-            hold(where, state, env, model, q)
+            hold(where, state, model, q)
             state[TIME] = min(t + left, t_end)
             record_step(where, steps, 0, t, state[TIME] - t, q)
         if mode == CHATTER:
             record_event(where, events, CHATTERING, where[SIDE], 0, t, velocity, velocity)
-            hold(where, state, env, model, q)
+            hold(where, state, model, q)
             state[SPEED], where[SKIP] = speed, 0
         where[MODE], where[HELD] = mode, 0 if mode == ARC else 1
     return PAUSED
@@ -238,7 +242,7 @@ def contact_root(g, skip, order, h, poly):
         if g[1] < 0.0:
             return SIMPLE, 0.0, NEVER
         skip = 1
-    while skip < order - 2 and g[skip] == 0.0:
+    while skip < order - 2 and g[skip] <= 0.0:  # leaving from rest: lower coefficients are zero up to rounding
         skip += 1
     scale_gap(g, skip, order, h, poly)
     return first_root(poly, order - skip)
@@ -292,12 +296,12 @@ def arc(where, state, settings, env, model, work, steps, events, origin, target)
 
 @jit
 def chatter_sums(where, env, model, work, h, x, factor, t, origin):
-    """The sums over both sides of g v / abs(a), v / abs(a) and v^3 / abs(a), g the damping, for unit speed, at x of a step."""
+    """The sums over the sides of g v / abs(a), v / abs(a) and v^3 / abs(a), g the damping, for unit speed, at x of a step."""
     b, order = work[7], where[ORDER]
     damping, duration, action = 0.0, 0.0, 0.0
-    for i in range(2):
-        side = float(where[SIDE]) if i == 0 or where[SIDES] < 2 else -float(where[SIDE])
-        ratio = 1.0 if i == 0 else factor
+    for i in range(where[SIDES]):
+        side = 1.0 - 2.0 * i
+        ratio = 1.0 if side == where[SIDE] else factor
         pull = abs(horner(b[i], order, x * h))
         damping += ratio / pull * model[3](t + x * h, origin, side, env, where[PIECE])
         duration += ratio / pull
@@ -308,11 +312,8 @@ def chatter_sums(where, env, model, work, h, x, factor, t, origin):
 @jit
 def chatter_decay(where, state, env, model, work, h, origin):
     """Advance the chatter speed over a step: the action v^3 sum 1/abs(a_s) decays at the rate of the mean damping."""
-    t, order, b = state[TIME], where[ORDER], work[7]
-    side = float(where[SIDE])
-    for i in range(2):
-        s = side if i == 0 or where[SIDES] < 2 else -side
-        model[1](t, origin, s, env, where[PIECE], b[i], work[5], order)
+    t, side = state[TIME], float(where[SIDE])
+    contact_accelerations(where, env, model, work, t, origin)
     next_side, after = model[2](t, origin, -state[SPEED] / rate_of(model, side), side, env, where[PIECE])
     factor = rate_of(model, next_side) * after / state[SPEED]
     decay = 0.0
@@ -327,31 +328,33 @@ def chatter_decay(where, state, env, model, work, h, origin):
 @jit
 def held(where, state, settings, env, model, work, steps, origin, target):
     """One step of REST or CHATTER, up to the first instant at which a contact acceleration points outward."""
-    q, _, _, _, _, w, poly, b = work
+    q, poly, b = work[0], work[6], work[7]
     order, t = where[ORDER], state[TIME]
-    h, first = target - t, NEVER
-    for i in range(2 if where[SIDES] == 2 else 1):
-        model[1](t, origin, 1.0 - 2.0 * i, env, where[PIECE], b[i], w, order)
+    h, first, released = target - t, NEVER, 0
+    contact_accelerations(where, env, model, work, t, origin)
+    for i in range(where[SIDES]):
         h = min(h, step_size(b[i : i + 1], order, max(1.0, abs(b[i, 0])), settings[TOLERANCE]))
-    clipped = h == target - t
-    for i in range(2 if where[SIDES] == 2 else 1):
+    for i in range(where[SIDES]):
         skip = leading(b[i], 0, order)
         if skip < order and b[i, skip] > 0.0:
-            first = 0.0
+            first, released = 0.0, 0
         elif skip < order:
             for k in range(order + 1):
                 b[i, k] = -b[i, k]
             scale_gap(b[i], skip, order, h, poly)
             kind, u, _ = first_root(poly, order - skip)
-            first = min(first, u) if kind == SIMPLE else first
+            if kind == SIMPLE and u < first:
+                first, released = u, 1 - 2 * i
     tau = min(first, 1.0) * h
     if where[MODE] == CHATTER and tau > 0.0:
         chatter_decay(where, state, env, model, work, tau, origin)
-    hold(where, state, env, model, q)
+    hold(where, state, model, q)
     record_step(where, steps, 0, t, tau, q)
-    if first <= 1.0:
-        where[MODE], where[SKIP] = CONTACT, 0
-    state[TIME] = target if clipped and first > 1.0 else t + tau
+    if first > 1.0:
+        state[TIME] = target if h == target - t else t + tau
+    else:
+        where[MODE], where[SKIP] = CONTACT, released
+        state[TIME] = t + tau if t + tau > t or released == 0 else np.nextafter(t, np.inf)  # time must go on
 
 
 @cached_jit(ADVANCE)
