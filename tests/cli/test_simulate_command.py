@@ -158,3 +158,15 @@ def test_an_interrupt_ends_with_status_130_and_leaves_nothing(started, study, tm
 
 def test_the_example_model_is_also_a_script():
     subprocess.run([sys.executable, EXAMPLES / "duffing.py"], check=True, timeout=300, capture_output=True)
+
+
+def test_an_operation_that_cannot_be_traced_is_refused(refused, study, tmp_path):
+    (tmp_path / "own.py").write_text(
+        "from dataclasses import dataclass\nimport numpy as np\nfrom saltus.systems import Model\n\n"
+        "@dataclass(frozen=True)\nclass Own(Model):\n    sides = ()\n"
+        "    def acceleration(self, t, theta, velocity, side, load):\n        return -np.floor(theta)\n"
+    )
+    path = study('[model]\ntype = "own.py:Own"\n[simulate]\nduration = 1\n')
+    sentence = refused("simulate", path, "-o", tmp_path / "out")
+    assert sentence.startswith(f"saltus: {path}: ")
+    assert "floor" in sentence

@@ -13,6 +13,7 @@ from saltus.cli.guard import INTERRUPTED, INTERRUPTION, guarded
 app = typer.Typer(
     rich_markup_mode="rich",
     no_args_is_help=True,
+    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -50,11 +51,11 @@ def saltus(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
     ] = False,
 ) -> None:
-    """Exact non-smooth dynamics of the buckling-based metainterface and of its relatives.
+    """Exact non-smooth dynamics of the buckling-based metainterface and its kin.
 
     First steps:
 
-    [cyan]saltus reproduce[/]             the paper's figures, tables and claims, into results/
+    [cyan]saltus reproduce[/]             the paper's figures, tables and claims
     [cyan]saltus simulate study.toml[/]   the motion of a system of your own
     [cyan]saltus info study.toml[/]       what is known of it in closed form
     """
@@ -70,8 +71,9 @@ def simulate(
 ) -> None:
     """Compute a motion, exactly from impact to impact; write it and draw it.
 
-    Writes motion.nc (netCDF, with units and provenance), motion.png and motion.pdf, and prints a summary: the state at the end,
-    the impacts, why the motion ended, and whether the mechanism could follow it.
+    Writes motion.nc (netCDF, with units and provenance), motion.png and
+    motion.pdf, and prints a summary: the state at the end, the impacts, why
+    the motion ended, and whether the mechanism could follow it.
 
     Example: [cyan]saltus simulate study.toml --output runs/first[/]
     """
@@ -85,8 +87,9 @@ def simulate(
 def info(study: Study) -> None:
     """Print what is known of a system before it moves.
 
-    Its equilibria and their stability, its natural frequencies and periods, the critical loads, the limits of the mechanism, and
-    whether it is symmetric. Needs no \\[simulate] in the study.
+    Its equilibria and their stability, its natural frequencies and periods,
+    the critical loads, the limits of the mechanism, and whether it is
+    symmetric. The study needs no \\[simulate] for it.
 
     Example: [cyan]saltus info study.toml[/]
     """
@@ -100,7 +103,7 @@ def info(study: Study) -> None:
 def reproduce(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAMES]...", help="Parts of the paper, such as fig04 or table1; all if none is named."),
+        typer.Argument(metavar="NAMES", help="Parts of the paper, such as fig04 or table1; all if none is named."),
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="The folder to write to.")] = Path("results"),
     force: Annotated[bool, typer.Option("--force", help="Make again what is up to date.")] = False,
@@ -108,9 +111,12 @@ def reproduce(
 ) -> None:
     """Compute and draw the paper: figures, tables, and every claim beside the value found here.
 
-    What is up to date is skipped. The results are PNG, PDF and netCDF files, and a report to open.
+    Writes PNG, PDF and netCDF files, and a report to open. What is up to date
+    is skipped.
 
-    Example: [cyan]saltus reproduce[/] for everything, [cyan]saltus reproduce fig04 fig07[/] for two figures
+    Example: [cyan]saltus reproduce[/] for everything
+
+    Example: [cyan]saltus reproduce fig04 fig07[/] for two figures
     """
     with guarded():
         from saltus.cli.reproduce import list_parts, reproduce_paper

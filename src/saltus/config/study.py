@@ -11,7 +11,7 @@ from saltus.config.loads import read_load
 from saltus.config.settings import Settings, read_settings
 from saltus.config.source import Source, read_source
 from saltus.config.types import read_part
-from saltus.errors import MotionError, near
+from saltus.errors import MotionError, TraceError, near
 from saltus.systems import Load, System, VelocityReduction
 
 PARTS = ("model", "load", "impact", "simulate")
@@ -45,14 +45,15 @@ class Study:
         Raises:
             ParameterError: the file has no [simulate], or the flow refuses a setting (with the file's name).
             MotionError: the motion cannot be continued (with the file's name).
+            TraceError: the model uses an operation that cannot be traced (with the file's name).
         """
         from saltus.flow import simulate
 
         arguments = {**self.settings().arguments(), **more}
         try:
             return call(self.source, simulate, self.system, **arguments)
-        except MotionError as error:
-            raise MotionError(f"{self.source.path}: {error}") from error
+        except (MotionError, TraceError) as error:
+            raise type(error)(f"{self.source.path}: {error}") from error
 
 
 def load_study(path: Path | str) -> Study:
