@@ -44,7 +44,7 @@ def test_erratum_10_kinetic_energy_has_four_thirds():
 
 def test_erratum_11_sign_of_the_ground_acceleration():
     """Lagrange's equation is `EOM&Rock`; with alpha = pi/2 - beta0 the ground enters as -zeta'' sin(theta + beta0)."""
-    kinetic, potential, (t, mass, radius, alpha, g, theta, zeta) = block_energies()
+    kinetic, potential, (t, _, radius, alpha, g, theta, zeta) = block_energies()
     rate = theta.diff(t)
     equation = sp.diff(sp.diff(kinetic, rate), t) - sp.diff(kinetic - potential, theta)
     acceleration = sp.solve(equation, theta.diff(t, 2))[0]
@@ -53,7 +53,6 @@ def test_erratum_11_sign_of_the_ground_acceleration():
     ground, weight = zeta.diff(t, 2), p2 * sp.cos(theta + b)
     assert sp.simplify(substituted - (-ground * sp.sin(theta + b) - weight)) == 0
     assert sp.simplify(substituted - (ground * sp.sin(theta + b) - weight)) != 0
-    del mass
     # the metainterface without its springs, V = -1: the same moment as the model's with zeta in the same units
     block, cell = RockingBlock(alpha=0.2), Metainterface(beta0=math.pi / 2 - 0.2)
     shaken = Load(frequency=2.0, ground_horizontal=Harmonic(0.3))
