@@ -378,7 +378,7 @@ def advance(where, state, settings, env, model, steps, events):
     for _ in range(BATCH):
         if where[STEPS] >= steps[1].shape[0] - 4 or where[EVENTS] >= events[1].shape[0] - 4:
             return FULL
-        origin = where[PERIOD] * settings[LENGTH] if where[LAST] > 0 else 0.0
+        origin = where[PERIOD] * settings[LENGTH]
         t_end = settings[END] if where[PERIOD] == where[LAST] else settings[LENGTH]
         if state[TIME] >= t_end:
             if where[PERIOD] == where[LAST]:
