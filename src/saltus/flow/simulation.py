@@ -14,7 +14,7 @@ from saltus.flow import kernel as k
 from saltus.flow.compile import Structure, load_kernel, load_structure
 from saltus.flow.motion import Crossings, DenseOutput, Event, EventKind, Motion, Stop
 from saltus.flow.trace import Trace, record_table, trace
-from saltus.systems import System
+from saltus.systems import Record, System
 from saltus.systems.checks import check_number
 from saltus.systems.parameters import children, is_number, numbers
 
@@ -56,10 +56,14 @@ _structures: dict[Any, tuple[Trace, Structure]] = {}
 
 def structure_key(node: Any) -> Any:
     """What a system's structure depends on: the types of its parts and whatever in them is not a number."""
+    if isinstance(node, Record):  # its samples are numbers, and its scale; where they came from does not matter
+        return Record, node.quantity
     parts = children(node)
-    if not parts:
-        return type(node) if is_number(node) or isinstance(node, np.ndarray) else node
-    return type(node), tuple((name, structure_key(part)) for name, part in parts.items())
+    if parts:
+        return type(node), tuple((name, structure_key(part)) for name, part in parts.items())
+    if is_number(node):
+        return float
+    return (node.shape, node.dtype.str, node.tobytes()) if isinstance(node, np.ndarray) else node
 
 
 def simulate(
@@ -93,7 +97,7 @@ def simulate(
         MotionError: the motion is not unique, an impact has no solution, or the numbers overflow; with the instant.
     """
     position, speeds = _start_state(system, velocity, coordinates)
-    limits = tuple(dict.fromkeys((*system.model.stops, *stop_at)))
+    limits = tuple(dict.fromkeys((*system.model.stops, *([stop_at] if isinstance(stop_at, str) else stop_at))))
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     check_number("time", time)
     if side not in (None, 1, -1):
