@@ -122,6 +122,7 @@ def _load(kind: str, text: str) -> ModuleType:
             handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
             with os.fdopen(handle, "w") as file:
                 file.write(text)
+            os.utime(temporary, (0, 0))  # numba trusts what it kept for a file of the same time: equal texts have equal times
             os.replace(temporary, path)
         spec = importlib.util.spec_from_file_location(name, path)
         assert spec is not None
