@@ -113,6 +113,11 @@ class Expr:
 
     __int__ = __index__ = __complex__ = __float__
 
+    def _refuse(self, *_: Any) -> Any:
+        raise TraceError(f"%, //, @ and round cannot be traced; allowed are {ALLOWED}")
+
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __divmod__ = __rdivmod__ = __matmul__ = __rmatmul__ = __round__ = _refuse
+
     def __iter__(self) -> Any:
         raise TraceError("a traced quantity is a scalar: it cannot be unpacked or looped over")
 

@@ -114,8 +114,6 @@ def _trace_contact(result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v
     if len(q) != 1:
         raise TraceError("a model with sides must have one coordinate; give it `sides = ()` and stop at margins instead")
     result.gap = combine("add", model.gap(q[0], side), 0.0)
-    if _uses_abs(result.acceleration[0], side, q[0]) and result.gap is not combine("mul", side, q[0]):
-        raise TraceError("abs of the coordinate can be traced only where the gap is side * coordinate; write it with the gap")
     result.contact = combine("add", model.contact, 0.0)
     at_contact: dict[Expr, Any] = {q[0]: result.contact, v[0]: 0.0}
     result.gap_rate = substitute(differentiate(result.gap, q[0]), at_contact)
@@ -123,10 +121,6 @@ def _trace_contact(result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v
     result.contact_damping = -substitute(differentiate(result.acceleration[0], v[0]), at_contact)
     next_side, after = model.reset(t, v[0], side, load, twin.impact)
     result.next_side, result.velocity_after = combine("add", next_side, 0.0), combine("add", after, 0.0)
-
-
-def _uses_abs(root: Expr, side: Expr, q: Expr) -> bool:
-    return any(node is side * q for node in ordered([root]))
 
 
 def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]) -> None:
@@ -149,10 +143,19 @@ def _check(result: Trace, model: str) -> None:
     for node in ordered(expanded):
         if node.op in POINTWISE:
             raise TraceError(f"{model} uses {node.op} in an acceleration, a gap or a margin; only an impact law may compare")
+    _check_abs(result, expanded)
     if result.gap is not None:
         for node in ordered([result.gap]):
             if node.op in ("time", "record", "velocity"):
                 raise TraceError(f"{model}.gap may depend on the coordinate, the side and the parameters only")
+
+
+def _check_abs(result: Trace, expanded: list[Expr]) -> None:
+    """Refuse abs of a coordinate, traced as side * coordinate, where that is not its meaning."""
+    side, coordinates = Expr("side"), [Expr("coordinate", (), i) for i in range(len(result.acceleration))]
+    sized = {side * q for q in coordinates}
+    if result.gap not in sized | {q * side for q in coordinates} and any(node in sized for node in ordered(expanded)):
+        raise TraceError("abs of the coordinate can be traced only where the gap is side * coordinate; write it with the gap")
 
 
 def record_table(system: System, rows: list[tuple[str, int]]) -> tuple[np.ndarray, np.ndarray]:
