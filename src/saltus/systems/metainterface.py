@@ -105,7 +105,7 @@ class Metainterface(Model):
     def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load) -> dict[str, Any]:
         """The straight line, the kinematic limit and the closed layer's reaction; all positive in the mechanism."""
         opening = math.pi - self.beta0
-        size = abs(theta) if self.smoothing is not None else side * theta
+        size = side * theta if self.smoothing is None else theta * np.tanh(theta * (self.smoothing / 2))
         margins = {"line_limit": opening - size, "kinematic_limit": 2 * opening - size}
         if self.smoothing is None:
             across, along = self._forces(t, (1 - side) / 2, load)
