@@ -96,10 +96,11 @@ def is_monostable(beta0: float, horizontal: Any, vertical: Any) -> Any:
     Broadcasts; arrays of bool.
     """
     _check_angle(beta0)
-    size, vertical = np.broadcast_arrays(np.abs(np.asarray(horizontal, dtype=float)), np.asarray(vertical, dtype=float))
+    size, vertical = np.abs(np.asarray(horizontal, dtype=float)), np.asarray(vertical, dtype=float)
     held = vertical * math.cos(beta0) < -size * math.sin(beta0)
     if beta0 < math.pi / 2:
-        held = held & ((vertical > -math.sin(beta0)) | (size < fold_horizontal(beta0, np.minimum(vertical, -math.sin(beta0)))))
+        subcritical = vertical <= -math.sin(beta0)
+        held = held & (~subcritical | (size < fold_horizontal(beta0, np.minimum(vertical, -math.sin(beta0)))))
     return held[()]
 
 
