@@ -89,14 +89,17 @@ def test_erratum_16_angles_do_not_jump_so_the_printed_conditions_are_refused():
     ]
 
 
-def test_a_velocity_factor_below_the_inelastic_one_needs_a_contact_that_pulls():
-    """Crossing without bouncing, theta_2'(+) = e theta_1'(-): the upper contact pushes (<= 0) only for e >= -cos(2 beta0)."""
-    inelastic = -math.cos(2 * MODEL.beta0)
-    before = LayerState((0.0, 0.0), (-1.0, 0.0))
-    for e, pushes in ((1.0, True), (inelastic + 1e-6, True), (inelastic - 1e-6, False), (0.8, False)):
-        after = LayerState((0.0, 0.0), (0.0, -e))
+@pytest.mark.parametrize(("layer", "mass"), [(1, 1.0), (2, 1.0 + MODEL.mass_ratio)])
+def test_erratum_29_a_velocity_factor_below_the_inelastic_one_needs_a_contact_that_pulls(layer, mass):
+    """The impulse on the closed layer pushes only for e >= -cos(2 beta0), or -cos(2 beta0)/(1+m) from upper to lower."""
+    inelastic = -math.cos(2 * MODEL.beta0) / mass
+    closing = signed(layer, 1.0)
+    before = LayerState((0.0, 0.0), pair(layer, closing, 0.0))
+    for e, pushes in ((1.0, True), (inelastic + 1e-6, True), (inelastic - 1e-6, False), (0.5, False)):
+        after = LayerState((0.0, 0.0), pair(layer, 0.0, e * closing))
         assert name_impact(before, after).scenario is Scenario.NO_BOUNCING
-        assert (other_impulse(MODEL, before, after, 1) <= 0) is pushes
+        push = -other_impulse(MODEL, before, after, 1) if layer == 1 else other_impulse(MODEL, before, after, 2)
+        assert (push >= 0) is pushes
 
 
 @pytest.mark.parametrize(

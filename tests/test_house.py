@@ -1,0 +1,70 @@
+"""The house: what may import what, how light the door is, and that every public name is there."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import saltus
+
+SOURCE = Path(saltus.__file__).parent
+
+# A room may import the rooms in its list, itself, and saltus.errors; `plots` knows datasets only.
+MAY_IMPORT = {
+    "systems": set(),
+    "theory": {"systems"},
+    "flow": {"systems"},
+    "plots": set(),
+    "config": {"systems", "flow"},
+    "paper": {"systems", "theory", "flow", "plots", "files"},
+    "cli": {"systems", "theory", "flow", "plots", "config", "paper", "files"},
+}
+HEAVY = ("scipy", "numba", "xarray", "matplotlib", "pydantic", "h5netcdf", "saltus.flow", "saltus.paper")
+
+
+def imported_rooms(path: Path) -> set[str]:
+    """The rooms of saltus that a file imports, at its top or inside its functions, but not for type checking alone."""
+    tree = ast.parse(path.read_text())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
+            node.body = []
+    names = [n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)]
+    names += [a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names]
+    return {name.split(".")[1] for name in names if name.startswith("saltus.")} - {"errors"}
+
+
+@pytest.mark.parametrize("room", MAY_IMPORT)
+def test_imports_run_one_way(room: str) -> None:
+    for path in (SOURCE / room).rglob("*.py"):
+        foreign = imported_rooms(path) - MAY_IMPORT[room] - {room}
+        assert not foreign, f"{path.relative_to(SOURCE)} imports {foreign}"
+
+
+@pytest.mark.parametrize("name", saltus.__all__)
+def test_every_public_name_is_there(name: str) -> None:
+    assert getattr(saltus, name) is not None
+
+
+def test_a_wrong_public_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no 'simulat'"):
+        _ = saltus.simulat
+
+
+@pytest.mark.parametrize("statement", ["import saltus", "import saltus.cli", "from saltus import Metainterface, System"])
+def test_the_door_is_light(statement: str) -> None:
+    loaded = f"{statement}; import sys; print([m for m in {HEAVY!r} if m in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("script", sorted((SOURCE.parents[1] / "examples").glob("*.py")), ids=lambda p: p.name)
+def test_examples_are_short_and_end_in_an_assertion_that_holds(script: Path) -> None:
+    text = script.read_text()
+    assert text.count("\n") <= 60
+    assert "assert " in text
+    environment = os.environ | {"PYTHONWARNINGS": "error::RuntimeWarning"}
+    result = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment, cwd=script.parent)
+    assert result.returncode == 0, result.stderr
