@@ -65,6 +65,8 @@ def test_erratum_23_the_papers_domain_holds_other_equilibria_too():
         assert (len(states) == 1) == alone
         assert sum(e.stable for e in states) == (1 if alone else 2)
     assert not paper_monostable(BETA, 0.22, -1.2)
+    edge = least_horizontal(BETA, -1.2) * np.array([1 - 1e-8, 1 + 1e-8])
+    np.testing.assert_array_equal(is_monostable(BETA, edge, -1.2), [True, False])
 
 
 @settings(deadline=None, max_examples=200)
