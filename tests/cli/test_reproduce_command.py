@@ -1,0 +1,53 @@
+"""`saltus reproduce`: the names, the options, and what is refused."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def test_the_parts_are_listed(saltus):
+    from saltus.paper import FIGURES
+
+    listed = [line.split()[0] for line in saltus("reproduce", "--list").stdout.splitlines()]
+    assert listed == list(FIGURES)
+    assert {"fig04", "table1"} <= set(listed)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names", "output", "force"),
+    [
+        ([], [], Path("results"), False),
+        (["fig04", "table1", "-o", "there", "--force"], ["fig04", "table1"], Path("there"), True),
+    ],
+)
+def test_the_options_reach_the_paper(saltus, monkeypatch, arguments, names, output, force):
+    calls = []
+    monkeypatch.setattr("saltus.paper.reproduce", lambda *given: calls.append(given))
+    assert saltus("reproduce", *arguments).exit_code == 0
+    assert calls[0][:3] == (names, output, force)
+
+
+def test_an_unknown_part_is_refused(refused, tmp_path):
+    assert "did you mean 'fig04'" in refused("reproduce", "fig4", "-o", tmp_path)
+
+
+def test_an_unwritable_folder_is_refused(refused, tmp_path):
+    (tmp_path / "file").touch()
+    assert "is a file; name another with --output" in refused("reproduce", "fig08", "-o", tmp_path / "file")
+
+
+def test_an_interrupt_leaves_whole_files_only(started, tmp_path):
+    command = [sys.executable, "-m", "saltus", "reproduce", "fig02", "fig04", "-o", tmp_path]
+    process = started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    while not process.stdout.readline().lstrip().startswith("fig02"):
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)  # while fig04, which takes seconds, is being made
+    _, err = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert err == "saltus: interrupted; no file was left half-written\n"
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert any("fig02" in path.name for path in files)
+    assert not [path for path in files if ".part" in path.name]
