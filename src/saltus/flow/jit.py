@@ -5,15 +5,10 @@ The kernel is compiled once and calls the functions of a structure through point
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
 from numba import njit, types
-from numba.core.errors import NumbaExperimentalFeatureWarning
-
-# Calls through pointers are called experimental by numba; the test suite runs every kernel through them.
-warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
 
 OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
 jit: Callable[[Any], Any] = njit(**OPTIONS)
