@@ -12,7 +12,6 @@ import inspect
 import os
 import sys
 import tempfile
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -22,7 +21,6 @@ from typing import Any
 
 import numpy as np
 from numba import types
-from numba.core.errors import NumbaExperimentalFeatureWarning
 
 from saltus.flow import jit, kernel, records, roots
 from saltus.flow.emit import Emitter
@@ -132,9 +130,7 @@ def _load(kind: str, text: str) -> ModuleType:
         module = importlib.util.module_from_spec(spec)
         sys.modules[name] = module  # numba finds the functions of a cached module through here
         try:
-            with warnings.catch_warnings():
-                # Calls through pointers are experimental in numba; the test suite runs every kernel through them.
-                warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
+            with jit.pointers():
                 spec.loader.exec_module(module)
         except BaseException:  # interrupted while compiling: the next call starts afresh
             del sys.modules[name]

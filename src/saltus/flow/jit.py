@@ -5,10 +5,13 @@ The kernel is compiled once and calls the functions of a structure through point
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from numba import njit, types
+from numba.core.errors import NumbaExperimentalFeatureWarning
 
 OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
 jit: Callable[[Any], Any] = njit(**OPTIONS)
@@ -32,7 +35,17 @@ CONTACT_SERIES = types.void(_f, _f, _f, ENV, _i, _f1, _f2, _i)
 RESET = types.UniTuple(_f, 2)(_f, _f, _f, _f, ENV, _i)
 CONTACT_DAMPING = _f(_f, _f, _f, ENV, _i)
 
-_functions = [types.FunctionType(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING)]
+
+@contextmanager
+def pointers() -> Iterator[None]:
+    """Within it numba does not remark that calls through pointers are experimental; the tests run every kernel through them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
+        yield
+
+
+with pointers():
+    _functions = [types.FunctionType(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING)]
 MODEL = types.Tuple((*_functions, _f1))
 STEP_BUFFERS, EVENT_BUFFERS = types.Tuple((_i2, _f2, _f3)), types.Tuple((_i2, _f2))
 ADVANCE = _i(_i1, _f1, _f1, ENV, MODEL, STEP_BUFFERS, EVENT_BUFFERS)
