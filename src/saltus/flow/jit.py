@@ -46,6 +46,6 @@ def pointers() -> Iterator[None]:
 
 with pointers():
     _functions = [types.FunctionType(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING)]
-MODEL = types.Tuple((*_functions, _f1))
+    MODEL = types.Tuple((*_functions, _f1))
 STEP_BUFFERS, EVENT_BUFFERS = types.Tuple((_i2, _f2, _f3)), types.Tuple((_i2, _f2))
 ADVANCE = _i(_i1, _f1, _f1, ENV, MODEL, STEP_BUFFERS, EVENT_BUFFERS)
