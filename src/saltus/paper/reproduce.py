@@ -1,0 +1,100 @@
+"""From names to files: compute, draw and judge what is not up to date, then write the report."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from saltus.errors import ParameterError, near
+from saltus.files import check_writable, write_atomically, write_dataset, write_text
+from saltus.paper import report, state
+from saltus.paper.claim import Claim, tally
+from saltus.paper.figure import PaperFigure
+from saltus.plots.style import style
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What became of one name: its files, its claims, and whether it was made anew."""
+
+    name: str
+    made: bool  # False: it was up to date
+    seconds: float
+    files: tuple[Path, ...]
+    claims: tuple[Claim, ...]
+
+
+def reproduce(
+    names: Sequence[str] = (), output: Path | str = Path("results"), force: bool = False, console: Console | None = None
+) -> list[Result]:
+    """Compute and draw the named parts of the paper (all where none is named) into `output`, and write the report.
+
+    What is up to date is left alone unless `force`. An interrupt leaves whole files only, and the next run goes on from there.
+
+    Raises:
+        ParameterError: an unknown name, with the near ones; an output folder that cannot be written to.
+    """
+    from saltus.paper import FIGURES
+
+    for name in names:
+        if name not in FIGURES:
+            raise ParameterError(f"no part of the paper is called {name!r}; {near(name, FIGURES)}")
+    output = Path(output)
+    check_writable(output)
+    chosen = [figure for name, figure in FIGURES.items() if not names or name in names]
+    results = _make_all(chosen, output, force, console)
+    claims = report.write(FIGURES.values(), output)
+    if console is not None:
+        console.print(tally(claims))
+        console.print(f"Results are in {output}: open {output / 'index.html'}", soft_wrap=True, highlight=False)
+    return results
+
+
+def _make_all(figures: list[PaperFigure], output: Path, force: bool, console: Console | None) -> list[Result]:
+    if console is None:
+        return [_make(figure, output, force) for figure in figures]
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(bar_width=24), MofNCompleteColumn(), TimeElapsedColumn())
+    results = []
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("", total=len(figures))
+        for figure in figures:
+            progress.update(task, description=f"{figure.name}: {figure.title}")
+            result = _make(figure, output, force)
+            done = f"made in {result.seconds:.1f} s" if result.made else "up to date"
+            progress.console.print(f"  {figure.name:<9} {done:<15} {figure.title}", highlight=False, soft_wrap=True)
+            progress.advance(task)
+            results.append(result)
+    return results
+
+
+def _make(figure: PaperFigure, output: Path, force: bool) -> Result:
+    start = time.perf_counter()
+    stale = force or not state.up_to_date(figure, output)
+    if stale:
+        data = figure.compute(**figure.parameters)
+        _write(figure, data, output)
+        state.write(figure, output)
+    claims = tuple(report.read_claims(figure, output))
+    files = tuple(output / name for name in figure.files())
+    return Result(name=figure.name, made=stale, seconds=time.perf_counter() - start, files=files, claims=claims)
+
+
+def _write(figure: PaperFigure, data: Any, output: Path) -> None:
+    write_dataset(output / f"{figure.name}.nc", data)
+    if figure.table is not None:
+        write_text(output / f"{figure.name}.md", figure.table(data))
+    if figure.draw is not None:
+        picture = figure.draw(data)
+        with style():
+            for kind, metadata in (("png", None), ("pdf", {"CreationDate": None, "Title": figure.title})):
+                save = partial(picture.savefig, format=kind, metadata=metadata)
+                write_atomically(output / f"{figure.name}.{kind}", save)

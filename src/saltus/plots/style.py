@@ -1,0 +1,105 @@
+"""The look of every picture: the paper's conventions, colours that survive greyscale and colour-blindness, journal widths.
+
+Stable is a solid blue line, unstable a dashed red one, a separatrix dashed grey, a limit of the mechanism dash-dotted green; no
+two of them share both a line style and a lightness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import wraps
+from typing import Any, ParamSpec
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+P = ParamSpec("P")
+
+STABLE = "#0b4fa0"
+UNSTABLE = "#d1342f"
+SEPARATRIX = "#7a7a7a"
+LIMIT = "#009060"
+FAINT = "#bdbdbd"  # grids, axes of symmetry, the discontinuity plane
+INK = "#1a1a1a"
+
+STABLE_LINE: dict[str, Any] = {"color": STABLE, "linestyle": "-", "linewidth": 1.0}
+UNSTABLE_LINE: dict[str, Any] = {"color": UNSTABLE, "linestyle": (0, (4, 2)), "linewidth": 1.0}
+SEPARATRIX_LINE: dict[str, Any] = {"color": SEPARATRIX, "linestyle": (0, (5, 2)), "linewidth": 1.1}
+LIMIT_LINE: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (6, 2, 1, 2)), "linewidth": 1.0}
+
+SINGLE_COLUMN = 90.0  # mm
+DOUBLE_COLUMN = 190.0  # mm
+RESOLUTION = 300  # dots per inch of the PNG
+
+RC: Any = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.titlesize": 9.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "legend.handlelength": 2.4,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.minor.width": 0.4,
+    "ytick.minor.width": 0.4,
+    "xtick.major.size": 3.0,
+    "ytick.major.size": 3.0,
+    "lines.linewidth": 1.0,
+    "lines.solid_capstyle": "round",
+    "pdf.fonttype": 42,  # fonts embedded whole, so that a publisher can edit the text
+    "savefig.dpi": RESOLUTION,
+    "figure.dpi": 100,
+    "axes.formatter.use_mathtext": True,
+    "axes.unicode_minus": True,
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """The conventions, for the time of a `with` block: drawing and saving both belong inside."""
+    with mpl.rc_context(RC):
+        yield
+
+
+def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
+    """Let a function draw its Figure in the conventions."""
+
+    @wraps(draw)
+    def inside(*args: P.args, **kwargs: P.kwargs) -> Figure:
+        with style():
+            return draw(*args, **kwargs)
+
+    return inside
+
+
+def new_figure(width: float = SINGLE_COLUMN, height: float = 65.0, **options: Any) -> Figure:
+    """An empty Figure of the given size in millimetres, laid out so that nothing is clipped."""
+    options.setdefault("layout", "constrained")
+    return Figure(figsize=(width / 25.4, height / 25.4), **options)
+
+
+def shades(n: int, first: float = 0.0, last: float = 0.78) -> list[Any]:
+    """`n` colours of an ordered family, from dark to light: their order is also that of their greys."""
+    return list(mpl.colormaps["viridis"](np.linspace(first, last, n))) if n > 1 else [mpl.colormaps["viridis"](first)]
+
+
+DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (1, 1.2)))
+
+
+def panel_label(ax: Any, label: str) -> None:
+    """Name a panel `(label)` above its upper left corner."""
+    ax.set_title(f"$({label})$", loc="left", pad=4)
