@@ -86,9 +86,10 @@ def leading_sign(b, n):
 def newton(p, n, low, high):
     """The root of p in [low, high], p(low) > 0 >= p(high): Newton's steps, bisection where one leaves the bracket."""
     at_low, at_high = horner(p, n, low), horner(p, n, high)
-    u = 0.5 * (low + high)
-    if at_low > 0.0 > at_high:
-        u = low + (high - low) * (at_low / (at_low - at_high))
+    share = at_low / (at_low - at_high) if at_low > 0.0 > at_high else 0.5
+    if not 0.01 < share < 0.99:  # p may touch zero at an end, where rounding decides its sign: begin away from there
+        share = 0.5
+    u = low + share * (high - low)
     for _ in range(200):
         value = horner(p, n, u)
         if value > 0.0:
@@ -127,7 +128,7 @@ def first_root(p, n):
         top -= 1
         b, low, wide = boxes[top], left[top], width[top]
         count = variations(b, n)
-        if b[0] <= 0.0 and low > 0.0:  # a root exactly where two boxes meet
+        if low > 0.0 and (b[0] <= 0.0 or (b[0] <= noise and count == 0)):  # a root where two boxes meet
             if leading_sign(b, n) <= 0:
                 return SIMPLE, low, touch
             touch = min(touch, low)
