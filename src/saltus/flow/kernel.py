@@ -296,33 +296,32 @@ def arc(where, state, settings, env, model, work, steps, events, origin, target)
 
 @jit
 def chatter_sums(where, env, model, work, h, x, factor, t, origin):
-    """The sums over the sides of g v / abs(a), v / abs(a) and v^3 / abs(a), g the damping, for unit speed, at x of a step."""
+    """The sums over the sides of g v / abs(a) and v / abs(a), g the damping, for unit speed, at x of a step."""
     b, order = work[7], where[ORDER]
-    damping, duration, action = 0.0, 0.0, 0.0
+    damping, duration = 0.0, 0.0
     for i in range(where[SIDES]):
         side = 1.0 - 2.0 * i
-        ratio = 1.0 if side == where[SIDE] else factor
         pull = abs(horner(b[i], order, x * h))
-        damping += ratio / pull * model[3](t + x * h, origin, side, env, where[PIECE])
-        duration += ratio / pull
-        action += ratio**3 / pull
-    return damping, duration, action
+        share = (1.0 if side == where[SIDE] else factor) / pull
+        damping += share * model[3](t + x * h, origin, side, env, where[PIECE])
+        duration += share
+    return damping, duration
 
 
 @jit
 def chatter_decay(where, state, env, model, work, h, origin):
-    """Advance the chatter speed over a step: the action v^3 sum 1/abs(a_s) decays at the rate of the mean damping."""
+    """Advance the chatter speed over a step: the action, v^2 times the duration sum v_s/abs(a_s), decays as the mean damping."""
     t, side = state[TIME], float(where[SIDE])
     contact_accelerations(where, env, model, work, t, origin)
     next_side, after = model[2](t, origin, -state[SPEED] / rate_of(model, side), side, env, where[PIECE])
     factor = rate_of(model, next_side) * after / state[SPEED]
     decay = 0.0
     for j in range(GAUSS_NODES.size):
-        damping, duration, _ = chatter_sums(where, env, model, work, h, GAUSS_NODES[j], factor, t, origin)
+        damping, duration = chatter_sums(where, env, model, work, h, GAUSS_NODES[j], factor, t, origin)
         decay += GAUSS_WEIGHTS[j] * h * damping / duration
-    _, _, before = chatter_sums(where, env, model, work, h, 0.0, factor, t, origin)
-    _, _, after_action = chatter_sums(where, env, model, work, h, 1.0, factor, t, origin)
-    state[SPEED] *= (math.exp(-decay) * before / after_action) ** (1.0 / 3.0)
+    _, before = chatter_sums(where, env, model, work, h, 0.0, factor, t, origin)
+    _, after_step = chatter_sums(where, env, model, work, h, 1.0, factor, t, origin)
+    state[SPEED] *= (math.exp(-decay) * before / after_step) ** (1.0 / 3.0)
 
 
 @jit
