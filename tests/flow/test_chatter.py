@@ -1,0 +1,138 @@
+"""Impacts without loss (e = 1) near contact: the averaged law of numerics.md against resolved impacts and closed forms.
+
+Between impacts at speed v the motion on side s lasts 2 v_s / abs(a_s). Per unit of time the speed gains the share a_s' / (3 a_s)
+from the change of the pull a_s, and loses the share g_s / 3 to the damping g_s. Averaged over both sides, with v_s = f_s v where
+the impact law changes the speed by a fixed factor there and back, the action J = v^3 sum f_s / abs(a_s) decays at the rate
+(sum g_s f_s / abs(a_s)) / (sum f_s / abs(a_s)).
+"""
+
+import math
+
+import numpy as np
+import pytest
+from flow_references import BETA80, driven
+from scipy.integrate import quad
+
+from saltus.flow import EventKind, simulate
+from saltus.flow import kernel as k
+from saltus.flow.simulation import _advance, _prepare, program
+from saltus.systems import EnergyRestitution
+
+
+def pulls(numbers, t):
+    """abs(a_+) and abs(a_-), the contact accelerations of the two sides."""
+    b, m = numbers.get("beta0", BETA80), numbers.get("m", 0.0)
+    across = (numbers.get("mean", 0.0) + numbers["H"] * math.sin(numbers["W"] * t + numbers.get("phase", 0.0))) * math.sin(b)
+    along = numbers["V"] * math.cos(b)
+    return -(across + along) / (1 + m), across - along
+
+
+def law(numbers, v0, t, lower_factor=1.0):
+    """Speed on the upper side at t from v0 at 0; on the lower side it is `lower_factor` times that."""
+    damping = (numbers["C"] * numbers.get("c", 1.0) / (1 + numbers.get("m", 0.0)), numbers["C"])
+
+    def sums(s):
+        lower, upper = pulls(numbers, s)
+        return lower_factor / lower, 1 / upper
+
+    def rate(s):
+        lower, upper = sums(s)
+        return (damping[0] * lower + damping[1] * upper) / (lower + upper)
+
+    decay = quad(rate, 0, t, epsabs=1e-14, epsrel=1e-13, limit=200)[0]
+    return v0 * (math.exp(-decay) * sum(sums(0)) / sum(sums(t))) ** (1 / 3)
+
+
+def averaged_speed(system, v0, duration):
+    """The speed of the kernel's CHATTER mode after a time, from its own state (a motion at contact reports 0)."""
+    run = program(system)
+    where, state, settings = _prepare(system, run, np.zeros(1), np.array([v0]), None, duration, 0.0, 1e-14)
+    _advance(system, run, where, state, settings)
+    assert where[k.MODE] == k.CHATTER
+    return state[k.SPEED]
+
+
+SYMMETRIC = {"C": 0.1, "V": -0.5, "H": 0.05, "W": 0.3}
+UNEQUAL = {"C": 0.2, "m": 0.6, "c": 1.7, "k": 1.4, "V": -0.8, "H": 0.09, "mean": 0.02, "W": 0.5, "phase": 1.0}
+CONSERVATIVE = {"C": 0.0, "V": -0.5, "H": 0.06, "W": 0.2}
+
+
+def worst_relative_error(numbers, v0, duration, lower_factor=1.0, impact=None):
+    """Of the law against the impacts that the kernel resolves, all those that leave the upper side."""
+    motion = simulate(driven(**numbers, impact=impact), theta=0.0, velocity=-v0, duration=duration, tol=1e-15)
+    upper = motion.crossings.side < 0
+    assert motion.phase_known
+    assert upper.sum() > 100
+    pairs = list(zip(motion.crossings.time[upper], motion.crossings.velocity_before[upper], strict=True))[::10]
+    return max(abs(v / law(numbers, v0, t, lower_factor) - 1) for t, v in pairs)
+
+
+@pytest.mark.parametrize("numbers", [SYMMETRIC, UNEQUAL, CONSERVATIVE])
+def test_the_law_is_met_by_the_resolved_impacts_with_an_error_that_halves_with_the_speed(numbers):
+    errors = [worst_relative_error(numbers, v0, 10.0) for v0 in (1e-3, 5e-4, 2.5e-4)]
+    assert errors[0] < 2e-2
+    assert errors[1] / errors[0] == pytest.approx(0.5, abs=0.1)
+    assert errors[2] / errors[1] == pytest.approx(0.5, abs=0.1)
+
+
+def test_the_law_holds_for_a_conservative_impact_that_changes_the_speed_between_unequal_masses():
+    numbers = {"C": 0.0, "m": 0.8, "V": -0.8, "H": 0.1, "W": 0.3}
+    errors = [
+        worst_relative_error(numbers, v0, 10.0, lower_factor=1 / math.sqrt(1.8), impact=EnergyRestitution(1.0))
+        for v0 in (1e-3, 5e-4)
+    ]
+    assert errors[0] < 2e-2
+    assert errors[1] / errors[0] == pytest.approx(0.5, abs=0.1)
+
+
+def test_the_averaged_speed_follows_the_closed_form_of_symmetric_layers():
+    t, C, V, H, W = 17.0, 0.1, -0.5, 0.07, 0.21
+    A, b = abs(V) * math.cos(BETA80), math.sin(BETA80)
+    h0, h = 0.2 * H * b, H * math.sin(W * t + math.asin(0.2)) * b
+    speed = averaged_speed(driven(C=C, V=V, H=H, W=W, phase=math.asin(0.2)), 8e-6, t)
+    expected = 8e-6 * ((A**2 - h**2) / (A**2 - h0**2)) ** (1 / 3) * math.exp(-C * t / 3)
+    assert speed == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize("duration", [0.3, 4.0, 23.0])
+def test_the_averaged_speed_follows_the_law_for_unequal_layers(duration):
+    assert averaged_speed(driven(**UNEQUAL), -9e-6, duration) == pytest.approx(law(UNEQUAL, 9e-6, duration), rel=1e-9)
+
+
+@pytest.mark.parametrize("start", [-1, 1])
+def test_the_averaged_speed_follows_the_law_where_the_impact_changes_the_speed(start):
+    numbers, factor = {"C": 0.15, "m": 0.8, "c": 0.6, "V": -0.8, "H": 0.1, "W": 0.3}, {-1: 1.0, 1: 1 / math.sqrt(1.8)}[start]
+    system = driven(**numbers, impact=EnergyRestitution(1.0))
+    expected = law(numbers, 5e-6 / factor, 9.0, lower_factor=1 / math.sqrt(1.8)) * factor
+    assert averaged_speed(system, start * 5e-6, 9.0) == pytest.approx(expected, rel=1e-9)
+
+
+def test_without_damping_and_under_constant_loads_the_speed_stays():
+    assert averaged_speed(driven(C=0.0, V=-0.5), 7e-6, 40.0) == pytest.approx(7e-6, rel=1e-13)
+
+
+def test_resolved_impacts_decay_into_chatter_once_they_are_too_small():
+    motion = simulate(driven(C=1.0, V=-1.5), theta=0.0, velocity=2e-4, duration=15.0)
+    (event,) = [e for e in motion.events if e.kind is EventKind.CHATTER]
+    assert not motion.phase_known
+    assert abs(event.velocity_after) == pytest.approx(1e-5, rel=1e-2)
+    assert event.time == pytest.approx(3 * math.log(20.0), rel=1e-2)  # exp(-C t / 3), and v^2 is small
+    assert (motion.theta, motion.velocity, motion.side) == (0.0, 0.0, 0)
+    assert motion.rest_time is None
+
+
+def test_chatter_is_released_when_the_load_says_and_its_phase_is_said_to_be_lost():
+    H, W = 0.2, 0.5
+    motion = simulate(driven(H=H, W=W), theta=0.0, velocity=5e-6, duration=4.0)
+    released = math.asin(0.5 * math.cos(BETA80) / (H * math.sin(BETA80))) / W
+    kinds = [e.kind for e in motion.events]
+    assert kinds[:2] == [EventKind.CHATTER, EventKind.RELEASE]
+    assert motion.events[1].time == pytest.approx(released, abs=1e-13)
+    assert not motion.phase_known
+    assert motion.theta > 0
+
+
+def test_chatter_never_starts_where_an_impact_loses_speed():
+    motion = simulate(driven(e=0.999, C=0.5), theta=0.0, velocity=1e-4, duration=30.0)
+    assert motion.phase_known
+    assert motion.rest_time is not None
