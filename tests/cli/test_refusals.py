@@ -91,6 +91,11 @@ CASES = {
     "samples": (simulate("duration = 1", "samples = 1"), ", line 6", "simulate.samples must lie in [2, "),
     "samples_half": (simulate("duration = 1", "samples = 2.5"), ", line 6", "simulate.samples must be a whole number, got 2.5"),
     "margin": (simulate("duration = 1", 'stop_at = "line_limits"'), ", line 6", "did you mean 'line_limit'"),
+    "control": (
+        '[model]\n"a\\r\\nb\\u2028" = 1\ntype = "Metainterface"\n',
+        ", line 2",
+        r"unknown key model.a\r\nb\u2028; known here",
+    ),
     "syntax": ("[model\n", "", "line 1, column 7 is not valid TOML"),
     "value": ("a = \n", "", "line 1, column 5 is not valid TOML: invalid value"),
     "twice": ("a = 1\na = 2\n", "", "line 2, column 6 is not valid TOML"),

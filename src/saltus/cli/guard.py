@@ -9,6 +9,7 @@ from typing import NoReturn
 
 import typer
 
+from saltus.cli.interrupt import interruptible
 from saltus.errors import SaltusError
 
 BAD_INPUT = 2
@@ -20,7 +21,8 @@ INTERRUPTION = "interrupted; no file was left half-written"
 def guarded() -> Iterator[None]:
     """Turn an error that a user can act on, or an interruption, into a sentence on stderr and an exit status."""
     try:
-        yield
+        with interruptible():
+            yield
     except SaltusError as error:
         stop(str(error), BAD_INPUT)
     except KeyboardInterrupt:

@@ -32,7 +32,12 @@ class Source:
         while keys and keys not in self.lines:
             keys = keys[:-1]
         line = f", line {self.lines[keys]}" if keys else ""
-        raise ParameterError(f"{self.path}{line}: {problem}")
+        raise ParameterError(one_line(f"{self.path}{line}: {problem}"))
+
+
+def one_line(text: str) -> str:
+    """`text` with line breaks and other control characters, which a quoted key may hold, written as escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def read_source(path: Path) -> tuple[Source, dict[str, Any]]:

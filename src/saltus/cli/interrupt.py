@@ -1,0 +1,58 @@
+"""Ctrl-C that is heeded wherever it falls."""
+
+from __future__ import annotations
+
+import _thread
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, NoReturn
+
+PATIENCE = 1.0  # s; ample for the clean-up after an interrupt, and then the next one is due
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let SIGINT end the block with a KeyboardInterrupt.
+
+    Python raises one wherever it happens to be, and there it can be lost: a callback from C drops it, and the import of an
+    extension module turns it into an ImportError. So it is raised again until the block ends, and whatever error comes of it
+    is taken for it. A process that ignores SIGINT goes on doing so.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if before is signal.SIG_IGN or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    reminders: list[threading.Timer] = []
+
+    def interrupt(*_: Any) -> NoReturn:
+        reminder = threading.Timer(PATIENCE, _remind)
+        reminder.daemon = True
+        reminder.start()
+        reminders.append(reminder)
+        raise KeyboardInterrupt
+
+    hook = sys.unraisablehook
+    sys.unraisablehook = lambda lost: None if lost.exc_type is KeyboardInterrupt else hook(lost)
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    except Exception as error:
+        if reminders:
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        signal.signal(signal.SIGINT, before)
+        for reminder in reminders:
+            reminder.cancel()
+        sys.unraisablehook = hook
+
+
+def _remind() -> None:
+    """Send SIGINT to the main thread itself, so that it wakes from waiting."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
