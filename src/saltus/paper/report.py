@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import saltus
@@ -36,9 +36,17 @@ def read_claims(figure: PaperFigure, folder: Path) -> list[Claim]:
         return figure.claims(tree.load())
 
 
-def write(figures: Iterable[PaperFigure], folder: Path) -> list[Claim]:
-    """Write index.html, claims.json and claims.md about everything in `folder` that is up to date; return its claims."""
-    present = {figure: read_claims(figure, folder) for figure in figures if state.up_to_date(figure, folder)}
+def write(figures: Iterable[PaperFigure], folder: Path, known: Mapping[str, Iterable[Claim]]) -> list[Claim]:
+    """Write index.html, claims.json and claims.md about everything in `folder` that is up to date; return its claims.
+
+    `known` holds the claims of the figures, by name, that are known to be up to date.
+    """
+    present = {}
+    for figure in figures:
+        if figure.name in known:
+            present[figure] = list(known[figure.name])
+        elif state.up_to_date(figure, folder):
+            present[figure] = read_claims(figure, folder)
     claims = [claim for group in present.values() for claim in group]
     pages = {
         "claims.json": json.dumps([claim.to_dict() for claim in claims], indent=1, ensure_ascii=False) + "\n",

@@ -50,7 +50,7 @@ def reproduce(
     check_writable(output)
     chosen = [figure for name, figure in FIGURES.items() if not names or name in names]
     results = _make_all(chosen, output, force, console)
-    claims = report.write(FIGURES.values(), output)
+    claims = report.write(FIGURES.values(), output, {result.name: result.claims for result in results})
     if console is not None:
         console.print(tally(claims))
         console.print(f"Results are in {output}: open {output / 'index.html'}", soft_wrap=True, highlight=False)

@@ -102,7 +102,7 @@ def _decay(e: float = 0.9, alpha: float = 0.3, theta0: float = 1e-4) -> dict[str
     return {
         "amplitude_ratio": float(peak / decayed_amplitude(2, theta0=theta0, e=e)),
         "printed_amplitude_ratio": float(peak / (e**8 * theta0)),
-        "final_time_ratio": float(motion.rest_time / end),
+        "final_time_ratio": float(motion.rest_time or np.nan) / end,
         "decay_e": e,
     }
 

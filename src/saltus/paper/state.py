@@ -40,6 +40,7 @@ def closure(module: str) -> frozenset[str]:
     return frozenset(found)
 
 
+@cache
 def _imports(module: str) -> list[str]:
     names: list[str] = []
     for node in ast.walk(ast.parse(_source(module))):
@@ -59,6 +60,7 @@ def _path(module: str) -> Path | None:
     return Path(spec.origin) if spec is not None and spec.origin else None
 
 
+@cache
 def _source(module: str) -> bytes:
     path = _path(module)
     return path.read_bytes() if path else b""

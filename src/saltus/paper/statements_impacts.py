@@ -135,7 +135,7 @@ def _without_root() -> dict[str, float]:
 
 def _inelastic(rng: np.random.Generator) -> dict[str, float]:
     """The restitution of errata 25 against the momentum balance of both layers solved numerically."""
-    from saltus.systems import InelasticImpact, Metainterface, TwoLayer
+    from saltus.systems import InelasticImpact, Load, Metainterface, TwoLayer
 
     worst = 0.0
     for beta0, m in zip(rng.uniform(np.pi / 4 + 0.01, 3 * np.pi / 4 - 0.01, 50), rng.uniform(0, 2, 50), strict=True):
@@ -146,7 +146,7 @@ def _inelastic(rng: np.random.Generator) -> dict[str, float]:
             # unknowns: velocity of the free layer after, impulse on the hit one, which stops it
             unknown = np.linalg.solve(np.column_stack([matrix[:, free], -np.eye(2)[hit]]), matrix @ before)
             law = InelasticImpact().velocity_after(
-                Metainterface(beta0=float(beta0), mass_ratio=float(m)), 0.0, 1.0, side, -side, None
+                Metainterface(beta0=float(beta0), mass_ratio=float(m)), 0.0, 1.0, side, -side, Load()
             )
             worst = max(worst, abs(float(law) - unknown[0]))
     model = Metainterface(beta0=np.deg2rad(80.0))

@@ -73,8 +73,13 @@ def _decay(e: float) -> dict[str, float]:
         "first_interval": float(impact[0]) / period,
         "second_interval": float(impact[1] - impact[0]) / period,
         "third_interval": float(impact[2] - impact[1]) / period,
-        "end": float(motion.rest_time) / final_time(period=period, e=e) - 1,
+        "end": _rest(motion) / final_time(period=period, e=e) - 1,
     }
+
+
+def _rest(motion: Any) -> float:
+    """The time of rest, or NaN if it never comes."""
+    return math.nan if motion.rest_time is None else float(motion.rest_time)
 
 
 def _equilibria() -> dict[str, float]:

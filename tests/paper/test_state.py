@@ -1,0 +1,124 @@
+"""What is up to date is left alone; what is missing, changed or interrupted is made again."""
+
+import numpy as np
+import pytest
+
+from saltus.errors import ParameterError
+from saltus.paper import PaperFigure, reproduce, state
+from saltus.paper.claim import check
+from saltus.paper.provenance import dataset, tree
+from saltus.plots.style import new_figure
+
+calls = []
+
+
+def compute(n=3):
+    calls.append(n)
+    return tree({"line": dataset({"y": ("x", np.arange(float(n)))}, what="a line")}, what="a test")
+
+
+def draw(data):
+    figure = new_figure()
+    figure.subplots().plot(data["line"]["y"])
+    return figure
+
+
+def claims(data):
+    return [check("line", "here", "it rises", printed=bool((np.diff(data["line"]["y"]) > 0).all()), evidence="differences")]
+
+
+def figure(**changes):
+    parts = {"name": "fig99", "title": "A line", "caption": "A line.", "compute": compute, "draw": draw, "claims": claims}
+    return PaperFigure(**{**parts, **changes})
+
+
+@pytest.fixture(autouse=True)
+def registry(monkeypatch):
+    calls.clear()
+    figures = {"fig99": figure()}
+    monkeypatch.setattr("saltus.paper.FIGURES", figures)
+    return figures
+
+
+def test_a_second_run_makes_nothing(tmp_path):
+    first, second = reproduce(output=tmp_path), reproduce(output=tmp_path)
+    assert [first[0].made, second[0].made] == [True, False]
+    assert calls == [3]
+    assert second[0].claims == first[0].claims
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "fig99.nc", "fig99.png", "fig99.pdf", "claims.json", "claims.md", "index.html", ".saltus",
+    }  # fmt: skip
+
+
+def test_the_report_is_not_rewritten_when_nothing_changes(tmp_path):
+    reproduce(output=tmp_path)
+    before = {p: p.stat().st_mtime_ns for p in tmp_path.iterdir() if p.is_file()}
+    reproduce(output=tmp_path)
+    assert {p: p.stat().st_mtime_ns for p in tmp_path.iterdir() if p.is_file()} == before
+
+
+@pytest.mark.parametrize("name", ["fig99.nc", "fig99.png", "fig99.pdf"])
+@pytest.mark.parametrize("damage", ["missing", "tampered"])
+def test_a_missing_or_tampered_output_is_made_again(tmp_path, name, damage):
+    reproduce(output=tmp_path)
+    whole = (tmp_path / name).read_bytes()
+    if damage == "missing":
+        (tmp_path / name).unlink()
+    else:
+        (tmp_path / name).write_bytes(whole[:-1])
+    assert reproduce(output=tmp_path)[0].made
+    assert len((tmp_path / name).read_bytes()) == len(whole)
+
+
+def test_force_makes_everything_again(tmp_path):
+    reproduce(output=tmp_path)
+    assert reproduce(output=tmp_path, force=True)[0].made
+
+
+def test_a_damaged_record_counts_as_none(tmp_path):
+    reproduce(output=tmp_path)
+    (tmp_path / state.FOLDER / "fig99.json").write_text("{")
+    assert reproduce(output=tmp_path)[0].made
+
+
+def test_other_parameters_make_it_again(tmp_path, registry):
+    reproduce(output=tmp_path)
+    registry["fig99"] = figure(parameters={"n": 5})
+    assert reproduce(output=tmp_path)[0].made
+    assert calls == [3, 5]
+
+
+def test_the_key_follows_the_source_of_everything_imported(monkeypatch):
+    from saltus.paper import fig08
+
+    key = state.key(fig08.FIGURE)
+    assert "saltus.theory.quasi_static" in state.closure("saltus.paper.fig08")
+    assert "saltus.flow" not in state.closure("saltus.paper.fig08")
+    original = state._source
+    changed = "saltus.theory.quasi_static"
+    monkeypatch.setattr(state, "_source", lambda module: original(module) + (b"#" if module == changed else b""))
+    assert state.key(fig08.FIGURE) != key
+
+
+def test_an_interrupt_leaves_what_was_there_and_the_next_run_goes_on(tmp_path, registry):
+    reproduce(output=tmp_path)
+    whole = (tmp_path / "fig99.nc").read_bytes()
+
+    def interrupted(data):
+        raise KeyboardInterrupt
+
+    registry["fig99"] = figure(draw=interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        reproduce(output=tmp_path, force=True)
+    assert not [p.name for p in tmp_path.iterdir() if "part" in p.name]
+    registry["fig99"] = figure()
+    reproduce(output=tmp_path)
+    assert len((tmp_path / "fig99.nc").read_bytes()) == len(whole)
+    assert reproduce(output=tmp_path)[0].made is False
+
+
+def test_an_output_folder_that_is_a_file_is_refused_before_anything_is_computed(tmp_path):
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(ParameterError, match="taken"):
+        reproduce(output=tmp_path / "taken")
+    assert calls == []
