@@ -170,3 +170,12 @@ def test_an_operation_that_cannot_be_traced_is_refused(refused, study, tmp_path)
     sentence = refused("simulate", path, "-o", tmp_path / "out")
     assert sentence.startswith(f"saltus: {path}: ")
     assert "floor" in sentence
+
+
+def test_an_interrupt_within_an_exec_ends_with_status_130(started, study, tmp_path):
+    """dataclasses and numba exec texts, and Python treats an interrupt there as one that nothing has caught."""
+    wait = "import os, signal, threading; os.kill(os.getpid(), signal.SIGINT); threading.Event().wait(30)"
+    (tmp_path / "own.py").write_text(f"exec({wait!r})\n")
+    process = started([sys.executable, "-m", "saltus", "info", study('[model]\ntype = "own.py:Own"\n')], stderr=subprocess.PIPE)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (130, "saltus: interrupted; no file was left half-written\n")

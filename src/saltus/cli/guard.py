@@ -26,6 +26,8 @@ def guarded() -> Iterator[None]:
     except SaltusError as error:
         stop(str(error), BAD_INPUT)
     except KeyboardInterrupt:
+        # Python notes an interrupt that leaves an exec of text, and `python -m` then dies of SIGINT; the next exec forgets it.
+        exec("")
         stop(INTERRUPTION, INTERRUPTED)
     except BrokenPipeError:  # `saltus info ... | head`: typer ends this quietly
         raise
