@@ -30,7 +30,6 @@ class Emitter:
     def source(self) -> str:
         """The functions `series`, `contact_series`, `reset`, `contact_damping`, `constants` and `geometry`, and their sizes."""
         trace = self.trace
-        sides = 0 if trace.next_side is None else 2 if any(n.op == "side" for n in ordered([trace.next_side])) else 1
         functions = [
             self._series(),
             self._contact_series(),
@@ -42,7 +41,7 @@ class Emitter:
             "DOF": len(trace.acceleration),
             "STOPS": len(trace.margins),
             "ROWS": self.most_rows,
-            "SIDES": sides,
+            "SIDES": trace.sides,
             "CONSTANT_COUNT": max(1, len(self.constants)),
         }
         head = [f"{name} = {value!r}" for name, value in sizes.items()]

@@ -56,6 +56,7 @@ class Trace:
 
     parameters: list[str] = field(default_factory=list)
     records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative
+    sides: int = 0  # of the contact
     acceleration: list[Expr] = field(default_factory=list)
     gap: Expr | None = None
     gap_rate: Expr | None = None
@@ -79,7 +80,7 @@ def trace(system: System, stop_at: tuple[str, ...] = ()) -> Trace:
         TraceError: an operation without a Taylor recurrence, a branch on the state, a time used outside the load.
         ParameterError: a margin that the model does not have.
     """
-    result = Trace()
+    result = Trace(sides=len(system.model.sides))
     twin = substitute_numbers(system, result.symbol)
     _name_records(twin.load)
     model, load, t = twin.model, twin.load, LoadTime(result)
