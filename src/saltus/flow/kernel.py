@@ -46,6 +46,7 @@ LENGTH, END, TOLERANCE = 0, 1, 2  # in `settings`: the forcing period, the local
 
 SMALLEST = 1e-6  # size below which a step's error is absolute, not relative
 ZERO = 1e-14  # an acceleration at contact below this is zero: it is a difference of loads of order 1
+EXACT = 1e-15  # at rest a small error of the load would decide whether a touch is a release, and there steps cost little
 SLOW = 1e-2  # a faster impact cannot be the end of an accumulation, and is not tested for it
 CHATTER_SPEED = 1e-5  # the averaged law is then wrong by 5e-5 of the speed; following on takes 1e5 impacts a unit of time
 LOSSLESS = 1e-12  # a loss of speed over two impacts below this is rounding
@@ -332,7 +333,7 @@ def held(where, state, settings, env, model, work, steps, origin, target):
     h, first, released = target - t, NEVER, 0
     contact_accelerations(where, env, model, work, t, origin)
     for i in range(where[SIDES]):
-        h = min(h, step_size(b[i : i + 1], order, max(1.0, abs(b[i, 0])), settings[TOLERANCE]))
+        h = min(h, step_size(b[i : i + 1], order, max(1.0, abs(b[i, 0])), min(settings[TOLERANCE], EXACT)))
     for i in range(where[SIDES]):
         skip = leading(b[i], 0, order)
         if skip < order and b[i, skip] > 0.0:
