@@ -174,6 +174,8 @@ def as_expr(value: Any) -> Expr:
         return value
     if isinstance(value, (int, float, np.integer, np.floating, np.bool_)) or (isinstance(value, np.ndarray) and value.ndim == 0):
         return number(float(value))
+    if hasattr(value, "refuse"):  # the time
+        value.refuse()
     raise TraceError(f"a traced model cannot use {value!r} of type {type(value).__name__}; allowed are {ALLOWED}")
 
 
@@ -306,7 +308,7 @@ def _chain(node: Expr, d: list[Expr]) -> Expr:
         "maximum": lambda: combine("where", combine("greater", a, b), d[0], d[1]),
         "minimum": lambda: combine("where", combine("less", a, b), d[0], d[1]),
     }
-    if all(x.op == "number" and x.value == 0.0 for x in d):
+    if node.op.startswith(("greater", "less")) or all(x.op == "number" and x.value == 0.0 for x in d):
         return number(0.0)
     if node.op not in rules:
         raise TraceError(f"{node.op} has no derivative")

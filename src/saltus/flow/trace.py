@@ -36,13 +36,16 @@ class LoadTime:
             self._trace.records.append(row)
         return combine("mul", record.scale, Expr("record", (), self._trace.records.index(row)))
 
-    def _refuse(self, *_: Any) -> Any:
+    def refuse(self, *_: Any) -> Any:
+        """The answer to every other use."""
         raise TraceError(
             "the time may only be handed to a load channel, such as load.horizontal(t); give the model a channel for it"
         )
 
-    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _refuse
-    __pow__ = __rpow__ = __neg__ = __abs__ = __float__ = __bool__ = __lt__ = __gt__ = __array__ = _refuse
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = refuse
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = refuse
+    __float__ = __int__ = __bool__ = __lt__ = __gt__ = __le__ = __ge__ = __eq__ = __ne__ = __array__ = refuse
+    __hash__ = object.__hash__
 
 
 @dataclass
@@ -144,11 +147,11 @@ def _check(result: Trace, model: str) -> None:
     for node in ordered(expanded):
         if node.op in POINTWISE:
             raise TraceError(f"{model} uses {node.op} in an acceleration, a gap or a margin; only an impact law may compare")
-    _check_abs(result, expanded)
     if result.gap is not None:
         for node in ordered([result.gap]):
             if node.op in ("time", "record", "velocity"):
                 raise TraceError(f"{model}.gap may depend on the coordinate, the side and the parameters only")
+    _check_abs(result, expanded)
 
 
 def _check_abs(result: Trace, expanded: list[Expr]) -> None:

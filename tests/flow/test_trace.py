@@ -1,0 +1,309 @@
+"""Tracing a model: what is folded and shared, what is refused and how, and that numbers are never part of a structure."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from saltus.errors import ParameterError, TraceError
+from saltus.flow.graph import Expr, combine, differentiate, number, ordered, power, substitute
+from saltus.flow.simulation import structure_key
+from saltus.flow.trace import trace
+from saltus.systems import Harmonic, Load, Metainterface, Model, Record, System, VelocityReduction, WallOscillator
+
+X, V, T, SIDE = Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("time"), Expr("side")
+ALLOWED = "allowed are + - * /, powers, NumPy's sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, and abs of the coordinate"
+
+
+def traced(formula, load=None, **more):
+    """Trace x'' = formula(t, x, v, side, load) in a model with the given attributes."""
+
+    def acceleration(self, t, x, velocity, side, load):
+        return formula(t, x, velocity, side, load)
+
+    attributes = {"coordinates": ("x",), "channels": ("force",), "sides": (), "acceleration": acceleration, **more}
+    model = type("Small", (Model,), attributes)()
+    return trace(System(model=model, load=load or Load(force=1.0)))
+
+
+# --- the graph -----------------------------------------------------------------------------------------------------------
+
+
+def test_literals_are_folded():
+    assert combine("add", 2, 3) is number(5.0)
+    assert (number(4.0) ** 0.5) is number(2.0)
+    assert np.sin(number(0.5)) is number(math.sin(0.5))
+    assert X * 0 is number(0.0)
+    assert 0.0 / (2 + X) is number(0.0)
+    for same in (X + 0, 0 + X, X - 0, X * 1, 1 * X, X / 1, X**1, +X, np.positive(X)):
+        assert same is X
+    assert X**0 is number(1.0)
+
+
+def test_equal_expressions_are_one_object():
+    assert np.sin(X + 1) * V is np.sin(X + 1) * V
+    assert X**2 is X * X
+    assert np.square(X) is X**2
+    assert np.sqrt(X) is X**0.5
+    assert np.tan(X) is np.sin(X) / np.cos(X)
+    assert len(ordered([np.sin(X) + np.sin(X) * V])) == 5
+
+
+def test_operands_come_before_what_uses_them():
+    nodes = ordered([np.exp(X * V) / (1 + X), X * V + T])
+    assert len(nodes) == len(set(map(id, nodes)))
+    seen: set[int] = set()
+    for node in nodes:
+        assert all(id(a) in seen for a in node.args)
+        seen.add(id(node))
+
+
+def test_degree_in_the_time_is_known_where_it_ends():
+    p = Expr("parameter", (), 0)
+    assert [e.degree for e in (p, np.sin(p), T, T * T + p, T * T / p, np.sin(T), T / (1 + T), X, T**3)] == [
+        *(0, 0, 1, 2, 2, None, None, None, 3)
+    ]
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        lambda x: x**3 - 2 / x + (1 + x) ** 0.7,
+        lambda x: np.sqrt(1 + x * x) * np.exp(-x) + np.log(x),
+        lambda x: np.sin(x) * np.cos(2 * x) + np.tan(x / 2),
+        lambda x: np.sinh(x) - np.cosh(x / 2) + np.tanh(3 * x),
+        lambda x: np.where(x > 1.0, x * x, x) + np.maximum(x, 0.3) * np.minimum(x, 0.9),
+    ],
+)
+def test_derivatives_agree_with_differences(formula):
+    slope = differentiate(formula(X), X)
+    for x in (0.4, 0.71, 1.3):
+        h = 1e-6
+        expected = (formula(x + h) - formula(x - h)) / (2 * h)
+        assert substitute(slope, {X: x}).value == pytest.approx(expected, rel=1e-8)
+
+
+def test_power_of_a_variable_exponent_is_an_exponential():
+    assert power(2.0, X).op == "exp"
+    assert power(X, V).op == "exp"
+    assert power(X, Expr("parameter", (), 0)).op == "pow"
+
+
+# --- refusals ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("formula", "sentence"),
+    [
+        (
+            lambda t, x, v, s, load: math.sin(x),
+            "a traced quantity has no number yet: use NumPy's functions, not math's; " + ALLOWED,
+        ),
+        (lambda t, x, v, s, load: float(x), "a traced quantity has no number yet"),
+        (lambda t, x, v, s, load: [1, 2][x], "a traced quantity has no number yet"),
+        (lambda t, x, v, s, load: np.arctan(x), "np.arctan cannot be traced; " + ALLOWED),
+        (lambda t, x, v, s, load: np.sign(x), "np.sign cannot be traced; " + ALLOWED),
+        (lambda t, x, v, s, load: np.arctan2(x, v), "np.arctan2 cannot be traced"),
+        (lambda t, x, v, s, load: np.clip(x, 0, 1), "np.clip cannot be traced"),
+        (lambda t, x, v, s, load: np.dot(x, v), "np.dot cannot be traced"),
+        (lambda t, x, v, s, load: np.add.reduce(x), "np.add cannot be traced"),
+        (lambda t, x, v, s, load: -x if x > 0 else x, "may not branch on its state or parameters (if, and, or, min, max)"),
+        (lambda t, x, v, s, load: min(x, 0.0), "may not branch on its state or parameters (if, and, or, min, max)"),
+        (lambda t, x, v, s, load: max(v, x), "use `side`"),
+        (lambda t, x, v, s, load: x > 0 and v, "may not branch"),
+        (lambda t, x, v, s, load: x % 1, "%, //, @ and round cannot be traced; " + ALLOWED),
+        (lambda t, x, v, s, load: 1 // x, "%, //, @ and round cannot be traced"),
+        (lambda t, x, v, s, load: round(x), "%, //, @ and round cannot be traced"),
+        (lambda t, x, v, s, load: abs(v), "abs of an expression that is not a coordinate cannot be traced; " + ALLOWED),
+        (lambda t, x, v, s, load: np.abs(2 * x), "abs of an expression that is not a coordinate cannot be traced"),
+        (lambda t, x, v, s, load: abs(x), "abs of the coordinate can be traced only where the gap is side"),
+        (lambda t, x, v, s, load: sum(x), "a scalar: it cannot be unpacked or looped ove"),
+        (lambda t, x, v, s, load: x.sin(), "a traced quantity has no 'sin'; " + ALLOWED),
+        (lambda t, x, v, s, load: x.real, "a traced quantity has no 'real'"),
+        (
+            lambda t, x, v, s, load: np.where(x > 0, x, -x),
+            "Small uses greater in an acceleration, a gap or a margin; only an impact law",
+        ),
+        (
+            lambda t, x, v, s, load: np.maximum(x, 0),
+            "Small uses maximum in an acceleration, a gap or a margin; only an impact law",
+        ),
+        (lambda t, x, v, s, load: (x, v), "a traced model cannot use (coordinate[0], velocity[0]) of type tuple"),
+        (lambda t, x, v, s, load: "x", "a traced model cannot use 'x' of type str; " + ALLOWED),
+        (lambda t, x, v, s, load: None, "a traced model cannot use None of type NoneType"),
+        (lambda t, x, v, s, load: x * 1j, "a traced model cannot use 1j of type complex"),
+        (lambda t, x, v, s, load: x * np.ones(3), "a traced model cannot use array([1., 1., 1.])"),
+    ],
+)
+def test_what_has_no_taylor_series_is_refused_by_name(formula, sentence):
+    with pytest.raises(TraceError) as refusal:
+        traced(formula)
+    assert sentence in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        lambda t, x, v, s, load: t * x,
+        lambda t, x, v, s, load: x * t,
+        lambda t, x, v, s, load: x - t,
+        lambda t, x, v, s, load: 2.0 - t,
+        lambda t, x, v, s, load: np.sin(t),
+        lambda t, x, v, s, load: np.float64(2.0) * t,
+        lambda t, x, v, s, load: math.cos(t),
+        lambda t, x, v, s, load: x if t > 1 else 0.0,
+        lambda t, x, v, s, load: x if t >= 1 else 0.0,
+        lambda t, x, v, s, load: x if t == 1 else 0.0,
+        lambda t, x, v, s, load: t % 1.0,
+        lambda t, x, v, s, load: t,
+        lambda t, x, v, s, load: x * t**2,
+        lambda t, x, v, s, load: load.force(t + 1.0),
+        lambda t, x, v, s, load: load.force(2 * t),
+    ],
+)
+def test_time_outside_the_load_is_refused(formula):
+    with pytest.raises(TraceError, match=r"the time may only be handed to a load channel, such as load.horizontal\(t\)"):
+        traced(formula, Load(frequency=1.0, force=Harmonic(1.0)))
+
+
+def wall_gap(self, x, side):
+    return 2.0 - x
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        ({"sides": (1,), "gap": wall_gap, "contact": 2.0}, r"only where the gap is side \* coordinate; write it with the gap"),
+        ({"sides": (1, -1), "gap": lambda self, x, side: side * (x - 1)}, r"only where the gap is side \* coordinate"),
+    ],
+)
+def test_abs_is_refused_where_the_gap_is_not_side_times_coordinate(more, sentence):
+    with pytest.raises(TraceError, match=sentence):
+        traced(lambda t, x, v, s, load: -abs(x) * x, **more)
+
+
+def test_abs_is_side_times_coordinate_where_the_gap_is():
+    for gap in (lambda self, x, side: side * x, lambda self, x, side: x * side):
+        result = traced(lambda t, x, v, s, load: -abs(x) * x, sides=(1, -1), gap=gap)
+        assert result.acceleration[0] is (-1.0 * (SIDE * X)) * X
+
+
+def test_abs_in_a_margin_is_refused_alike():
+    def margins(self, t, x, velocity, acceleration, side, load):
+        return {"far": 3.0 - abs(x)}
+
+    model = type(
+        "Small", (Model,), {"coordinates": ("x",), "sides": (), "acceleration": lambda self, *_: -1.0, "margins": margins}
+    )
+    with pytest.raises(TraceError, match="abs of the coordinate can be traced only where the gap"):
+        trace(System(model=model()), ("far",))
+
+
+def test_gap_of_velocity_or_time_is_refused():
+    for gap in (lambda self, x, side: side * (x + 0.1 * V), lambda self, x, side: side * x + np.sin(T)):
+        with pytest.raises(TraceError, match=r"Small.gap may depend on the coordinate, the side and the parameters only"):
+            traced(lambda t, x, v, s, load: -x, sides=(1, -1), gap=gap)
+
+
+def test_comparison_in_a_gap_is_refused():
+    with pytest.raises(TraceError, match="Small uses maximum in an acceleration, a gap or a margin"):
+        traced(lambda t, x, v, s, load: -x, sides=(1, -1), gap=lambda self, x, side: np.maximum(side * x, 0.0))
+
+
+def test_dry_friction_is_refused_by_what_it_uses():
+    with pytest.raises(TraceError, match="Small uses greater in an acceleration"):
+        traced(lambda t, x, v, s, load: np.where(v > 0, -1.0, 1.0) - x, sides=(1, -1))
+
+
+def test_wrong_number_of_accelerations_is_refused():
+    for result, count in (((1.0,), 1), ((1.0, 2.0, 3.0), 3)):
+        with pytest.raises(TraceError, match=rf"Small.acceleration must return 2 values, got {count}"):
+            traced(lambda t, x, v, s, load, result=result: result, coordinates=("x", "y"))
+
+
+def test_single_acceleration_for_two_coordinates_is_refused():
+    with pytest.raises(TraceError, match="cannot be unpacked or looped over"):
+        traced(lambda t, x, v, s, load: x[0], coordinates=("x", "y"))
+
+
+def test_sides_with_two_coordinates_are_refused():
+    with pytest.raises(TraceError, match="a model with sides must have one coordinate"):
+        traced(lambda t, x, v, s, load: (x[0], x[1]), coordinates=("x", "y"), sides=(1, -1))
+
+
+def test_unknown_margin_is_answered_with_the_near_ones():
+    with pytest.raises(ParameterError, match="Metainterface has no margin 'line_limits' to stop at; did you mean 'line_limit'"):
+        trace(System(model=Metainterface(beta0=1.4)), ("line_limits",))
+
+
+# --- structures ----------------------------------------------------------------------------------------------------------
+
+BASE = System(model=Metainterface(beta0=1.4), load=Load(frequency=1.0, horizontal=Harmonic(0.5), vertical=-0.5))
+
+
+def test_numbers_are_not_part_of_the_structure():
+    changes: dict[str, Any] = {"model.beta0": 1.2, "model.damping": 0, "load.frequency": 3, "load.horizontal.amplitude": 0.0}
+    changes |= {"load.horizontal.order": 4, "load.vertical": 0, "impact.e": 0, "model.mass_ratio": 2}
+    for path, value in changes.items():
+        assert structure_key(BASE.with_({path: value})) == structure_key(BASE), path
+
+
+def test_whole_numbers_are_numbers():
+    @dataclass(frozen=True, kw_only=True)
+    class Spring(Model):
+        stiffness: float
+        sides: ClassVar[tuple[int, ...]] = ()
+
+        def acceleration(self, t, theta, velocity, side, load):
+            return -self.stiffness * theta
+
+    assert structure_key(System(model=Spring(stiffness=2))) == structure_key(System(model=Spring(stiffness=2.5)))
+
+
+def test_whatever_changes_the_expressions_is_part_of_the_structure():
+    wall = System(model=WallOscillator(), load=Load(frequency=1.0, force=Harmonic(1.0)))
+    record = Record([0.0, 1.0], [0.0, 1.0])
+    others = [
+        BASE,
+        wall,
+        BASE.with_({"model.smoothing": 50.0}),
+        BASE.with_({"load.vertical": Harmonic(0.1)}),
+        BASE.with_({"load.horizontal": Harmonic(0.1) + 0.2}),
+        BASE.with_({"load.ground_horizontal": 0.0}),
+        wall.with_({"load.force": Harmonic(1.0) + record}),
+        wall.with_({"load": Load(force=1.0)}),
+    ]
+    assert len({structure_key(system) for system in others}) == len(others)
+
+
+def test_samples_of_a_record_are_numbers_and_its_source_does_not_matter():
+    a = Load(force=Record([0.0, 1.0], [0.0, 1.0], source="a.csv"))
+    b = Load(force=Record(np.linspace(0, 3, 9), np.ones(9), scale=2.0, source="b.csv"))
+    assert structure_key(a) == structure_key(b)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tabulated(Model):
+    """A model whose formula depends on an array and a switch: those are read while tracing, so they are its structure."""
+
+    factors: np.ndarray
+    cubic: bool = False
+    sides: ClassVar[tuple[int, ...]] = ()
+
+    def acceleration(self, t, theta, velocity, side, load):
+        force = sum(-float(f) * theta ** (n + 1) for n, f in enumerate(self.factors))
+        return force - theta**3 if self.cubic else force
+
+
+def test_arrays_and_switches_of_a_model_are_part_of_its_structure():
+    models = [Tabulated(factors=np.array(f), cubic=c) for f in ([1.0], [2.0], [1.0, 2.0]) for c in (False, True)]
+    assert len({structure_key(System(model=m)) for m in models}) == 6
+    again = Tabulated(factors=np.array([2.0]))
+    assert structure_key(System(model=again)) == structure_key(System(model=models[2]))
+
+
+def test_parameters_are_traced_in_the_order_of_their_paths():
+    system = BASE.with_({"impact": VelocityReduction(0.9)})
+    assert trace(system).parameters == list(system.parameters)
