@@ -44,6 +44,7 @@ DOF, STOPS, ROWS, SIDES = 12, 13, 14, 15  # and the structure's: coordinates, ma
 TIME, SPEED, STATE = 0, 1, 2  # in `state`: local time, chatter speed, then the coordinates and the velocities
 LENGTH, END, TOLERANCE = 0, 1, 2  # in `settings`: the forcing period, the local time at the end, the tolerance
 
+SAFETY = 0.9  # of a step: its error is then a tenth of tol, and 1000 periods add up to a drift in energy below 1e-12
 SMALLEST = 1e-6  # size below which a step's error is absolute, not relative
 ZERO = 1e-14  # an acceleration at contact below this is zero: it is a difference of loads of order 1
 EXACT = 1e-15  # at rest a small error of the load would decide whether a touch is a release, and there steps cost little
@@ -64,7 +65,7 @@ def step_size(coefficients, order, size, tol):
         before = max(before, abs(coefficients[i, order - 1]))
     bound = max(size, SMALLEST) * tol
     h = (bound / last) ** (1.0 / order) if last > 0.0 else np.inf
-    return min(h, (bound / before) ** (1.0 / (order - 1))) if before > 0.0 else h
+    return SAFETY * (min(h, (bound / before) ** (1.0 / (order - 1))) if before > 0.0 else h)
 
 
 @jit
