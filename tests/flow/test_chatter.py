@@ -15,7 +15,8 @@ from scipy.integrate import quad
 
 from saltus.flow import EventKind, simulate
 from saltus.flow import kernel as k
-from saltus.flow.simulation import _advance, _prepare, program
+from saltus.flow.compile import load_kernel
+from saltus.flow.simulation import _prepare, program
 from saltus.systems import EnergyRestitution
 
 
@@ -47,7 +48,9 @@ def averaged_speed(system, v0, duration):
     """The speed of the kernel's CHATTER mode after a time, from its own state (a motion at contact reports 0)."""
     run = program(system)
     where, state, settings = _prepare(system, run, np.zeros(1), np.array([v0]), None, duration, 0.0, 1e-14)
-    _advance(system, run, where, state, settings)
+    steps = (np.empty((64, 2), dtype=np.int64), np.empty((64, 2)), np.empty((64, 1, where[k.ORDER] + 2)))
+    events = (np.empty((64, 4), dtype=np.int64), np.empty((64, 3)))
+    assert load_kernel()(where, state, settings, run.env, run.model, steps, events) == k.DONE
     assert where[k.MODE] == k.CHATTER
     return state[k.SPEED]
 
