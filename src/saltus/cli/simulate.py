@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 if TYPE_CHECKING:
     from saltus.config import Study
     from saltus.flow import Motion
 
 MOST_SAMPLES = 1_000_000  # written unless the study asks for more
+LONG = 20_000  # periods; beyond this a motion is sampled as it goes, so that memory is bounded
 
 
 def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
@@ -30,12 +31,12 @@ def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
     output = Path("results") / study.name if output is None else output
     check_writable(output)
     console, messages = Console(highlight=False), Console(stderr=True, highlight=False)
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn())
     with Progress(*columns, console=messages, transient=True, disable=not messages.is_terminal) as progress:
-        task = progress.add_task("")
+        task = progress.add_task("", total=1.0)
         tell = _teller(messages, progress, task)
         tell(f"computing {path}")
-        motion = study.run()
+        motion = study.run(progress=lambda done: progress.update(task, completed=done), samples=long_samples(study))
         tell(f"writing to {output}")
         files = write_motion(motion, study, output, plot)
     print_summary(motion, console)
@@ -70,11 +71,26 @@ def write_motion(motion: Motion, study: Study, output: Path, plot: bool) -> list
     return files
 
 
+def long_samples(study: Study) -> Any:
+    """The times at which to keep the states of a motion too long to be kept whole, or None for one that is not."""
+    import numpy as np
+
+    settings, period = study.settings(), study.system.load.period
+    span = settings.duration if settings.periods is None else settings.periods * (period or 1.0)
+    if span is None or span / (period or 2 * np.pi) <= LONG:
+        return None
+    return np.linspace(settings.time, settings.time + span, settings.samples or MOST_SAMPLES)
+
+
 def sample_times(motion: Motion, samples: int | None) -> Any:
     """Evenly spaced times over a motion, or None for its own choice where that is no more than `MOST_SAMPLES`."""
     import numpy as np
 
     period = motion.system.load.period
-    if samples is None and (period is None or 200 * (motion.time - motion.start) / period <= MOST_SAMPLES):
+    if (
+        motion.samples is not None
+        or samples is None
+        and (period is None or 200 * (motion.time - motion.start) / period <= MOST_SAMPLES)
+    ):
         return None
     return np.linspace(motion.start, motion.time, MOST_SAMPLES if samples is None else samples)

@@ -21,11 +21,11 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
     from saltus import __version__
 
     period = motion.system.load.period
-    if times is None:
-        count = 10 * SAMPLES if period is None else int(np.ceil(SAMPLES * (motion.time - motion.start) / period))
-        times = np.linspace(motion.start, motion.time, max(2, count + 1))
-    times = np.atleast_1d(np.asarray(times, dtype=float))
-    position, velocity, side = motion._states(times)
+    if times is None and motion.samples is not None:
+        times, position, velocity, side = (getattr(motion.samples, n) for n in ("time", "position", "velocity", "side"))
+    else:
+        times = _default_times(motion, period) if times is None else np.atleast_1d(np.asarray(times, dtype=float))
+        position, velocity, side = motion._states(times)
     names = motion.system.model.coordinates
     dataset = xarray.Dataset(coords={"time": ("time", times, {"units": "1", "long_name": "dimensionless time tau"})})
     for i, name in enumerate(names):
@@ -45,9 +45,14 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
         "stop": motion.stop.value + (f" ({motion.limit})" if motion.limit else ""),
         "end_time": motion.time,
         "phase_known": str(motion.phase_known),
-        "validity": str(motion.validity),
+        "validity": str(motion.validity) if motion.dense or motion.sampled_validity else "not kept",
         "Conventions": "CF-1.8",
     }
     if motion.rest_time is not None:
         dataset.attrs["rest_time"] = motion.rest_time
     return dataset
+
+
+def _default_times(motion: Motion, period: float | None) -> np.ndarray:
+    count = 10 * SAMPLES if period is None else int(np.ceil(SAMPLES * (motion.time - motion.start) / period))
+    return np.linspace(motion.start, motion.time, max(2, count + 1))

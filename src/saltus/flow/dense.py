@@ -19,6 +19,11 @@ class DenseOutput:
     side: np.ndarray
     series: np.ndarray
 
+    @property
+    def end(self) -> float:
+        """When the last step ends."""
+        return float(self.start[-1] + self.length[-1])
+
     def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Coordinates and velocities, each (degrees of freedom, n), and sides (n,); at an impact, those after it."""
         step = np.clip(np.searchsorted(self.start, times, side="right") - 1, 0, None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -12,11 +11,13 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow.dense import DenseOutput
-from saltus.flow.validity import Validity, check_validity
+from saltus.flow.validity import Validity, ValidityCheck
 from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
+
+    from saltus.flow.recorder import Events
 
 
 class Stop(StrEnum):
@@ -63,6 +64,16 @@ class Crossings:
 
 
 @dataclass(frozen=True, eq=False)
+class Samples:
+    """States at given times: `time` (n,), `position` and `velocity` (degrees of freedom, n), `side` (n,), 0 at rest."""
+
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    side: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Motion:
     """An exact motion of a system.
 
@@ -80,9 +91,11 @@ class Motion:
     stop: Stop
     limit: str | None  # the margin that stopped it
     periods: int  # whole forcing periods since time 0
-    events: Sequence[Event]
+    events: Events
     crossings: Crossings
     dense: DenseOutput | None
+    samples: Samples | None
+    sampled_validity: Validity | None
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name == "system" or name not in self.system.model.coordinates:
@@ -101,12 +114,12 @@ class Motion:
         """The time from which the system rests until the end, or None."""
         if self.stop is not Stop.REST:
             return None
-        return next(e.time for e in reversed(self.events) if e.kind is EventKind.REST)
+        return self.events.of(EventKind.REST)[-1].time
 
     @property
     def phase_known(self) -> bool:
         """Whether the phase is exact: False once impacts without loss were averaged (see `EventKind.CHATTER`)."""
-        return not any(e.kind is EventKind.CHATTER for e in self.events)
+        return len(self.events.of(EventKind.CHATTER)) == 0
 
     def at(self, times: Any) -> tuple[Any, Any]:
         """Coordinate and velocity at any times of the motion, at the method's accuracy; after the impact at an impact.
@@ -126,12 +139,12 @@ class Motion:
         return position, velocity
 
     def _states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        if self.dense is None:
-            raise ParameterError("this motion was computed with dense=False, so only its end and its events are known")
+        if self.dense is None and self.time > self.start:
+            raise ParameterError("this motion was not kept densely: only its end, its events and its `samples` are known")
         slack = 1e-12 * max(1.0, abs(self.time))
         if times.size and not (times.min() >= self.start - slack and times.max() <= self.time + slack):
             raise ParameterError(f"times must lie in [{self.start:g}, {self.time:g}], the span of the motion")
-        if self.dense.start.size == 0:
+        if self.dense is None:
             position, velocity = np.atleast_1d(self.position), np.atleast_1d(self.velocity)
             tile = np.ones(times.size)
             return position[:, None] * tile, velocity[:, None] * tile, self.side * tile
@@ -139,11 +152,22 @@ class Motion:
 
     @cached_property
     def validity(self) -> Validity:
-        """Whether the mechanism could move so: limits passed, and the share of time with a wrong reaction (errata 20, 21)."""
-        return check_validity(self)
+        """Whether the mechanism could move so: limits passed, and the share of time with a wrong reaction (errata 20, 21).
+
+        Raises:
+            ParameterError: a motion computed with dense=False and without samples.
+        """
+        if self.sampled_validity is not None:
+            return self.sampled_validity
+        if self.dense is None and self.time > self.start:
+            raise ParameterError("a motion computed with dense=False has no validity; leave dense out, or give samples=...")
+        check = ValidityCheck(self.system)
+        if self.dense is not None:
+            check.add(self.dense)
+        return check.result(self.time - self.start)
 
     def to_xarray(self, times: Any = None) -> xarray.Dataset:
-        """The motion as a dataset with units and provenance; by default 200 samples a forcing period (or 2000 in all)."""
+        """The motion as a dataset with units and provenance; by default its samples, or 200 a forcing period, or 2000 in all."""
         from saltus.flow.dataset import to_dataset
 
         return to_dataset(self, times)

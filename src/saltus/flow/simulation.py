@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,22 +12,14 @@ import numpy as np
 from saltus.errors import MotionError, ParameterError, near
 from saltus.flow import kernel as k
 from saltus.flow.compile import Structure, load_kernel, load_structure
-from saltus.flow.motion import Crossings, DenseOutput, Event, EventKind, Motion, Stop
+from saltus.flow.motion import Motion, Stop
+from saltus.flow.recorder import Recorder
 from saltus.flow.trace import Trace, record_table, trace
 from saltus.systems import Record, System
 from saltus.systems.checks import check_number
 from saltus.systems.parameters import children, is_number, numbers
 
-BUFFER = 4096  # steps, and events, that one call of the kernel may record
 MOST_EVENTS = 20_000_000  # beyond this an accumulation of impacts is not being resolved but endured
-EVENT_KINDS = (
-    EventKind.CROSSING,
-    EventKind.GRAZING,
-    EventKind.REST,
-    EventKind.RELEASE,
-    EventKind.CHATTER,
-    EventKind.LIMIT,
-)  # in the order of the kernel's numbers
 
 
 @dataclass(frozen=True)
@@ -77,6 +69,8 @@ def simulate(
     side: int | None = None,
     stop_at: Iterable[str] = (),
     dense: bool = True,
+    samples: Any = None,
+    progress: Callable[[float], object] | None = None,
     **coordinates: float,
 ) -> Motion:
     """The exact motion of a system from a state, event by event, by Taylor series.
@@ -89,7 +83,9 @@ def simulate(
         time: the dimensionless time at the start.
         side: +1 or -1, the side to leave by where the motion from rest at contact is not unique.
         stop_at: margins of the model that end the motion, such as "kinematic_limit"; its own `stops` always do.
-        dense: keep the motion between the events; False saves memory over very many periods.
+        dense: keep the motion between the events; False keeps the events alone.
+        samples: times at which to keep the states instead, for a motion too long to be kept whole.
+        progress: called with the fraction done, now and then.
         coordinates: the state at the start by the model's names: theta=0.3, or x=0.0 for a wall oscillator.
 
     Raises:
@@ -104,8 +100,18 @@ def simulate(
         raise ParameterError(f"side must be +1 or -1, got {side!r}")
     run = program(system, limits)
     where, state, settings = _prepare(system, run, position, speeds, periods, duration, float(time), tol)
-    where[k.FORCED], where[k.DENSE] = side or 0, int(dense)
-    return _collect(system, run, where, state, settings, float(time), *_advance(system, run, where, state, settings))
+    sample_times = None if samples is None else _sample_times(samples, float(time))
+    recorder = Recorder(system, int(where[k.ORDER]), float(settings[k.LENGTH]), dense, sample_times)
+    where[k.FORCED], where[k.DENSE] = side or 0, int(dense or samples is not None)
+    status = _advance(system, run, where, state, settings, recorder, progress)
+    return _collect(system, run, where, state, settings, float(time), status, recorder)
+
+
+def _sample_times(samples: Any, start: float) -> np.ndarray:
+    times = np.atleast_1d(np.asarray(samples, dtype=float))
+    if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0).any() or (times < start).any():
+        raise ParameterError(f"samples must be times that do not decrease, from the start {start:g} on, got {samples!r}")
+    return times
 
 
 def _start_state(system: System, velocity: Any, coordinates: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -190,29 +196,30 @@ def _choose_side(system: System, where: np.ndarray, position: np.ndarray, speeds
 
 
 def _advance(
-    system: System, run: Program, where: np.ndarray, state: np.ndarray, settings: np.ndarray
-) -> tuple[int, list[list[np.ndarray]], list[list[np.ndarray]]]:
-    """Call the kernel until the motion ends, emptying its buffers in between."""
-    dof, order = len(system.model.coordinates), int(where[k.ORDER])
-    size = BUFFER if where[k.DENSE] else 8
-    steps = (np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
-    events = (np.empty((BUFFER, 4), dtype=np.int64), np.empty((BUFFER, 3)))
-    kept_steps: list[list[np.ndarray]] = []
-    kept_events: list[list[np.ndarray]] = []
-    total, advance = 0, load_kernel()
+    system: System,
+    run: Program,
+    where: np.ndarray,
+    state: np.ndarray,
+    settings: np.ndarray,
+    recorder: Recorder,
+    progress: Callable[[float], object] | None,
+) -> int:
+    """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended."""
+    advance, begin = load_kernel(), _global_time(where, state, settings)
+    end = where[k.LAST] * settings[k.LENGTH] + settings[k.END]
     while True:
-        status = advance(where, state, settings, run.env, run.model, steps, events)
-        kept_steps.append([a[: where[k.STEPS]].copy() for a in steps])
-        kept_events.append([a[: where[k.EVENTS]].copy() for a in events])
-        total += int(where[k.EVENTS])
-        where[k.STEPS] = where[k.EVENTS] = 0
+        status = advance(where, state, settings, run.env, run.model, recorder.steps, recorder.events)
+        recorder.take(where)
+        time = _global_time(where, state, settings)
+        if progress is not None and end > begin:
+            progress((time - begin) / (end - begin))
         if status not in (k.FULL, k.PAUSED):
             _refuse(system, status, where, state, settings)
-            return status, kept_steps, kept_events
-        if total > MOST_EVENTS:
+            return status
+        if recorder.total > MOST_EVENTS:
             raise MotionError(
-                f"more than {MOST_EVENTS} impacts before time {_global_time(where, state, settings):.6g}: they accumulate "
-                "too slowly to be followed; raise the loss at impact, or ask for a shorter time"
+                f"more than {MOST_EVENTS} impacts before time {time:.6g}: they accumulate too slowly to be followed; "
+                "raise the loss at impact, or ask for a shorter time"
             )
 
 
@@ -248,46 +255,31 @@ def _collect(
     settings: np.ndarray,
     start: float,
     status: int,
-    steps: list[list[np.ndarray]],
-    events: list[list[np.ndarray]],
+    recorder: Recorder,
 ) -> Motion:
     """The motion from the kernel's last state and its records."""
-    length = settings[k.LENGTH]
-    labels, values = (np.concatenate([chunk[i] for chunk in events]) for i in (0, 1))
-    times = labels[:, 0] * length + values[:, 0]
-    hit = labels[:, 1] == k.CROSSING
-    crossings = Crossings(times[hit], labels[hit, 2].astype(np.int8), values[hit, 1], values[hit, 2])
+    events, time = recorder.all_events(), _global_time(where, state, settings)
     held = where[k.MODE] in (k.REST, k.CHATTER)
     stop, limit = (Stop.REST if where[k.MODE] == k.REST else Stop.HORIZON), None
     if status == k.LIMITED:
-        stop, limit = Stop.LIMIT, run.limits[labels[-1, 3]]
+        stop, limit = Stop.LIMIT, run.limits[events.last_detail]
     dof = len(system.model.coordinates)
     position, velocity = state[k.STATE : k.STATE + dof], state[k.STATE + dof :]
+    samples = recorder.samples(time)
     return Motion(
         system=system,
         tol=float(settings[k.TOLERANCE]),
         start=start,
-        time=_global_time(where, state, settings),
+        time=time,
         position=float(position[0]) if dof == 1 else tuple(position.tolist()),
         velocity=float(velocity[0]) if dof == 1 else tuple(velocity.tolist()),
         side=0 if held else int(where[k.SIDE]),
         stop=stop,
         limit=limit,
         periods=int(where[k.PERIOD]),
-        events=EventList(times, labels, values),
-        crossings=crossings,
-        dense=_dense(steps, length) if where[k.DENSE] else None,
+        events=events,
+        crossings=events.crossings(),
+        dense=recorder.dense(),
+        samples=samples,
+        sampled_validity=None if samples is None else recorder.validity(time - start),
     )
-
-
-def _dense(steps: list[list[np.ndarray]], length: float) -> DenseOutput:
-    labels, spans, series = (np.concatenate([chunk[i] for chunk in steps]) for i in (0, 1, 2))
-    return DenseOutput(labels[:, 0] * length + spans[:, 0], spans[:, 1], labels[:, 1], series)
-
-
-class EventList(list[Event]):
-    """The events of a motion in order of time."""
-
-    def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray) -> None:
-        rows = zip(times.tolist(), labels[:, 1:3].tolist(), values[:, 1:].tolist(), strict=True)
-        super().__init__(Event(t, EVENT_KINDS[kind], side, before, after) for t, (kind, side), (before, after) in rows)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, TraceError, near
+from saltus.errors import ParameterError, SaltusError, TraceError, near
 from saltus.flow.graph import POINTWISE, Expr, combine, differentiate, number, ordered, substitute
 from saltus.systems import Record, System
 from saltus.systems.parameters import substitute as substitute_numbers
@@ -92,7 +92,7 @@ def trace(system: System, stop_at: tuple[str, ...] = ()) -> Trace:
     velocities = tuple(Expr("velocity", (), i) for i in range(dof))
     side = Expr("side") if model.sides else number(1.0)
     q, v = (coordinates[0], velocities[0]) if dof == 1 else (coordinates, velocities)
-    accelerations = model.acceleration(t, q, v, side, load)
+    accelerations = ask(model, "acceleration", t, q, v, side, load)
     result.acceleration = [combine("add", a, 0.0) for a in ((accelerations,) if dof == 1 else accelerations)]
     if len(result.acceleration) != dof:
         raise TraceError(f"{type(system.model).__name__}.acceleration must return {dof} values, got {len(result.acceleration)}")
@@ -101,6 +101,21 @@ def trace(system: System, stop_at: tuple[str, ...] = ()) -> Trace:
     _trace_margins(result, twin, t, q, v, side, stop_at)
     _check(result, type(system.model).__name__)
     return result
+
+
+def ask(model: Any, method: str, *arguments: Any) -> Any:
+    """Call a model's method; a mistake in a user's own code becomes a sentence that names it.
+
+    Raises:
+        TraceError: any other exception than saltus's own, with its type and text (and itself as the cause).
+    """
+    try:
+        return getattr(model, method)(*arguments)
+    except SaltusError:
+        raise
+    except Exception as error:
+        name = f"{type(model).__name__}.{method}"
+        raise TraceError(f"{name} failed while it was traced: {type(error).__name__}: {error}") from error
 
 
 def _name_records(load: Any) -> None:
@@ -117,13 +132,13 @@ def _trace_contact(result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v
     model, load = twin.model, twin.load
     if len(q) != 1:
         raise TraceError("a model with sides must have one coordinate; give it `sides = ()` and stop at margins instead")
-    result.gap = combine("add", model.gap(q[0], side), 0.0)
+    result.gap = combine("add", ask(model, "gap", q[0], side), 0.0)
     result.contact = combine("add", model.contact, 0.0)
     at_contact: dict[Expr, Any] = {q[0]: result.contact, v[0]: 0.0}
     result.gap_rate = substitute(differentiate(result.gap, q[0]), at_contact)
     result.contact_acceleration = result.gap_rate * substitute(result.acceleration[0], at_contact)
     result.contact_damping = -substitute(differentiate(result.acceleration[0], v[0]), at_contact)
-    next_side, after = model.reset(t, v[0], side, load, twin.impact)
+    next_side, after = ask(model, "reset", t, v[0], side, load, twin.impact)
     result.next_side, result.velocity_after = combine("add", next_side, 0.0), combine("add", after, 0.0)
 
 
@@ -132,7 +147,7 @@ def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: 
         return
     dof = len(twin.model.coordinates)
     a = tuple(Expr("acceleration", (), i) for i in range(dof))
-    margins = twin.model.margins(t, q, v, a[0] if dof == 1 else a, side, twin.load)
+    margins = ask(twin.model, "margins", t, q, v, a[0] if dof == 1 else a, side, twin.load)
     for name in stop_at:
         if name not in margins:
             raise ParameterError(f"{type(twin.model).__name__} has no margin {name!r} to stop at; {near(name, margins)}")

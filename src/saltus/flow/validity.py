@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from saltus.flow.dense import evaluate
+from saltus.flow.dense import DenseOutput, evaluate
+from saltus.systems import System
 
-if TYPE_CHECKING:
-    from saltus.flow.motion import Motion
-
-SAMPLES = 12  # in each step, before the bisection: a step is shorter than a margin's own time scale
-BISECTIONS = 50
+SAMPLES = 12  # in each step, to find changes of sign: a step is shorter than a margin's own time scale
+ITERATIONS = 12  # of the Illinois method: its order is 1.44, and two would do for most
 
 
 @dataclass(frozen=True)
@@ -37,32 +35,45 @@ class Validity:
         )
 
 
-def check_validity(motion: Motion) -> Validity:
-    """Evaluate the model's margins along the dense output; each change of sign is bisected to rounding.
+class ValidityCheck:
+    """Evaluates the model's margins along dense output, given in one piece or in several; their zeros are found to rounding.
 
     A margin that is passed and regained within a twelfth of one step may be missed. Rest is left out: nothing moves there.
     """
-    names = _margins(motion, np.array([motion.start]), np.array([0]))
-    dense = motion.dense
-    if not names or dense is None or dense.start.size == 0:
-        return Validity(dict.fromkeys(names), dict.fromkeys(names, 0.0))
-    moving = np.flatnonzero((dense.side != 0) & (dense.length > 0))
-    fraction = np.linspace(0.0, 1.0, SAMPLES + 1)
-    step = np.repeat(moving, SAMPLES + 1)
-    tau = (dense.length[moving, None] * fraction).ravel()
-    values = _margins(motion, tau, step)
-    first: dict[str, float | None] = {}
-    share = {}
-    for name in names:
-        first[name], beyond = _beyond(motion, name, values[name], tau, step)
-        share[name] = beyond / (motion.time - motion.start)
-    return Validity(first, share)
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+        side = (*system.model.sides, 1)[0]
+        state: Any = 0.0 if len(system.model.coordinates) == 1 else (0.0,) * len(system.model.coordinates)
+        names = system.model.margins(0.0, state, state, state, side, system.load)
+        self._first: dict[str, float | None] = dict.fromkeys(names)
+        self._beyond: dict[str, float] = dict.fromkeys(names, 0.0)
+
+    def add(self, dense: DenseOutput) -> None:
+        """Go on along the next piece."""
+        moving = np.flatnonzero((dense.side != 0) & (dense.length > 0))
+        if not self._first or not moving.size:
+            return
+        step = np.repeat(moving, SAMPLES + 1)
+        tau = (dense.length[moving, None] * np.linspace(0.0, 1.0, SAMPLES + 1)).ravel()
+        for name, value in _margins(self._system, dense, tau, step, _grid(dense, moving)).items():
+            first, beyond = _beyond(self._system, dense, name, value, tau, step)
+            self._beyond[name] += beyond
+            if self._first[name] is None:
+                self._first[name] = first
+
+    def result(self, duration: float) -> Validity:
+        """The verdict on a motion of that duration."""
+        return Validity(
+            dict(self._first), {name: beyond / duration if duration else 0.0 for name, beyond in self._beyond.items()}
+        )
 
 
-def _beyond(motion: Motion, name: str, value: np.ndarray, tau: np.ndarray, step: np.ndarray) -> tuple[float | None, float]:
+def _beyond(
+    system: System, dense: DenseOutput, name: str, value: np.ndarray, tau: np.ndarray, step: np.ndarray
+) -> tuple[float | None, float]:
     """The first time at which a margin is negative, and for how long it is, from its samples on every step."""
-    dense = motion.dense
-    assert dense is not None
+    value = np.broadcast_to(value, tau.shape)
     left, right = np.arange(value.size - 1), np.arange(1, value.size)
     same = step[left] == step[right]
     left, right = left[same], right[same]
@@ -71,32 +82,64 @@ def _beyond(motion: Motion, name: str, value: np.ndarray, tau: np.ndarray, step:
     starts = np.where(out_left, dense.start[step[left]] + tau[left], np.inf)
     mixed = np.flatnonzero(out_left != out_right)
     if mixed.size:
-        low, high = tau[left[mixed]], tau[right[mixed]]
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (low + high)
-            like_left = (_margins(motion, middle, step[left[mixed]])[name] < 0) == out_left[mixed]
-            low, high = np.where(like_left, middle, low), np.where(like_left, high, middle)
-        spent[mixed] = np.where(out_left[mixed], low - tau[left[mixed]], tau[right[mixed]] - low)
-        crossing = dense.start[step[left[mixed]]] + low
-        starts[mixed] = np.where(out_left[mixed], starts[mixed], crossing)
+        change = _sign_change(system, dense, name, value, tau, step, left[mixed], right[mixed])
+        spent[mixed] = np.where(out_left[mixed], change - tau[left[mixed]], tau[right[mixed]] - change)
+        starts[mixed] = np.where(out_left[mixed], starts[mixed], dense.start[step[left[mixed]]] + change)
     first = starts.min() if starts.size else np.inf
     return (float(first) if np.isfinite(first) else None), float(spent.sum())
 
 
-def _margins(motion: Motion, tau: np.ndarray, step: np.ndarray) -> dict[str, Any]:
+def _sign_change(
+    system: System,
+    dense: DenseOutput,
+    name: str,
+    value: np.ndarray,
+    tau: np.ndarray,
+    step: np.ndarray,
+    left: np.ndarray,
+    right: np.ndarray,
+) -> np.ndarray:
+    """Where a margin changes its sign between the samples `left` and `right`, by the Illinois method for all at once."""
+    low, high, at_low, at_high = tau[left], tau[right], value[left], value[right]
+    between = low
+    for _ in range(ITERATIONS):
+        gap = at_high - at_low
+        between = np.where(gap == 0, low, (low * at_high - high * at_low) / np.where(gap == 0, 1.0, gap))
+        here = _margins(system, dense, between, step[left])[name]
+        like_low = (here < 0) == (at_low < 0)
+        low, high = np.where(like_low, between, low), np.where(like_low, high, between)
+        at_low, at_high = np.where(like_low, here, 0.5 * at_low), np.where(like_low, 0.5 * at_high, here)
+    return between
+
+
+def _grid(dense: DenseOutput, moving: np.ndarray) -> list[np.ndarray]:
+    """Coordinates, velocities and accelerations at SAMPLES + 1 even times of every moving step: matrix products, for speed."""
+    coefficients, h = dense.series[moving], dense.length[moving]
+    fraction = np.linspace(0.0, 1.0, SAMPLES + 1)
+    state = []
+    for _ in range(3):
+        powers = np.arange(coefficients.shape[2])
+        values = (coefficients * h[:, None, None] ** powers) @ fraction ** powers[:, None]
+        state.append(values.transpose(1, 0, 2).reshape(values.shape[1], -1))
+        coefficients = coefficients[:, :, 1:] * powers[1:]
+    return state
+
+
+def _states(dense: DenseOutput, tau: np.ndarray, step: np.ndarray) -> list[np.ndarray]:
+    """Coordinates, velocities and accelerations at the times `tau` after the starts of the given steps."""
+    coefficients = dense.series[step]
+    state = []
+    for _ in range(3):
+        state.append(evaluate(coefficients, tau))
+        coefficients = coefficients[:, :, 1:] * np.arange(1, coefficients.shape[2])
+    return state
+
+
+def _margins(
+    system: System, dense: DenseOutput, tau: np.ndarray, step: np.ndarray, state: list[np.ndarray] | None = None
+) -> dict[str, Any]:
     """The model's margins at the times `tau` after the starts of the given steps, from the steps' own series."""
-    system, dense = motion.system, motion.dense
-    if dense is None or dense.start.size == 0:
-        zero = np.zeros(len(system.model.coordinates))
-        state = [zero, zero, zero]
-        t, side = np.asarray(motion.start), np.asarray(motion.side or 1)
-    else:
-        coefficients = dense.series[step]
-        state = []
-        for _ in range(3):
-            state.append(evaluate(coefficients, tau))
-            coefficients = coefficients[:, :, 1:] * np.arange(1, coefficients.shape[2])
-        t, side = dense.start[step] + tau, np.where(dense.side[step] == 0, 1, dense.side[step])
+    theta, velocity, acceleration = _states(dense, tau, step) if state is None else state
     if len(system.model.coordinates) == 1:
-        state = [x[0] for x in state]
-    return system.model.margins(t, state[0], state[1], state[2], side, system.load)
+        theta, velocity, acceleration = theta[0], velocity[0], acceleration[0]
+    return system.model.margins(dense.start[step] + tau, theta, velocity, acceleration, dense.side[step], system.load)

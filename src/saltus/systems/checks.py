@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,8 @@ def check_number(
         ParameterError: with the name, the range and the value, and a hint where degrees look likely.
     """
     number = isinstance(value, (float, int, np.floating, np.integer)) and not isinstance(value, bool)
+    if number and isinstance(value, int) and abs(value) > sys.float_info.max:
+        value = math.inf
     wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
     if not number:
         kind = wanted.replace("lie in", "be a number in").replace("be finite", "be a finite number")

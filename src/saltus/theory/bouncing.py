@@ -76,7 +76,7 @@ def turning_point(layer: Layer, energy: float) -> float:
     nodes = [0.0, *zeros_of_slope(layer), layer.kinematic_limit]
     for a, b in pairwise(nodes):
         if layer.potential(b) >= energy:
-            return float(brentq(lambda x: layer.potential(x) - energy, a, b, xtol=1e-300, rtol=1e-15))
+            return float(brentq(lambda x: layer.potential(x) - energy, a, b, xtol=1e-300, rtol=1e-15, maxiter=5000))
     raise ParameterError(f"the motion passes the kinematic limit abs(theta) = {layer.kinematic_limit:.6g} rad; start lower")
 
 

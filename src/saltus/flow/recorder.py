@@ -1,0 +1,132 @@
+"""What is kept of a motion while it is computed: all of it, the states at given times, or its events alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, overload
+
+import numpy as np
+
+from saltus.flow import kernel as k
+from saltus.flow.dense import DenseOutput
+from saltus.flow.motion import Crossings, Event, EventKind, Samples
+from saltus.flow.validity import Validity, ValidityCheck
+from saltus.systems import System
+
+BUFFER = 4096  # steps, and events, that one call of the kernel may record
+EVENT_KINDS = (
+    EventKind.CROSSING,
+    EventKind.GRAZING,
+    EventKind.REST,
+    EventKind.RELEASE,
+    EventKind.CHATTER,
+    EventKind.LIMIT,
+)  # in the order of the kernel's numbers
+
+
+class Events(Sequence[Event]):
+    """The events of a motion in order of time, made one by one from the kernel's arrays."""
+
+    def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray) -> None:
+        self._times, self._labels, self._values = times, labels, values
+
+    def __len__(self) -> int:
+        return int(self._times.size)
+
+    @overload
+    def __getitem__(self, index: int) -> Event: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Event]: ...
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            return Events(self._times[index], self._labels[index], self._values[index])
+        kind, side = self._labels[index, 1:3]
+        before, after = self._values[index, 1:].tolist()
+        return Event(float(self._times[index]), EVENT_KINDS[kind], int(side), before, after)
+
+    def __repr__(self) -> str:
+        counts = {kind.value: int(np.sum(self._labels[:, 1] == i)) for i, kind in enumerate(EVENT_KINDS)}
+        return f"Events({', '.join(f'{n} {kind}' for kind, n in counts.items() if n)})"
+
+    def of(self, kind: EventKind) -> Events:
+        """The events of one kind."""
+        chosen = self._labels[:, 1] == EVENT_KINDS.index(kind)
+        return Events(self._times[chosen], self._labels[chosen], self._values[chosen])
+
+    @property
+    def last_detail(self) -> int:
+        """What the kernel noted with the last event: of a limit, which margin it is."""
+        return int(self._labels[-1, 3])
+
+    def crossings(self) -> Crossings:
+        """The impacts, as arrays."""
+        impacts = self.of(EventKind.CROSSING)
+        labels, values = impacts._labels, impacts._values
+        return Crossings(impacts._times, labels[:, 2].astype(np.int8), values[:, 1], values[:, 2])
+
+
+class Recorder:
+    """Takes the kernel's buffers whenever they are full.
+
+    With `sample_times` the dense output of each buffer is sampled, checked for validity and dropped, so that memory is
+    bounded by the samples and the events.
+    """
+
+    def __init__(self, system: System, order: int, length: float, dense: bool, sample_times: np.ndarray | None) -> None:
+        dof, size = len(system.model.coordinates), BUFFER if dense or sample_times is not None else 8
+        self.steps = (np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
+        self.events = (np.empty((BUFFER, 4), dtype=np.int64), np.empty((BUFFER, 3)))
+        self.total = 0  # events so far
+        self._length, self._times = length, sample_times
+        self._pieces: list[DenseOutput] = []
+        self._events: list[tuple[np.ndarray, ...]] = []
+        self._samples: list[tuple[np.ndarray, ...]] = []
+        self._next = 0  # index of the first sample time that is still to come
+        self._check = ValidityCheck(system)
+
+    def take(self, where: np.ndarray) -> None:
+        """Empty the buffers."""
+        labels, spans, series = (a[: where[k.STEPS]].copy() for a in self.steps)
+        if labels.size:
+            self._add(DenseOutput(labels[:, 0] * self._length + spans[:, 0], spans[:, 1], labels[:, 1], series))
+        self._events.append(tuple(a[: where[k.EVENTS]].copy() for a in self.events))
+        self.total += int(where[k.EVENTS])
+        where[k.STEPS] = where[k.EVENTS] = 0
+
+    def _add(self, piece: DenseOutput) -> None:
+        if self._times is None:
+            self._pieces.append(piece)
+            return
+        self._sample(piece, int(np.searchsorted(self._times, piece.end, side="left")))
+        self._check.add(piece)
+        self._pieces = [piece]
+
+    def _sample(self, piece: DenseOutput, stop: int) -> None:
+        assert self._times is not None
+        times = self._times[self._next : stop]
+        self._samples.append((times, *piece.states(times)))
+        self._next = max(stop, self._next)
+
+    def all_events(self) -> Events:
+        """Everything that happened."""
+        labels, values = (np.concatenate([chunk[i] for chunk in self._events]) for i in (0, 1))
+        return Events(labels[:, 0] * self._length + values[:, 0], labels, values)
+
+    def dense(self) -> DenseOutput | None:
+        """The whole dense output, or None where it was not kept."""
+        if self._times is not None or not self._pieces:
+            return None
+        fields = ("start", "length", "side", "series")
+        return DenseOutput(*(np.concatenate([getattr(piece, name) for piece in self._pieces]) for name in fields))
+
+    def samples(self, end: float) -> Samples | None:
+        """The states at the sample times up to the end, or None where none were asked for."""
+        if self._times is None:
+            return None
+        if self._pieces:
+            self._sample(self._pieces[-1], int(np.searchsorted(self._times, end * (1 + 1e-15), side="right")))
+        return Samples(*(np.concatenate([chunk[i] for chunk in self._samples], axis=-1) for i in range(4)))
+
+    def validity(self, duration: float) -> Validity:
+        """The verdict on what was sampled and dropped."""
+        return self._check.result(duration)
