@@ -1,9 +1,11 @@
 """Verdicts follow from numbers, and the paper's errata are all among the claims."""
 
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from saltus.paper import FIGURES, Verdict
 from saltus.paper.claim import check, compare, printed_unit, tally, to_markdown
+from saltus.plots.style import style
 
 WHERE = {"id": "x", "where": "eq", "statement": "s", "evidence": "e"}
 ERRATA = {*range(1, 22), 23, 25, 26, 27}  # those of sections 2 to 5 and of the appendix
@@ -64,12 +66,14 @@ def test_the_table_escapes_bars_and_counts_verdicts():
     assert tally(claims) == "2 claims: 1 agree, 0 agree with an erratum, 1 disagree."
 
 
-def test_every_erratum_of_sections_2_to_5_is_proved_by_a_computed_claim_and_nothing_disagrees():
+def test_every_erratum_is_proved_by_a_computed_claim_nothing_disagrees_and_no_picture_is_clipped():
     claims = []
     for figure in FIGURES.values():
         data = figure.compute(**figure.parameters)
         _check_provenance(figure.name, data)
         claims += figure.claims(data)
+        if figure.draw is not None:
+            assert clipped(figure.draw(data)) == [], figure.name
     assert len({claim.id for claim in claims}) == len(claims)
     assert [claim.id for claim in claims if claim.verdict is Verdict.DISAGREES] == []
     assert {claim.erratum for claim in claims if claim.verdict is Verdict.ERRATUM} == ERRATA
@@ -82,3 +86,15 @@ def _check_provenance(name, data):
         assert "what" in node.attrs, name
         for variable in node.data_vars:
             assert node[variable].attrs.get("units"), f"{name}: {variable} has no units"
+
+
+def clipped(picture):
+    """The parts of a picture, axes with all their labels and texts, that reach beyond its edges by more than a pixel."""
+    with style():
+        FigureCanvasAgg(picture).draw()
+    frame = picture.bbox.padded(1.0)
+    parts = list(picture.texts)
+    for axes in picture.axes:  # a box in space may be larger than the picture; its axes may not
+        parts += [axes.xaxis, axes.yaxis, axes.zaxis] if hasattr(axes, "zaxis") else [axes]
+    boxes = [(part, part.get_tightbbox(picture.canvas.get_renderer())) for part in parts]
+    return [part for part, box in boxes if not (frame.contains(box.x0, box.y0) and frame.contains(box.x1, box.y1))]

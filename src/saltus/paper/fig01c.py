@@ -11,7 +11,7 @@ from saltus.paper.figure import PaperFigure
 from saltus.paper.portrait import circled, portrait, system
 from saltus.paper.provenance import TOLERANCE, tree
 from saltus.plots.energy_space import draw_space
-from saltus.plots.style import new_figure, styled
+from saltus.plots.style import SINGLE_COLUMN, new_figure, styled
 
 STARTS = [(2.3, 0.0), (-2.38, 0.0), (2.5, 0.0)]
 DURATION = 70.0
@@ -32,8 +32,8 @@ def compute(samples: int = 1600) -> Any:
 @styled
 def draw(data: Any) -> Any:
     """One view of the space, with the plane of discontinuity."""
-    figure = new_figure(110.0, 92.0, layout=None)
-    ax = figure.add_axes((-0.04, -0.02, 1.02, 1.1), projection="3d")
+    figure = new_figure(SINGLE_COLUMN, 78.0, layout=None)
+    ax = figure.add_axes((-0.08, 0.0, 0.98, 1.08), projection="3d")
     draw_space(ax, data["space"])
     return figure
 

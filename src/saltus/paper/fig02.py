@@ -10,14 +10,14 @@ from saltus.paper.claim import Claim
 from saltus.paper.figure import PaperFigure
 from saltus.paper.provenance import dataset, tree
 from saltus.plots.style import DOUBLE_COLUMN, new_figure, panel_label, styled
-from saltus.plots.unit_cell import draw_cell, draw_frames, label_deformed, label_undeformed
+from saltus.plots.unit_cell import draw_cell, draw_frames, label_deformed, label_heights, label_undeformed
 
 STATES = {"undeformed": (0.0, 0.0), "deformed": (12.0, -8.0)}  # theta_1, theta_2 in degrees
 
 
 def compute(alpha0: float = 38.0, beta0: float = 75.0) -> Any:
     """Positions of every point and the angles of both layers in both states; `alpha0` and `beta0` in degrees."""
-    from saltus.systems.unit_cell import UnitCell
+    from saltus.systems import UnitCell
 
     cell = UnitCell(alpha0=np.deg2rad(alpha0), beta0=np.deg2rad(beta0))
     groups = {name: _state(cell, *np.deg2rad(angles)) for name, angles in STATES.items()}
@@ -57,9 +57,10 @@ def draw(data: Any) -> Any:
     label_undeformed(left, points, data["undeformed"])
     points = draw_cell(right, data["deformed"].to_dataset())
     label_deformed(right, points, data["deformed"])
+    label_heights(right, points, 2.12)
     draw_frames(right, np.array([-0.95, -0.55]), points["lower_left"])
     for ax, label in ((left, "a"), (right, "b")):
-        ax.set_xlim(-1.05, 2.3)
+        ax.set_xlim(-1.0, 2.4)
         ax.set_ylim(-0.72, 2.5)
         panel_label(ax, label)
     return figure

@@ -18,8 +18,7 @@ SPAN = 1.5  # of time before the impact
 def compute(alpha0: float = 45.0, samples: int = 400) -> Any:
     """theta, phi and their rates until the first impact from theta = 0.4 at rest, beta0 = 80 deg; `alpha0` in degrees."""
     from saltus.flow import simulate
-    from saltus.systems import Load, Metainterface, System
-    from saltus.systems.unit_cell import UnitCell
+    from saltus.systems import Load, Metainterface, System, UnitCell
 
     beta0 = np.deg2rad(80.0)
     cell = UnitCell(alpha0=np.deg2rad(alpha0), beta0=beta0)

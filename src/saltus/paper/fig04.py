@@ -77,6 +77,14 @@ def claims(data: Any) -> list[Claim]:
             evidence=f"equilibria {np.round(a['equilibrium'].values, 5).tolist()}, stable {stable.round(5).tolist()}",
         ),
         check(
+            "fig04-feasible",
+            "section 1",
+            "Three stable attractors exist within the feasible range of deformations",
+            printed=len(stable) == 3 and bool(np.abs(stable).max() < float(a["line_limit"])),
+            evidence=f"|θ_I| = {np.rad2deg(stable[-1]):.2f}°, before the straight line at "
+            f"{np.rad2deg(float(a['line_limit'])):.0f}°",
+        ),
+        check(
             "fig04a-regions",
             "Fig. 4a",
             "Without losses a motion goes round one attractor inside its separatrix, and round all three outside",

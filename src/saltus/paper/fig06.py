@@ -90,12 +90,15 @@ def draw(data: Any) -> Any:
 
 def claims(data: Any) -> list[Claim]:
     """Peaks and periods, and erratum 7."""
+    from saltus.theory import unloaded_period
+
     a, velocity, energy = data["a"], data["b_velocity"], data["b_energy"]
     ratios = {name: _ratio(data[name]) for name in ("a", "b_velocity", "b_energy")}
     shift = float(np.abs(ratios["b_velocity"] - ratios["b_velocity"][0]).max())
     kept = float(np.abs(ratios["b_energy"] - ratios["b_energy"][0]).max())
     right = float(np.abs(ratios["b_velocity"] / velocity["ratio_theory"].values - 1).max())
     change = velocity["energy_ratio"].values
+    limits = [float(unloaded_period(k, m)) for k, m in ((1e12, 0.0), (1e-12, 0.0), (1.0, 1e12))]
     periods = max(float(np.abs(d["period"] / d["period_theory"] - 1).max()) for d in (a, velocity, energy))
     return [
         check(
@@ -120,6 +123,14 @@ def claims(data: Any) -> list[Claim]:
             "T0 = π (1 + √((1+m)/k)), whatever the amplitude",
             printed=periods,
             evidence="time between the first and the third impact of 12 simulated motions, with e = 1 and with r = 1",
+        ),
+        check(
+            "fig06-period-limits",
+            "section 5.3",
+            "T0 → π for k → ∞, and grows without bound for k → 0 or m → ∞",
+            printed=bool(limits[0] - np.pi < 1e-5 and limits[1] > 1e5 and limits[2] > 1e5),
+            evidence=f"T0 = {limits[0]:.7f} at k = 10¹², {limits[1]:.3g} at k = 10⁻¹², {limits[2]:.3g} at m = 10¹²; simulated at "
+            f"k = {STIFFNESS[-1]:g}: {float(a['period'][-1]):.6f}",
         ),
         check(
             "fig06-mass",

@@ -132,7 +132,7 @@ def claims(data: Any) -> list[Claim]:
         check(
             "pot-balance-side",
             "pot_balance, Fig. 7",
-            "P_R does not depend on which side starts",
+            "P_R is a function of V and k for a given |θ₀|, whichever side starts",
             printed=min(here, 1 / here) - min(there, 1 / there),
             corrected=bool(abs(min(here, 1 / here) - min(there, 1 / there)) > 1e-6),
             erratum=6,

@@ -77,7 +77,8 @@ def _energies(rng: np.random.Generator, impacts: int) -> dict[str, Any]:
     from saltus.theory import energy_factor, energy_jump
 
     counts = dict.fromkeys(("sign_printed", "sign_corrected"), 0)
-    worst = dict.fromkeys(("r_printed", "r_corrected", "change_at_e_1"), 0.0)
+    worst = dict.fromkeys(("r_printed", "r_corrected"), 0.0)
+    changes = []
     for i in range(impacts):
         single, double, load = random_case(rng)
         if i % 2:
@@ -95,8 +96,8 @@ def _energies(rng: np.random.Generator, impacts: int) -> dict[str, Any]:
             r, falls = _as_printed(load, single.beta0, velocity, e)
             counts["sign_printed"] += bool(falls != (jump < 0))
             worst["r_printed"] = max(worst["r_printed"], abs(r / (after / before) - 1))
-            worst["change_at_e_1"] = max(worst["change_at_e_1"], abs(_both_masses(double, load, velocity, -side) / before - 1))
-    return {**counts, **worst}
+            changes.append(abs(_both_masses(double, load, velocity, -side) / before - 1))
+    return {**counts, **worst, "change_at_e_1": float(np.median(changes))}
 
 
 def _both_masses(double: Any, load: Any, velocity: float, side: int) -> float:
@@ -231,7 +232,7 @@ def claims(data: Any) -> list[Claim]:
             printed=r["change_at_e_1"],
             corrected=r["change_at_e_1"] > 1e-3,
             erratum=5,
-            evidence=f"with ν' ≠ 0 it changes, by a factor up to {1 + r['change_at_e_1']:.1f}: the vertical "
+            evidence=f"with ν' ≠ 0 it changes, here by {r['change_at_e_1']:.0%} in the median: the vertical "
             "velocity of the mass turns round",
         ),
         check(

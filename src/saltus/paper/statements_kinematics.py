@@ -22,7 +22,7 @@ def compute() -> Any:
 
 
 def _cell(alpha0: float, beta0: float) -> dict[str, float]:
-    from saltus.systems.unit_cell import UnitCell
+    from saltus.systems import UnitCell
 
     cell = UnitCell(alpha0=alpha0, beta0=beta0)
     theta = np.linspace(1e-3, 0.95 * cell.line_limit, 60)
@@ -70,7 +70,7 @@ def _drawn(cell: Any, openings: np.ndarray) -> dict[str, float]:
 
 def _limits() -> dict[str, float]:
     """The straight line and the kinematic limit at beta0 = 80 degrees."""
-    from saltus.systems.unit_cell import UnitCell
+    from saltus.systems import UnitCell
 
     cell = UnitCell(alpha0=math.radians(45), beta0=math.radians(80))
     theta = np.linspace(0, cell.kinematic_limit, 2001)
@@ -88,7 +88,7 @@ def _limits() -> dict[str, float]:
 
 def _dimensions() -> dict[str, float]:
     """One cell written in seconds and in milliseconds: what changes has a dimension. tau against tau = t sqrt(M2 / K2)."""
-    from saltus.systems.si_units import PhysicalCell
+    from saltus.systems import PhysicalCell
 
     seconds = PhysicalCell(length=0.2, upper_mass=1.5, upper_stiffness=3.0, upper_damping=0.07)
     millis = PhysicalCell(length=0.2, upper_mass=1.5, upper_stiffness=3.0e-6, upper_damping=0.07e-3)

@@ -15,7 +15,16 @@ BETA0, VERTICAL, SMALL = math.radians(80.0), -0.5, 1e-6
 
 def compute(e: float = 0.8) -> Any:
     """Periods, decay and equilibria, from the exact motion and from the closed forms."""
-    values = {**_periods(), **_decay(e), **_equilibria(), **_potential(), **_divergence(), **_linear_solution()}
+    values = {
+        **_periods(),
+        **_decay(e),
+        **_equilibria(),
+        **_potential(),
+        **_divergence(),
+        **_linear_solution(),
+        **_frequencies(),
+        **_upright(),
+    }
     return dataset({name: ((), value) for name, value in values.items()}, what="small vibrations", tol=TOLERANCE, e=e)
 
 
@@ -124,6 +133,34 @@ def _divergence() -> dict[str, float]:
     }
 
 
+def _frequencies() -> dict[str, float]:
+    """Omega_0 and mu of `fre_freq_xi` against the derivatives of the acceleration just beside theta = 0."""
+    from saltus.theory import vibrations
+
+    system, worst, h = free(damping=0.3, stiffness=1.7).with_({"model.mass_ratio": 0.6}), 0.0, 1e-4
+    for side, vibration in zip((1, -1), vibrations(system), strict=True):
+        a = [system.model.acceleration(0.0, side * x, 0.0, side, system.load) for x in (0.0, h, 2 * h)]
+        slope = side * (-3 * a[0] + 4 * a[1] - a[2]) / (2 * h)
+        drag = system.model.acceleration(0.0, 0.0, 1.0, side, system.load) - a[0]
+        omega, mu = vibration.frequency, vibration.damping_ratio
+        worst = max(worst, abs(omega**2 + slope), abs(2 * mu * omega + drag))
+    return {"frequencies": float(worst)}
+
+
+def _upright() -> dict[str, float]:
+    """theta_A and its energy under the full equation against the paper's forms, beta0 = 89.9 deg, V = -1.3, k = 1.1."""
+    from saltus.theory import equilibria
+
+    vertical, k, beta0 = -1.3, 1.1, math.radians(89.9)
+    full = min((p for p in equilibria(free(vertical, stiffness=k, beta0=beta0)) if p.theta > 0), key=lambda p: p.theta)
+    kappa, push = k + vertical * math.sin(beta0), vertical * math.cos(beta0)
+    return {
+        "theta_a_form": full.theta / (push / kappa) - 1,
+        "theta_a_upright": full.theta / (vertical / (k + vertical) * (math.pi / 2 - beta0)) - 1,
+        "energy_form": full.energy / (-(push**2) / (2 * kappa)) - 1,
+    }
+
+
 def _linear_solution() -> dict[str, float]:
     """Impact times of the piecewise-linear solution against the exact motion of small amplitude, with damping and loss."""
     from saltus.flow import simulate
@@ -153,6 +190,22 @@ def claims(data: Any) -> list[Claim]:
             "θ = 0 is stable for V cos β₀ < 0 and unstable for V cos β₀ > 0",
             printed=bool(r["stability_signs"]),
             evidence="both signs of V, β₀ below and above 90°",
+        ),
+        check(
+            "frequencies",
+            "fre_freq_xi",
+            "Apparent frequencies and damping ratios of both layers",
+            printed=r["frequencies"],
+            tolerance=1e-6,
+            evidence="derivatives of the acceleration beside θ = 0, k = 1.7, m = 0.6, C = 0.3",
+        ),
+        check(
+            "non-trivial",
+            "non-trivial, potential energy differences",
+            "θ_A, its form for β₀ close to 90°, and its energy above the undeformed state",
+            printed=max(abs(r["theta_a_form"]), abs(r["theta_a_upright"]), abs(r["energy_form"])),
+            tolerance=1e-3,
+            evidence="against the equilibrium of the full equation, β₀ = 89.9°, V = −1.3, k = 1.1",
         ),
         check(
             "minmin",

@@ -22,8 +22,7 @@ EXAMPLES: tuple[tuple[float, tuple[float, float], float], ...] = (
 
 def compute(beta0: float = 80.0) -> Any:
     """The rows, an example state after each kind of impact on the lower layer, and its name; `beta0` in degrees."""
-    from saltus.systems import TwoLayer
-    from saltus.systems.scenarios import table_1
+    from saltus.systems import TwoLayer, table_1
 
     model = TwoLayer(beta0=np.deg2rad(beta0))
     rows = table_1()
@@ -46,7 +45,7 @@ def compute(beta0: float = 80.0) -> Any:
 
 def _example(model: Any, theta_2: float, before: tuple[float, float], after_1: float, row: int) -> dict[str, Any]:
     """An impact on the lower layer whose velocity becomes `after_1`; the other velocity follows from its momentum balance."""
-    from saltus.systems.scenarios import LayerState, name_impact, other_impulse
+    from saltus.systems import LayerState, name_impact, other_impulse
 
     theta = (0.0, theta_2)
     matrix = model.mass_matrix(theta)
@@ -71,7 +70,7 @@ def _example(model: Any, theta_2: float, before: tuple[float, float], after_1: f
 def _refusal(model: Any) -> Any:
     """Whether an impact across which an angle jumps, as Table 1 prints it, is refused."""
     from saltus.errors import ParameterError
-    from saltus.systems.scenarios import LayerState, name_impact
+    from saltus.systems import LayerState, name_impact
 
     try:
         name_impact(LayerState((0.0, OPEN), (-0.5, 0.2)), LayerState((0.0, OPEN / 2), (0.0, 0.2)), model=model)

@@ -30,8 +30,9 @@ def draw_space(ax: Any, data: Any) -> None:
     ax.set_ylabel(r"$\dot\theta$", labelpad=1)
     ax.set_zlabel(r"energy$\,/K_2$", labelpad=-3)
     ax.tick_params(pad=-1)
+    ax.set_yticks([-1, -0.5, 0, 0.5, 1])
     ax.view_init(elev=24, azim=-58)
-    ax.set_box_aspect((1.25, 1.1, 0.9), zoom=0.98)
+    ax.set_box_aspect((1.25, 1.1, 0.9), zoom=0.95)
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.pane.set_facecolor("white")
         axis.pane.set_edgecolor("#cccccc")

@@ -46,6 +46,9 @@ def label_undeformed(ax: Any, points: dict[str, np.ndarray], cell: Any) -> None:
     _angles(ax, points, (alpha, alpha), (beta, beta), (r"$\alpha_0$", r"$\alpha_0$"), (r"$\beta_0$", r"$\beta_0$"))
     dimension(ax, points["lower_left"], points["middle_left"], r"$l$", offset=0.17, shift=0.09)
     dimension(ax, points["middle_left"], points["upper_left"], r"$l$", offset=0.17, shift=0.09)
+    base = r"$l\,\sin(\alpha_0+\beta_0)\,/\sin\alpha_0$"
+    dimension(ax, points["lower_left"], points["lower_right"], base, offset=-0.32, shift=0.11)
+    dimension(ax, points["middle_right"], points["slider_2_in"], r"$\lambda l$", offset=-0.12, shift=0.1)
     for name, at, where, ha in (
         ("A", "lower_right", (0.12, 0.02), "left"),
         ("B", "upper_right", (0.12, -0.02), "left"),
@@ -88,6 +91,16 @@ def label_deformed(ax: Any, points: dict[str, np.ndarray], cell: Any) -> None:
         ax.annotate("", xy=at + _xy(0.0, size), xytext=at, arrowprops={**ARROW, "color": FORCE}, zorder=6)
         ax.text(*(at + _xy(size - 0.06, 0.1)), rf"$H_{j}$", color=FORCE, ha="center", va="center")
         ax.text(*(at + _xy(0.05, size)), rf"$V_{j}$", color=FORCE, ha="left", va="center")
+
+
+def label_heights(ax: Any, points: dict[str, np.ndarray], x: float) -> None:
+    """The heights eta_j l of both layers as dimension lines at the abscissa `x`."""
+    levels = [points[name][1] for name in ("lower_right", "middle_right", "upper_right")]
+    for name, level in zip(("lower_right", "middle_right", "upper_right"), levels, strict=True):
+        ax.plot([points[name][0] + 0.16, x + 0.05], [level, level], color=INK, lw=0.4)
+    for j in (1, 2):
+        ends = _xy(x, levels[j]), _xy(x, levels[j - 1])
+        dimension(ax, *ends, rf"$\eta_{j}\,l$", shift=0.13)
 
 
 def draw_frames(ax: Any, origin: np.ndarray, ground: np.ndarray) -> None:
