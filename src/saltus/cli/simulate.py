@@ -87,10 +87,7 @@ def sample_times(motion: Motion, samples: int | None) -> Any:
     import numpy as np
 
     period = motion.system.load.period
-    if (
-        motion.samples is not None
-        or samples is None
-        and (period is None or 200 * (motion.time - motion.start) / period <= MOST_SAMPLES)
-    ):
+    short = period is None or 200 * (motion.time - motion.start) / period <= MOST_SAMPLES
+    if motion.samples is not None or (samples is None and short):
         return None
     return np.linspace(motion.start, motion.time, MOST_SAMPLES if samples is None else samples)

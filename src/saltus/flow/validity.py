@@ -11,7 +11,7 @@ from saltus.flow.dense import DenseOutput, evaluate
 from saltus.systems import System
 
 SAMPLES = 12  # in each step, to find changes of sign: a step is shorter than a margin's own time scale
-ITERATIONS = 12  # of the Illinois method: its order is 1.44, and two would do for most
+ITERATIONS = 8  # of Ridders' method, which doubles the digits each time and halves the bracket at the least
 
 
 @dataclass(frozen=True)
@@ -99,17 +99,23 @@ def _sign_change(
     left: np.ndarray,
     right: np.ndarray,
 ) -> np.ndarray:
-    """Where a margin changes its sign between the samples `left` and `right`, by the Illinois method for all at once."""
+    """Where a margin changes its sign between the samples `left` and `right`, by Ridders' method for all at once."""
     low, high, at_low, at_high = tau[left], tau[right], value[left], value[right]
-    between = low
+    root = low
     for _ in range(ITERATIONS):
-        gap = at_high - at_low
-        between = np.where(gap == 0, low, (low * at_high - high * at_low) / np.where(gap == 0, 1.0, gap))
-        here = _margins(system, dense, between, step[left])[name]
-        like_low = (here < 0) == (at_low < 0)
-        low, high = np.where(like_low, between, low), np.where(like_low, high, between)
-        at_low, at_high = np.where(like_low, here, 0.5 * at_low), np.where(like_low, 0.5 * at_high, here)
-    return between
+        middle = 0.5 * (low + high)
+        at_middle = _margins(system, dense, middle, step[left])[name]
+        spread = np.sqrt(at_middle**2 - at_low * at_high)
+        shift = np.where(
+            spread > 0, (middle - low) * np.sign(at_low - at_high) * at_middle / np.where(spread > 0, spread, 1.0), 0.0
+        )
+        root = np.clip(middle + shift, low, high)
+        at_root = _margins(system, dense, root, step[left])[name]
+        for x, at_x in ((middle, at_middle), (root, at_root)):
+            inside, like_low = (x >= low) & (x <= high), (at_x < 0) == (at_low < 0)
+            low, at_low = np.where(inside & like_low, x, low), np.where(inside & like_low, at_x, at_low)
+            high, at_high = np.where(inside & ~like_low, x, high), np.where(inside & ~like_low, at_x, at_high)
+    return root
 
 
 def _grid(dense: DenseOutput, moving: np.ndarray) -> list[np.ndarray]:
