@@ -51,7 +51,7 @@ def claims(data: Any) -> list[Claim]:
     """The fixed points, and what the text says of each panel."""
     a, b, c = data["a"], data["b"], data["c"]
     stable = a["equilibrium"].values[a["stable"].values.astype(bool)]
-    rounds_a = circled(a)
+    rounds_a, wrong = circled(a), a["wrong_reaction"].values
     outer_b = [i for i, (theta, _) in enumerate(STARTS["b"]) if abs(theta) > 2 or abs(theta) < 0.5]
     inner_b = [i for i in range(len(STARTS["b"])) if i not in outer_b]
     rounds_c = [len(r) for r in circled(c)]
@@ -91,6 +91,13 @@ def claims(data: Any) -> list[Claim]:
             printed=sorted({len(r) for r in rounds_a}) == [1, 3] and _closed(a),
             evidence=f"attractors circled by the {len(rounds_a)} motions: {[len(r) for r in rounds_a]}; each "
             "separatrix ends at a saddle",
+        ),
+        check(
+            "fig04a-one-layer",
+            "Fig. 4a",
+            "In these motions one layer stays closed while the other is open",
+            printed=bool(wrong.max() == 0),
+            evidence=f"share of the time in which the closed layer's reaction has the wrong sign: {wrong.round(3).tolist()}",
         ),
         check(
             "fig04a-energy",

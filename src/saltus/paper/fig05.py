@@ -45,8 +45,8 @@ def claims(data: Any) -> list[Claim]:
     """theta_I (erratum 9), the separatrix regions, and the motion round two equilibria."""
     found = {name: _summary(data[name]) for name in ("a", "b", "symmetric")}
     (soft, _, soft_area), (stiff, _, stiff_area), (_, _, area) = (found[n] for n in ("a", "b", "symmetric"))
-    wrong = 1.384
-    stiffness = VERTICAL * float(np.cos(BETA0 + wrong)) / wrong
+    misprint, wrong = 1.384, data["a"]["wrong_reaction"].values
+    stiffness = VERTICAL * float(np.cos(BETA0 + misprint)) / misprint
     rest = np.array(circled(data["a"])[1]), np.array(circled(data["b"])[2])
     return [
         compare(
@@ -67,7 +67,7 @@ def claims(data: Any) -> list[Claim]:
             erratum=9,
             value=stiff,
             unit="rad",
-            evidence=f"root of P'(θ) = 0; at θ = {wrong} the moments balance for k = V cos(β₀ + θ)/θ = {stiffness:.4f}",
+            evidence=f"root of P'(θ) = 0; at θ = {misprint} the moments balance for k = V cos(β₀ + θ)/θ = {stiffness:.4f}",
         ),
         check(
             "fig05a-region",
@@ -105,6 +105,15 @@ def claims(data: Any) -> list[Claim]:
             evidence=f"θ_II = {found['a'][1]:.6f} for k = 0.5 and {found['b'][1]:.6f} for k = 1.1",
         ),
         check(
+            "fig05a-one-layer",
+            "Fig. 5a",
+            "In these motions one layer stays closed while the other is open",
+            printed=bool(wrong.max() == 0),
+            corrected=bool(wrong.max() > 0),
+            erratum=21,
+            evidence=f"share of the time in which the closed layer's reaction has the wrong sign: {wrong.round(3).tolist()}",
+        ),
+        check(
             "fig05a-limit",
             "line_cond",
             "Rotations have no limit but the energy",
@@ -113,7 +122,8 @@ def claims(data: Any) -> list[Claim]:
             erratum=20,
             evidence="for k = 0.5 the outer separatrix reaches θ = "
             f"{np.nanmax(data['a']['manifold_theta'].values):.4f} rad, past the "
-            f"kinematic limit {float(data['a']['kinematic_limit']):.4f} rad, where the slider has closed again",
+            f"kinematic limit {float(data['a']['kinematic_limit']):.4f} rad, where the slider has closed again; the motion from "
+            f"θ = {STARTS['a'][-1][0]} spends {float(data['a']['beyond_limit'][-1]):.1%} of its time there",
         ),
     ]
 

@@ -43,6 +43,14 @@ def portrait(system: System, starts: Sequence[tuple[float, float]], duration: fl
             "energy": (("trajectory", "sample"), _energy(system, theta, velocity), "K2", "kinetic and potential energy"),
             "end": ("trajectory", [m.theta for m in motions], "rad", "theta at the end"),
             "impacts": ("trajectory", [len(m.crossings) for m in motions], "1", "impacts in the time shown"),
+            "wrong_reaction": (
+                "trajectory",
+                _shares(motions, "reaction"),
+                "1",
+                "share of time in which the closed layer would open",
+            ),
+            "beyond_line": ("trajectory", _shares(motions, "line_limit"), "1", "share of time beyond the straight line"),
+            "beyond_limit": ("trajectory", _shares(motions, "kinematic_limit"), "1", "share of time beyond the kinematic limit"),
             "manifold_theta": (
                 ("manifold", "point"),
                 padded([b.theta for b in branches]),
@@ -108,6 +116,10 @@ def loop_area(data: Any, saddle: float) -> float:
     theta, velocity = data["manifold_theta"][i].values, data["manifold_velocity"][i].values
     known = np.isfinite(theta) & np.isfinite(velocity)
     return float(abs(np.trapezoid(velocity[known], theta[known])))
+
+
+def _shares(motions: Sequence[Any], margin: str) -> list[float]:
+    return [float(motion.validity.share[margin]) for motion in motions]
 
 
 def _energy(system: System, theta: np.ndarray, velocity: np.ndarray) -> np.ndarray:

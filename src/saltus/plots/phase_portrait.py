@@ -47,7 +47,8 @@ def _hidden(data: Any) -> np.ndarray:
             floor = float(data["equilibrium_energy"][i]) + (EYE if points[i] else CORE)
             theta = data["theta"].values
             hidden |= (theta > low) & (theta < high) & (data["energy"].values < floor)
-    return hidden
+    decays = np.nanmax(data["energy"].values, axis=1) - np.nanmin(data["energy"].values, axis=1) > 1e-9
+    return hidden & decays[:, None]
 
 
 def _arrow_places(theta: np.ndarray, velocity: np.ndarray, width: float, height: float, spacing: float) -> list[int]:
