@@ -183,7 +183,8 @@ FIGURE = PaperFigure(
         "motions; grey dashed: separatrices, computed as the stable manifolds of the saddles; filled: stable, "
         "open: unstable fixed "
         "points; grey line: impact at θ = 0, where velocities jump in (b); green: straight line at |θ| = π − β₀ "
-        "= 100° (erratum 19)."
+        "= 100° (erratum 19). Decaying motions are drawn until they come close to their attractor; in (b) the "
+        "manifolds that separate no two attractors are left out."
     ),
     compute=compute,
     draw=draw,
