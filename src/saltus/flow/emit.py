@@ -55,7 +55,7 @@ class Emitter:
     def _constants(self) -> str:
         """The function that fills the table `c` from the parameters `p`, once for a motion."""
         names = {node: f"c[{i}]" for node, i in self.constants.items()}
-        lines = ["@cached_jit(CONSTANTS)", "def constants(p, c):"]
+        lines = ["@cached_jit(CONSTANTS, fused=False)", "def constants(p, c):"]
         for node in ordered(list(self.constants)):
             if node.op in ("number", "parameter"):
                 continue
@@ -80,7 +80,7 @@ class Emitter:
 
     def _pointwise(self, signature: str, name: str, arguments: str, roots: list[Expr | None]) -> str:
         """A function of one instant that returns the values of `roots`."""
-        decorator = f"@cached_jit({signature})"
+        decorator = f"@cached_jit({signature}, fused=False)"
         names: dict[Expr, str] = {}
 
         def ref(node: Expr) -> str:

@@ -17,9 +17,13 @@ OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
 jit: Callable[[Any], Any] = njit(**OPTIONS)
 
 
-def cached_jit(signature: Any) -> Callable[[Any], Any]:
-    """Compile for one signature at once, and keep the result on disk."""
-    decorator: Callable[[Any], Any] = njit(signature, cache=True, **OPTIONS)
+def cached_jit(signature: Any, fused: bool = True) -> Callable[[Any], Any]:
+    """Compile for one signature at once, and keep the result on disk; without fused multiply-adds if asked.
+
+    A law that takes the difference of two equal products must get 0, not the rounding of one of them.
+    """
+    options = OPTIONS if fused else {**OPTIONS, "fastmath": False}
+    decorator: Callable[[Any], Any] = njit(signature, cache=True, **options)
     return decorator
 
 
