@@ -7,9 +7,9 @@ A motion is in one of four modes. ARC: a smooth motion on one side. CONTACT: at 
 contact until an acceleration points outward. CHATTER: impacts without loss, too small and too many to follow one by one.
 
 `env` = (parameters, constants, record breakpoints, record table). `model` = (the four functions; the coordinate at contact and
-the gap's rate of change with the coordinate there, on sides +1 and -1). `work` = (q, v, a, g, m, w, poly, b): the Taylor
+the gap's rate of change with the coordinate there, on sides +1 and -1). `work` = (q, v, a, g, m, w, poly, b, end): the Taylor
 coefficients of coordinates, velocities, accelerations, gap and margins, the workspace of their recurrences, a scaled
-polynomial, and the contact accelerations of both sides.
+polynomial, the contact accelerations of both sides, and the first five once more at the end of a step.
 """
 
 from __future__ import annotations
@@ -26,25 +26,14 @@ from saltus.flow.roots import NEVER, SIMPLE, first_root, horner, scale_gap
 ARC, CONTACT, REST, CHATTER = 0, 1, 2, 3  # modes
 DONE, FULL, PAUSED, NOT_UNIQUE, NO_IMPACT, NOT_FINITE, STALLED, LIMITED = 0, 1, 2, 3, 4, 5, 6, 7  # why `advance` returns
 CROSSING, GRAZING, RESTING, RELEASE, CHATTERING, LIMIT = 0, 1, 2, 3, 4, 5  # events
-PERIOD, MODE, SIDE, SKIP, PIECE, STEPS, EVENTS, LAST, ORDER, DENSE, FORCED, HELD = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    7,
-    8,
-    9,
-    10,
-    11,
-)  # in `where`,
+PERIOD, MODE, SIDE, SKIP, PIECE, STEPS = 0, 1, 2, 3, 4, 5  # in `where`,
+EVENTS, LAST, ORDER, DENSE, FORCED, HELD = 6, 7, 8, 9, 10, 11
 DOF, STOPS, ROWS, SIDES = 12, 13, 14, 15  # and the structure's: coordinates, margins, workspace rows, sides of the contact
 TIME, SPEED, STATE = 0, 1, 2  # in `state`: local time, chatter speed, then the coordinates and the velocities
 LENGTH, END, TOLERANCE = 0, 1, 2  # in `settings`: the forcing period, the local time at the end, the tolerance
 
 SAFETY = 0.9  # of a step: its error is then a tenth of tol, and 1000 periods add up to a drift in energy below 1e-12
+DEFECT = 100.0  # between a series and the equation at the end of a step, in tol size / h: sound steps stay below 4
 SMALLEST = 1e-6  # size below which a step's error is absolute, not relative
 ZERO = 1e-14  # an acceleration at contact below this is zero: it is a difference of loads of order 1
 EXACT = 1e-15  # at rest a small error of the load would decide whether a touch is a release, and there steps cost little
@@ -66,6 +55,23 @@ def step_size(coefficients, order, size, tol):
     bound = max(size, SMALLEST) * tol
     h = (bound / last) ** (1.0 / order) if last > 0.0 else np.inf
     return SAFETY * (min(h, (bound / before) ** (1.0 / (order - 1))) if before > 0.0 else h)
+
+
+@jit
+def leaps(where, env, model, work, t, origin, h, size, tol):
+    """Whether a step goes past what its series cannot see, such as the bend of a saturated tanh, below rounding from afar.
+
+    The acceleration at the end of the step is then not the one that the series gives there.
+    """
+    q, v, a, _, _, w, _, _, (q_end, v_end, a_end, g_end, m_end) = work
+    order = where[ORDER]
+    for i in range(where[DOF]):
+        q_end[i, 0], v_end[i, 0] = horner(q[i], order, h), horner(v[i], order, h)
+    model[0](t + h, origin, float(where[SIDE]), env, where[PIECE], q_end, v_end, a_end, g_end, m_end, w, 0)
+    defect = 0.0
+    for i in range(where[DOF]):
+        defect = max(defect, abs(a_end[i, 0] - horner(a[i], order, h)))
+    return defect > DEFECT * tol * max(size, SMALLEST) / h
 
 
 @jit
@@ -253,13 +259,15 @@ def contact_root(g, skip, order, h, poly):
 @jit
 def arc(where, state, settings, env, model, work, steps, events, origin, target):
     """One step of a smooth motion, up to the first zero of the gap or of a margin. Returns PAUSED, or why the motion ends."""
-    q, v, a, g, m, w, poly, _ = work
+    q, v, a, g, m, w, poly, _, _ = work
     order, t, size = where[ORDER], state[TIME], 0.0
     for i in range(where[DOF]):
         q[i, 0], v[i, 0] = state[STATE + i], state[STATE + where[DOF] + i]
         size = max(size, abs(q[i, 0]), abs(v[i, 0]))
     model[0](t, origin, float(where[SIDE]), env, where[PIECE], q, v, a, g, m, w, order)
     natural = step_size(v, order, size, settings[TOLERANCE])
+    while leaps(where, env, model, work, t, origin, min(natural, target - t), size, settings[TOLERANCE]):
+        natural = 0.5 * min(natural, target - t)
     h = min(natural, target - t)
     hit, first, touch = -1, NEVER, NEVER
     if where[SIDES] > 0:
@@ -375,6 +383,7 @@ def advance(where, state, settings, env, model, steps, events):
         np.zeros((where[ROWS], order + 6)),
         np.zeros(order + 2),
         np.zeros((2, order + 2)),
+        (np.zeros((dof, 2)), np.zeros((dof, 2)), np.zeros((dof, 2)), np.zeros(2), np.zeros((max(where[STOPS], 1), 2))),
     )
     for _ in range(BATCH):
         if where[STEPS] >= steps[1].shape[0] - 4 or where[EVENTS] >= events[1].shape[0] - 4:
