@@ -17,7 +17,7 @@ from saltus.flow import EventKind, simulate
 from saltus.flow import kernel as k
 from saltus.flow.compile import load_kernel
 from saltus.flow.simulation import _prepare, program
-from saltus.systems import EnergyRestitution
+from saltus.systems import EnergyRestitution, Harmonic, Load, System, WallOscillator
 
 
 def pulls(numbers, t):
@@ -44,10 +44,10 @@ def law(numbers, v0, t, lower_factor=1.0):
     return v0 * (math.exp(-decay) * sum(sums(0)) / sum(sums(t))) ** (1 / 3)
 
 
-def averaged_speed(system, v0, duration):
+def averaged_speed(system, v0, duration, contact=0.0):
     """The speed of the kernel's CHATTER mode after a time, from its own state (a motion at contact reports 0)."""
     run = program(system)
-    where, state, settings = _prepare(system, run, np.zeros(1), np.array([v0]), None, duration, 0.0, 1e-14)
+    where, state, settings = _prepare(system, run, np.array([contact]), np.array([v0]), None, duration, 0.0, 1e-14)
     steps = (np.empty((64, 2), dtype=np.int64), np.empty((64, 2)), np.empty((64, 1, where[k.ORDER] + 2)))
     events = (np.empty((64, 4), dtype=np.int64), np.empty((64, 3)))
     assert load_kernel()(where, state, settings, run.env, run.model, steps, events) == k.DONE
@@ -139,3 +139,22 @@ def test_chatter_never_starts_where_an_impact_loses_speed():
     motion = simulate(driven(e=0.999, C=0.5), theta=0.0, velocity=1e-4, duration=30.0)
     assert motion.phase_known
     assert motion.rest_time is not None
+
+
+@pytest.mark.parametrize("C", [0.0, 0.2])
+def test_on_a_wall_the_action_is_the_cube_of_the_speed_over_the_pull(C):
+    """One side only: v^3 / abs(a) decays at the rate C, whether averaged or resolved."""
+    W, load = 0.3, Harmonic(amplitude=0.4, mean=1.0)
+    wall = System(model=WallOscillator(stiffness=0.0, damping=C, wall=0.7), load=Load(frequency=W, force=load))
+
+    def expected(v0, t):
+        return v0 * ((1.0 + 0.4 * np.sin(W * t)) * np.exp(-C * t)) ** (1 / 3)
+
+    assert averaged_speed(wall, -7e-6, 11.0, contact=0.7) == pytest.approx(expected(7e-6, 11.0), rel=1e-11)
+    errors = []
+    for v0 in (2e-3, 1e-3):
+        crossings = simulate(wall, x=0.7, velocity=-v0, duration=8.0, tol=1e-15).crossings
+        errors.append(np.abs(crossings.velocity_before / expected(v0, crossings.time) - 1).max())
+        assert len(crossings) > 1000
+    assert errors[0] < 1e-2
+    assert errors[1] / errors[0] == pytest.approx(0.25, abs=0.03)  # every flight starts alike: no term of order v

@@ -82,4 +82,5 @@ def test_after_rest_the_determinant_is_zero():
     states = [np.array([0.05, 0.0]), np.array([0.05 + STEP, 0.0]), np.array([0.05, STEP])]
     motions = [end(system, s)[0] for s in states]
     assert all(any(e.kind == "rest" for e in m.events) and m.side != 0 for m in motions)  # rest, then release before the end
-    assert len({(m.theta, m.velocity) for m in motions}) == 1
+    ends = np.array([[m.theta, m.velocity] for m in motions])
+    np.testing.assert_allclose(ends, ends[[0, 0, 0]], rtol=0, atol=1e-15)  # over STEP, a derivative below 1e-12
