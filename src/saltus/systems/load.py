@@ -75,7 +75,7 @@ class Load:
         raise AttributeError("a Load is frozen; system.with_({'load.frequency': ...}) makes a changed copy")
 
     def __getattr__(self, name: str) -> Channel:
-        if name.startswith("__"):
+        if name.startswith("_"):  # IPython, pickle and copy probe for names like these
             raise AttributeError(name)
         return Channel(self.channels.get(name), self.frequency)
 
