@@ -119,12 +119,15 @@ class Recorder:
         fields = ("start", "length", "side", "series")
         return DenseOutput(*(np.concatenate([getattr(piece, name) for piece in self._pieces]) for name in fields))
 
-    def samples(self, end: float) -> Samples | None:
-        """The states at the sample times up to the end, or None where none were asked for."""
+    def samples(self, end: float, position: np.ndarray, velocity: np.ndarray, side: int) -> Samples | None:
+        """The states at the sample times up to the end, where the motion is as given; None where none were asked for."""
         if self._times is None:
             return None
-        if self._pieces:
-            self._sample(self._pieces[-1], int(np.searchsorted(self._times, end * (1 + 1e-15), side="right")))
+        stop = int(np.searchsorted(self._times, end + 1e-15 * abs(end), side="right"))
+        if not self._pieces:  # it has no length
+            one = np.ones(stop)
+            return Samples(self._times[:stop], np.outer(position, one), np.outer(velocity, one), side * one)
+        self._sample(self._pieces[-1], stop)
         return Samples(*(np.concatenate([chunk[i] for chunk in self._samples], axis=-1) for i in range(4)))
 
     def validity(self, duration: float) -> Validity:

@@ -108,7 +108,10 @@ def simulate(
 
 
 def _sample_times(samples: Any, start: float) -> np.ndarray:
-    times = np.atleast_1d(np.asarray(samples, dtype=float))
+    try:
+        times = np.atleast_1d(np.asarray(samples, dtype=float))
+    except (TypeError, ValueError):
+        times = np.array([np.nan])
     if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0).any() or (times < start).any():
         raise ParameterError(f"samples must be times that do not decrease, from the start {start:g} on, got {samples!r}")
     return times
@@ -265,7 +268,8 @@ def _collect(
         stop, limit = Stop.LIMIT, run.limits[events.last_detail]
     dof = len(system.model.coordinates)
     position, velocity = state[k.STATE : k.STATE + dof], state[k.STATE + dof :]
-    samples = recorder.samples(time)
+    side = 0 if held else int(where[k.SIDE])
+    samples = recorder.samples(time, position, velocity, side)
     return Motion(
         system=system,
         tol=float(settings[k.TOLERANCE]),
@@ -273,7 +277,7 @@ def _collect(
         time=time,
         position=float(position[0]) if dof == 1 else tuple(position.tolist()),
         velocity=float(velocity[0]) if dof == 1 else tuple(velocity.tolist()),
-        side=0 if held else int(where[k.SIDE]),
+        side=side,
         stop=stop,
         limit=limit,
         periods=int(where[k.PERIOD]),
