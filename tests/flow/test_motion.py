@@ -29,7 +29,8 @@ def motion():
 
 
 def test_end_state_is_that_of_the_dense_output(motion):
-    assert motion.at(motion.time) == pytest.approx((motion.theta, motion.velocity), abs=1e-14)
+    assert motion.at(motion.time) == (motion.theta, motion.velocity)
+    assert motion.at(motion.time - 1e-12) == pytest.approx((motion.theta, motion.velocity), abs=1e-11)
     assert motion.position == motion.theta
     assert motion.time == pytest.approx(3 * 2 * math.pi, abs=1e-14)
     assert (motion.stop, motion.limit, motion.periods, motion.side) == (Stop.HORIZON, None, 3, int(np.sign(motion.theta)))
@@ -43,6 +44,16 @@ def test_velocity_at_an_impact_is_the_one_after_it(motion):
     assert velocity == pytest.approx(crossings.velocity_after, abs=1e-15)
     _, before = motion.at(crossings.time - 1e-9)
     assert before == pytest.approx(crossings.velocity_before, abs=1e-8)
+
+
+def test_motion_that_ends_at_an_impact_ends_after_it():
+    wall = WALL.with_({"model.wall": 1.0, "load.force.amplitude": 0.9, "impact.e": 0.8})
+    impact = simulate(wall, x=0.0, periods=2).crossings
+    motion = simulate(wall, x=0.0, duration=float(impact.time[0]), samples=[0.0, float(impact.time[0])])
+    kept = simulate(wall, x=0.0, duration=float(impact.time[0]))
+    assert len(motion.crossings) == len(kept.crossings) == 1
+    assert kept.at(kept.time) == (1.0, kept.velocity)
+    assert (motion.samples.velocity[0, -1], kept.velocity) == pytest.approx([impact.velocity_after[0]] * 2, abs=1e-14)
 
 
 def test_states_take_the_shape_of_the_times(motion):
@@ -248,7 +259,7 @@ def test_block_that_overturns_stops_on_its_side():
         fall = math.cos(start - alpha) - math.cos(start + u * u - alpha)
         return 2 * u / math.sqrt(2 * fall)
 
-    expected = quad(slowness, 0, math.sqrt(math.pi / 2 - start), epsabs=1e-13, epsrel=1e-13, limit=400)[0]
+    expected = quad(slowness, 0, math.sqrt(math.pi / 2 - start), epsabs=1e-11, epsrel=1e-11)[0]
     assert (motion.stop, motion.limit) == (Stop.LIMIT, "overturned")
     assert motion.time == pytest.approx(expected, abs=1e-9)
     assert motion.theta == pytest.approx(math.pi / 2, abs=1e-14)
@@ -347,6 +358,7 @@ def test_motion_after_ten_thousand_periods_goes_on_as_from_time_zero():
         ({"theta": 0.3, "velocity": "fast"}, "velocity must be a finite number, got"),
         ({"theta": 0.3, "velocity": None}, "velocity must be a finite number, got None"),
         ({"theta": 0.3, "velocity": (0.0, 1.0)}, "velocity must have 1 value(s), got (0.0, 1.0)"),
+        ({"theta": 0.3, "velocity": [0.0, [1.0]]}, "velocity must have 1 value(s), got [0.0, [1.0]]"),
         ({"theta": 0.3, "time": math.inf}, "time must be finite, got inf"),
         ({"theta": 0.3, "side": 0}, "side must be +1 or -1, got 0"),
         ({"theta": 0.3, "side": "left"}, "side must be +1 or -1, got 'left'"),

@@ -148,7 +148,11 @@ class Motion:
             position, velocity = np.atleast_1d(self.position), np.atleast_1d(self.velocity)
             tile = np.ones(times.size)
             return position[:, None] * tile, velocity[:, None] * tile, self.side * tile
-        return self.dense.states(times)
+        position, velocity, side = self.dense.states(times)
+        end = times >= self.time  # the end itself is known exactly, and after an impact there
+        position[:, end], velocity[:, end] = np.reshape(self.position, (-1, 1)), np.reshape(self.velocity, (-1, 1))
+        side[end] = self.side
+        return position, velocity, side
 
     @cached_property
     def validity(self) -> Validity:

@@ -128,7 +128,11 @@ class Recorder:
             one = np.ones(stop)
             return Samples(self._times[:stop], np.outer(position, one), np.outer(velocity, one), side * one)
         self._sample(self._pieces[-1], stop)
-        return Samples(*(np.concatenate([chunk[i] for chunk in self._samples], axis=-1) for i in range(4)))
+        samples = Samples(*(np.concatenate([chunk[i] for chunk in self._samples], axis=-1) for i in range(4)))
+        last = samples.time >= end  # known exactly, and after an impact there
+        samples.position[:, last], samples.velocity[:, last] = position[:, None], velocity[:, None]
+        samples.side[last] = side
+        return samples
 
     def validity(self, duration: float) -> Validity:
         """The verdict on what was sampled and dropped."""
