@@ -34,7 +34,7 @@ OPERATIONS = {
     "negative": lambda q, v, f, a, b: -q + +v + np.negative(f) + np.positive(q),
     "numpy": lambda q, v, f, a, b: np.add(q, 1.5) * np.subtract(2, v) + np.divide(np.multiply(a, f), 3) + np.square(q + f),
     "whole power": lambda q, v, f, a, b: q**3 - v**2 + (q + 2) ** -2 + q**0 + v**1 + f**5,
-    "high power": lambda q, v, f, a, b: (1 + 0.1 * q) ** 17 + (1.5 + q) ** -19,
+    "high power": lambda q, v, f, a, b: (1 + 0.1 * q) ** 70 + (1.5 + q) ** -66 + q**19,
     "broken power": lambda q, v, f, a, b: (2 + q) ** 1.5 + (2 + v) ** -0.3 + (1.5 + f) ** 0.5,
     "power of a parameter": lambda q, v, f, a, b: (2 + q) ** a + (2 + v) ** (a - b) + a**b + a ** (1 / 3),
     "power of the state": lambda q, v, f, a, b: (2 + q) ** v + 2**q + a**f,

@@ -212,20 +212,34 @@ def test_comparison_in_a_gap_is_refused():
         traced(lambda t, x, v, s, load: -x, sides=(1, -1), gap=lambda self, x, side: np.maximum(side * x, 0.0))
 
 
+def test_misspelt_channel_is_refused_with_the_near_ones():
+    with pytest.raises(TraceError, match=r"Small reads load.forse, not one of its channels; did you mean 'force'"):
+        traced(lambda t, x, v, s, load: load.forse(t) - x)
+
+
+def test_channel_that_is_not_called_is_refused():
+    with pytest.raises(TraceError, match=r"cannot use a load channel .call it with the time, as in load.horizontal.t.."):
+        traced(lambda t, x, v, s, load: load.force * x)
+
+
+def test_what_cannot_be_told_apart_is_refused_in_a_model():
+    @dataclass(frozen=True)
+    class Listed(Model):
+        factors: list
+
+    with pytest.raises(ParameterError, match=r"a model cannot keep a list, got \[1.0\]; give it numbers, an array or a tuple"):
+        structure_key(System(model=Listed([1.0])))
+
+
 def test_dry_friction_is_refused_by_what_it_uses():
     with pytest.raises(TraceError, match="Small uses greater in an acceleration"):
         traced(lambda t, x, v, s, load: np.where(v > 0, -1.0, 1.0) - x, sides=(1, -1))
 
 
 def test_wrong_number_of_accelerations_is_refused():
-    for result, count in (((1.0,), 1), ((1.0, 2.0, 3.0), 3)):
-        with pytest.raises(TraceError, match=rf"Small.acceleration must return 2 values, got {count}"):
+    for result in ((1.0,), (1.0, 2.0, 3.0), 1.0, X):
+        with pytest.raises(TraceError, match=r"Small.acceleration must return 2 values, got "):
             traced(lambda t, x, v, s, load, result=result: result, coordinates=("x", "y"))
-
-
-def test_single_acceleration_for_two_coordinates_is_refused():
-    with pytest.raises(TraceError, match="cannot be unpacked or looped over"):
-        traced(lambda t, x, v, s, load: x[0], coordinates=("x", "y"))
 
 
 def test_sides_with_two_coordinates_are_refused():

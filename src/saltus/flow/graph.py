@@ -208,7 +208,7 @@ def power(base: Any, exponent: Any) -> Expr:
         whole = int(exponent.value) if np.isfinite(exponent.value) else 0
         if exponent.value == 0.5:
             return combine("sqrt", base)
-        if exponent.value == whole and abs(whole) <= 16:
+        if exponent.value == whole and abs(whole) <= 64:
             return _whole_power(base, whole)
     if exponent.degree == 0:
         return combine("pow", base, exponent)

@@ -55,7 +55,11 @@ def structure_key(node: Any) -> Any:
         return type(node), tuple((name, structure_key(part)) for name, part in parts.items())
     if is_number(node):
         return float
-    return (node.shape, node.dtype.str, node.tobytes()) if isinstance(node, np.ndarray) else node
+    if isinstance(node, np.ndarray):
+        return node.shape, node.dtype.str, node.tobytes()
+    if type(node).__hash__ is None:
+        raise ParameterError(f"a model cannot keep a {type(node).__name__}, got {node!r}; give it numbers, an array or a tuple")
+    return node
 
 
 def simulate(
@@ -127,7 +131,10 @@ def _start_state(system: System, velocity: Any, coordinates: dict[str, float]) -
         raise ParameterError(f"the state at the start needs {missing[0]}=...")
     for name in names:
         check_number(name, coordinates[name])
-    speeds = np.atleast_1d(velocity)
+    try:
+        speeds = np.atleast_1d(velocity)
+    except ValueError:
+        raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}") from None
     if speeds.shape != (len(names),):
         raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}")
     for value in speeds:

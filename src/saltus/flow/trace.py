@@ -48,6 +48,19 @@ class LoadTime:
     __hash__ = object.__hash__
 
 
+class DeclaredLoad:
+    """The load that a traced model sees: the channels that it names, so that a misspelt one is not read as 0."""
+
+    def __init__(self, load: Any, model: Any) -> None:
+        self._load, self._model = load, model
+
+    def __getattr__(self, name: str) -> Any:
+        channels = self._model.channels
+        if name not in (*channels, "frequency", "period"):
+            raise TraceError(f"{type(self._model).__name__} reads load.{name}, not one of its channels; {near(name, channels)}")
+        return getattr(self._load, name)
+
+
 @dataclass
 class Trace:
     """The expressions of a system's motion; leaves are the time, the coordinates, the velocities, the side and the parameters.
@@ -86,6 +99,7 @@ def trace(system: System, stop_at: tuple[str, ...] = ()) -> Trace:
     result = Trace(sides=len(system.model.sides))
     twin = substitute_numbers(system, result.symbol)
     _name_records(twin.load)
+    object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
     model, load, t = twin.model, twin.load, LoadTime(result)
     dof = len(model.coordinates)
     coordinates = tuple(Expr("coordinate", (), i) for i in range(dof))
@@ -93,9 +107,9 @@ def trace(system: System, stop_at: tuple[str, ...] = ()) -> Trace:
     side = Expr("side") if model.sides else number(1.0)
     q, v = (coordinates[0], velocities[0]) if dof == 1 else (coordinates, velocities)
     accelerations = ask(model, "acceleration", t, q, v, side, load)
+    if dof > 1 and len(accelerations if isinstance(accelerations, (tuple, list)) else [accelerations]) != dof:
+        raise TraceError(f"{type(system.model).__name__}.acceleration must return {dof} values, got {accelerations!r}")
     result.acceleration = [combine("add", a, 0.0) for a in ((accelerations,) if dof == 1 else accelerations)]
-    if len(result.acceleration) != dof:
-        raise TraceError(f"{type(system.model).__name__}.acceleration must return {dof} values, got {len(result.acceleration)}")
     if model.sides:
         _trace_contact(result, twin, t, coordinates, velocities, side)
     _trace_margins(result, twin, t, q, v, side, stop_at)

@@ -21,6 +21,9 @@ class Channel:
     def __init__(self, signal: Signal | None, frequency: Any) -> None:
         self._signal, self._frequency = signal, frequency
 
+    def __repr__(self) -> str:
+        return "a load channel (call it with the time, as in load.horizontal(t))"
+
     def _derivative(self, t: Any, order: int) -> Any:
         return 0.0 if self._signal is None else self._signal.derivative(t, self._frequency, order)
 
