@@ -1,4 +1,4 @@
-"""Section 4: jumps of acceleration, energy and velocity at impacts (errata 4, 5, 25, 26)."""
+"""Section 4: jumps of acceleration, energy and velocity at impacts (errata 4, 5, 25, 26, and our own 29)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def compute(impacts: int = 400) -> Any:
     rng = np.random.default_rng(3)
     jumps = [_jump(rng, e) for e in np.where(rng.random(impacts // 4) < 0.3, 1.0, rng.uniform(0.1, 1, impacts // 4))]
     values: dict[str, Any] = {name: max(row[name] for row in jumps) for name in jumps[0]}
-    values |= {**_no_jump(), **_energies(rng, impacts), **_still_ground(), **_without_root(), **_inelastic(rng)}
+    values |= {**_no_jump(), **_energies(rng, impacts), **_still_ground(), **_without_root(), **_inelastic(rng), **_pushing(rng)}
     return dataset({name: ((), value) for name, value in values.items()}, what="impacts", impacts=impacts)
 
 
@@ -155,6 +155,27 @@ def _inelastic(rng: np.random.Generator) -> dict[str, float]:
     return {"inelastic": worst, "inelastic_factor": factor, "outside": float(Metainterface(beta0=0.7).inelastic_factor(1))}
 
 
+def _pushing(rng: np.random.Generator) -> dict[str, float]:
+    """How far the least e at which the closed layer's contact still pushes is from -cos(2 beta0), over 1+m going down (29)."""
+    from saltus.systems import LayerState, TwoLayer, other_impulse
+
+    worst = 0.0
+    for beta0, m in zip(rng.uniform(np.pi / 4 + 0.01, 3 * np.pi / 4 - 0.01, 50), rng.uniform(0, 2, 50), strict=True):
+        model = TwoLayer(beta0=float(beta0), mass_ratio=float(m))
+        for layer, closing, mass in ((1, -1.0, 1.0), (2, 1.0, 1.0 + m)):
+            before = LayerState((0.0, 0.0), (closing, 0.0) if layer == 1 else (0.0, closing))
+
+            def impulse(
+                e: float, before: Any = before, layer: int = layer, closing: float = closing, model: Any = model
+            ) -> float:
+                after = LayerState((0.0, 0.0), (0.0, e * closing) if layer == 1 else (e * closing, 0.0))
+                return other_impulse(model, before, after, layer)
+
+            least = -impulse(0.0) / (impulse(1.0) - impulse(0.0))  # the impulse is linear in e
+            worst = max(worst, abs(least + math.cos(2 * beta0) / mass))
+    return {"pushing": worst, "least_e": -math.cos(math.radians(160.0))}
+
+
 def claims(data: Any) -> list[Claim]:
     """Section 4."""
     r = {name: float(value) for name, value in data.to_dataset().items()}
@@ -255,5 +276,16 @@ def claims(data: Any) -> list[Claim]:
             evidence="frictionless inelastic contact: θ'+ = −cos 2β₀ θ'− (over 1+m from the upper layer), here "
             f"{r['inelastic_factor']:.6f} at "
             f"80°, against the solved balance of both layers; {r['outside']:.0f} outside 45° to 135°",
+        ),
+        check(
+            "restitution-range",
+            "vel_red",
+            "Any velocity factor e in (0, 1] is possible at an impact without bouncing",
+            printed=r["least_e"] <= 0,
+            corrected=r["pushing"],
+            tolerance=1e-13,
+            erratum=29,
+            evidence="momentum balance of both layers: the contact of the layer that opened no further can only push, which needs "
+            f"e ≥ −cos 2β₀ (over 1+m going down), here {r['least_e']:.6f} at 80°; Fig. 4b has e = 0.8 (docs/errata.md)",
         ),
     ]
