@@ -285,7 +285,7 @@ def claims(data: Any) -> list[Claim]:
             corrected=r["pushing"],
             tolerance=1e-13,
             erratum=29,
-            evidence="momentum balance of both layers: the contact of the layer that opened no further can only push, which needs "
+            evidence="momentum balance of both layers: the contact of the layer that opens can only push it open, which needs "
             f"e ≥ −cos 2β₀ (over 1+m going down), here {r['least_e']:.6f} at 80°; Fig. 4b has e = 0.8 (docs/errata.md)",
         ),
     ]
