@@ -88,8 +88,8 @@ def agrees(computed, expected, digits=14):
 @pytest.mark.parametrize(("x", "v", "t"), [(0.35, 0.55, 0.0), (-0.45, -0.3, 2.1)])
 def test_taylor_coefficients_of_each_operation(operation, x, v, t):
     generated = Interpreted(System(model=Single(operation=operation), load=LOAD))
-    computed = generated.coefficients(t, x, v, 12, side=math.copysign(1.0, x))[0]
-    expected = solution(lambda t, q, w: OPERATIONS[operation](q, w, force(t), 1.3, 0.6), x, v, t, 12)
+    computed = generated.coefficients(t, x, v, 10, side=math.copysign(1.0, x))[0]
+    expected = solution(lambda t, q, w: OPERATIONS[operation](q, w, force(t), 1.3, 0.6), x, v, t, 10)
     assert agrees(computed, expected)
 
 
@@ -124,15 +124,15 @@ SYSTEMS = {
 @pytest.mark.parametrize("theta", [0.25, -0.4])
 def test_taylor_coefficients_of_the_models(name, theta):
     system, side = SYSTEMS[name], math.copysign(1.0, theta) if len(SYSTEMS[name].model.sides) == 2 else 1.0
-    computed = Interpreted(system).coefficients(1.7, theta, -0.6, 12, side)[0]
-    expected = solution(lambda t, q, v: system.model.acceleration(t, q, v, side, system.load), theta, -0.6, 1.7, 12)
+    computed = Interpreted(system).coefficients(1.7, theta, -0.6, 10, side)[0]
+    expected = solution(lambda t, q, v: system.model.acceleration(t, q, v, side, system.load), theta, -0.6, 1.7, 10)
     assert agrees(computed, expected)
 
 
 def test_taylor_coefficients_of_both_layers():
     system = System(model=TwoLayer(**LAYERS), load=ALL_CHANNELS)
-    computed = Interpreted(system).coefficients(0.4, (0.3, -0.5), (0.7, 0.2), 12)
-    expected = solution(lambda t, q, v: system.model.acceleration(t, q, v, 1, system.load), (0.3, -0.5), (0.7, 0.2), 0.4, 12)
+    computed = Interpreted(system).coefficients(0.4, (0.3, -0.5), (0.7, 0.2), 10)
+    expected = solution(lambda t, q, v: system.model.acceleration(t, q, v, 1, system.load), (0.3, -0.5), (0.7, 0.2), 0.4, 10)
     assert agrees(computed, expected)
 
 
