@@ -87,3 +87,13 @@ def test_every_impact_of_an_accumulation_loses_the_same_factor():
     small = np.abs(motion.crossings.velocity_before) < 1e-6
     ratios = np.diff(motion.crossings.time)[small[1:]][1:] / np.diff(motion.crossings.time)[small[1:]][:-1]
     np.testing.assert_allclose(ratios, 0.8, rtol=1e-4)  # time differences of 1e-6 near 17.8
+
+
+def test_a_motion_that_ends_within_the_accumulation_is_not_at_rest():
+    """The jump to rest is for the time that is left; a horizon inside it is reached impact by impact."""
+    whole = simulate(driven(e=0.8), theta=0.3, duration=50.0)
+    for before in (1e-5, 1e-7, 1e-9):
+        cut = simulate(driven(e=0.8), theta=0.3, duration=whole.rest_time - before)
+        assert cut.time == whole.rest_time - before
+        assert cut.stop is Stop.HORIZON
+        assert abs(cut.velocity) < 10 * before

@@ -192,3 +192,11 @@ def test_a_right_angle_makes_a_smooth_pendulum():
         sides = (1, -1) if theta == 0 else (int(math.copysign(1, theta)),)
         for side in sides:
             assert model.acceleration(t, theta, v, side, load) == pytest.approx(expected, abs=1e-14)
+
+
+def test_a_lower_load_that_vanishes_does_not_break_the_mirror():
+    model = Metainterface(beta0=1.4)
+    upper = {"frequency": 2.0, "horizontal": Harmonic(0.3), "vertical": -0.5}
+    for nothing in (0.0, Harmonic(0.0), Harmonic(0.0, phase=1.0) + 0.0):
+        assert model.mirror(Load(**upper, lower_horizontal=nothing)) is not None
+    assert model.mirror(Load(**upper, lower_horizontal=Harmonic(0.1))) is None

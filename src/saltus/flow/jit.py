@@ -27,6 +27,11 @@ def cached_jit(signature: Any, fused: bool = True) -> Callable[[Any], Any]:
     return decorator
 
 
+def not_here(signature: Any) -> Callable[[Any], Any]:
+    """Stands for `cached_jit` where a text is only read or imported for its constants, and compiled elsewhere."""
+    return lambda function: function
+
+
 _f, _i = types.float64, types.int64
 _f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
 _i1, _i2 = (types.Array(_i, n, "C") for n in (1, 2))

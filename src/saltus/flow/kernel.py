@@ -18,7 +18,8 @@ import math
 
 import numpy as np
 
-from saltus.flow.jit import ADVANCE, cached_jit, jit
+from saltus.flow.jit import ADVANCE, jit
+from saltus.flow.jit import not_here as cached_jit
 from saltus.flow.roots import NEVER, SIMPLE, first_root, horner, scale_gap
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -212,6 +213,8 @@ def decide(where, state, settings, env, model, work, steps, events, origin, t_en
     speed = rate_of(model, float(where[SIDE])) * velocity
     if speed < SLOW:
         mode, left = accumulation(where, env, model, work, speed, t, origin, settings[TOLERANCE])
+        if mode == REST and where[PERIOD] == where[LAST] and t + left > t_end:
+            mode = ARC  # the motion ends before the accumulation does
         if mode == REST:
             record_event(where, events, RESTING, 0, 0, t + left, 0.0, 0.0)
             hold(where, state, model, q)

@@ -7,12 +7,14 @@ from typing import Any, overload
 
 import numpy as np
 
+from saltus.errors import MotionError
 from saltus.flow import kernel as k
 from saltus.flow.dense import DenseOutput
 from saltus.flow.motion import Crossings, Event, EventKind, Samples
 from saltus.flow.validity import Validity, ValidityCheck
 from saltus.systems import System
 
+MOST_STEPS = 10_000_000  # kept whole; about 2 GB
 BUFFER = 4096  # steps, and events, that one call of the kernel may record
 EVENT_KINDS = (
     EventKind.CROSSING,
@@ -77,6 +79,7 @@ class Recorder:
         self.steps = (np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
         self.events = (np.empty((BUFFER, 4), dtype=np.int64), np.empty((BUFFER, 3)))
         self.total = 0  # events so far
+        self._kept = 0  # steps so far
         self._length, self._times = length, sample_times
         self._pieces: list[DenseOutput] = []
         self._events: list[tuple[np.ndarray, ...]] = []
@@ -96,6 +99,12 @@ class Recorder:
     def _add(self, piece: DenseOutput) -> None:
         if self._times is None:
             self._pieces.append(piece)
+            self._kept += piece.start.size
+            if self._kept > MOST_STEPS:
+                raise MotionError(
+                    f"more than {MOST_STEPS} steps before time {piece.end:.6g}, too many to be kept; give samples=times to keep "
+                    "the states at those times instead, or dense=False to keep the events alone"
+                )
             return
         self._sample(piece, int(np.searchsorted(self._times, piece.end, side="left")))
         self._check.add(piece)

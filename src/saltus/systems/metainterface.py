@@ -12,7 +12,7 @@ from saltus.errors import ParameterError
 from saltus.systems.checks import settle_number
 from saltus.systems.load import Load
 from saltus.systems.model import Model
-from saltus.systems.signals import Constant, Signal, scaled
+from saltus.systems.signals import Signal, scaled, vanishes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,5 +141,6 @@ class Metainterface(Model):
 
 def _proportional(lower: Signal | None, upper: Signal | None, ratio: float) -> bool:
     """Whether the lower load is `ratio` times the upper one; a channel that is not named is 0."""
-    zero = Constant(0.0)
-    return (lower or zero) == (scaled(upper, ratio) if upper and ratio else zero)
+    if lower is None or vanishes(lower):
+        return ratio == 0.0 or upper is None or vanishes(upper)
+    return upper is not None and lower == scaled(upper, ratio)

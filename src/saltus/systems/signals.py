@@ -235,3 +235,12 @@ def scaled(signal: Signal, factor: float) -> Signal:
     if isinstance(signal, Record):
         return Record(signal.time, signal.value, signal.quantity, factor * signal.scale, signal.source)
     raise ParameterError(f"a {type(signal).__name__} cannot be scaled")
+
+
+def vanishes(signal: Signal) -> bool:
+    """Whether the signal is 0 at all times, as its numbers say."""
+    if isinstance(signal, Sum):
+        return all(vanishes(term) for term in signal.terms)
+    if isinstance(signal, Record):
+        return signal.scale == 0.0 or not signal.value.any()
+    return all(getattr(signal, name, 0.0) == 0.0 for name in ("value", "amplitude", "mean"))
