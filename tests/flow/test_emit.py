@@ -189,3 +189,9 @@ def test_terms_that_are_literally_zero_cost_nothing():
     loaded = bare.with_({"load.vertical": -0.5})
     assert Interpreted(bare).scope["ROWS"] <= Interpreted(loaded).scope["ROWS"]
     assert len(Interpreted(bare).source) < len(Interpreted(loaded).source)
+
+
+@pytest.mark.parametrize("operation", ["tanh", "exp", "sinh", "cosh", "nested", "sin", "sqrt", "whole power"])
+def test_steps_are_checked_where_a_function_may_bend_unseen(operation):
+    scope = Interpreted(System(model=Single(operation=operation), load=LOAD)).scope
+    assert scope["STEEP"] == (operation not in ("sin", "sqrt", "whole power"))

@@ -85,9 +85,9 @@ class Structure:
         return env, (*self.functions, geometry)
 
     @property
-    def sizes(self) -> tuple[int, int, int, int]:
-        """Coordinates, margins, rows of the workspace, sides of the contact."""
-        return self.module.DOF, self.module.STOPS, self.module.ROWS, self.module.SIDES
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """Coordinates, margins, rows of the workspace, sides of the contact, whether steps are checked."""
+        return self.module.DOF, self.module.STOPS, self.module.ROWS, self.module.SIDES, self.module.STEEP
 
 
 @cache

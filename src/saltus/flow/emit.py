@@ -16,6 +16,7 @@ CONTEXT = "env, piece"  # what every generated function may read: parameters, co
 UNPACK = "    p, c, breaks, table = env"
 INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "pow": "**"}
 COMPARE = {"greater": ">", "less": "<", "greater_equal": ">=", "less_equal": "<="}
+STEEP = ("exp", "sinh", "cosh", "tanh")  # may bend sharply far from where they are expanded, below rounding there
 PAIRS = {"sin": "cos", "cos": "sin", "sinh": "cosh", "cosh": "sinh"}
 
 
@@ -42,6 +43,7 @@ class Emitter:
             "STOPS": len(trace.margins),
             "ROWS": self.most_rows,
             "SIDES": trace.sides,
+            "STEEP": int(any(n.op in STEEP and n.degree is None for n in ordered(trace.acceleration))),
             "CONSTANT_COUNT": max(1, len(self.constants)),
         }
         head = [f"{name} = {value!r}" for name, value in sizes.items()]

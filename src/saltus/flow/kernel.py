@@ -29,7 +29,8 @@ DONE, FULL, PAUSED, NOT_UNIQUE, NO_IMPACT, NOT_FINITE, STALLED, LIMITED = 0, 1, 
 CROSSING, GRAZING, RESTING, RELEASE, CHATTERING, LIMIT = 0, 1, 2, 3, 4, 5  # events
 PERIOD, MODE, SIDE, SKIP, PIECE, STEPS = 0, 1, 2, 3, 4, 5  # in `where`,
 EVENTS, LAST, ORDER, DENSE, FORCED, HELD = 6, 7, 8, 9, 10, 11
-DOF, STOPS, ROWS, SIDES = 12, 13, 14, 15  # and the structure's: coordinates, margins, workspace rows, sides of the contact
+DOF, STOPS, ROWS, SIDES = 12, 13, 14, 15  # and the structure's: coordinates, margins, workspace rows, sides of the contact,
+STEEP = 16  # whether it has functions whose bends a series may not see
 TIME, SPEED, STATE = 0, 1, 2  # in `state`: local time, chatter speed, then the coordinates and the velocities
 LENGTH, END, TOLERANCE = 0, 1, 2  # in `settings`: the forcing period, the local time at the end, the tolerance
 
@@ -269,7 +270,7 @@ def arc(where, state, settings, env, model, work, steps, events, origin, target)
         size = max(size, abs(q[i, 0]), abs(v[i, 0]))
     model[0](t, origin, float(where[SIDE]), env, where[PIECE], q, v, a, g, m, w, order)
     natural = step_size(v, order, size, settings[TOLERANCE])
-    while leaps(where, env, model, work, t, origin, min(natural, target - t), size, settings[TOLERANCE]):
+    while where[STEEP] > 0 and leaps(where, env, model, work, t, origin, min(natural, target - t), size, settings[TOLERANCE]):
         natural = 0.5 * min(natural, target - t)
     h = min(natural, target - t)
     hit, first, touch = -1, NEVER, NEVER

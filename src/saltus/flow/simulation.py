@@ -153,7 +153,7 @@ def _prepare(
     tol: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The kernel's state at the start: counters, numbers and settings (see `kernel.py`)."""
-    where, state = np.zeros(16, dtype=np.int64), np.concatenate([[0.0, 0.0], position, speeds])
+    where, state = np.zeros(17, dtype=np.int64), np.concatenate([[0.0, 0.0], position, speeds])
     length = system.load.period
     if (periods is None) == (duration is None):
         raise ParameterError("say how long: either periods=... or duration=...")
@@ -174,7 +174,7 @@ def _prepare(
         state[k.TIME], last = local, int(first + whole)
     where[k.PERIOD], where[k.LAST], where[k.ORDER] = int(first), last, taylor_order(tol)
     where[k.PIECE] = np.searchsorted(run.env[2], time, side="right")
-    where[[k.DOF, k.STOPS, k.ROWS, k.SIDES]] = run.structure.sizes
+    where[[k.DOF, k.STOPS, k.ROWS, k.SIDES, k.STEEP]] = run.structure.sizes
     _choose_side(system, where, position, speeds)
     return where, state, np.array([length, end, tol])
 
