@@ -14,7 +14,7 @@ from flow_references import BETA80, driven
 from scipy.integrate import quad
 
 from saltus.flow import EventKind, simulate
-from saltus.flow import kernel as k
+from saltus.flow import layout as k
 from saltus.flow.compile import load_kernel
 from saltus.flow.simulation import _prepare, program
 from saltus.systems import EnergyRestitution, Harmonic, Load, System, WallOscillator

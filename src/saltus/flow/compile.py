@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from saltus.flow import jit, kernel, records, roots
+from saltus.flow import chatter, contact, jit, kernel, layout, records, roots, steps
 from saltus.flow.emit import Emitter
 from saltus.flow.trace import Trace
 
@@ -93,7 +93,7 @@ class Structure:
 @cache
 def load_kernel() -> Callable[..., int]:
     """The kernel that advances every model, `advance` of `kernel.py`, called without numba's dispatch on argument types."""
-    advance = _load("kernel", "".join(_body(module) for module in (roots, kernel))).advance
+    advance = _load("kernel", "".join(_body(module) for module in (layout, roots, steps, contact, chatter, kernel))).advance
     (result,) = advance.overloads.values()
     entry: Callable[..., int] = result.entry_point
     return entry

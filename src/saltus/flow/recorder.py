@@ -8,7 +8,7 @@ from typing import Any, overload
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow import kernel as k
+from saltus.flow import layout as k
 from saltus.flow.dense import DenseOutput
 from saltus.flow.motion import Crossings, Event, EventKind, Samples
 from saltus.flow.validity import Validity, ValidityCheck

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import MotionError, ParameterError, near
-from saltus.flow import kernel as k
+from saltus.flow import layout as k
 from saltus.flow.compile import Structure, load_kernel, load_structure
 from saltus.flow.motion import Motion, Stop
 from saltus.flow.recorder import Recorder

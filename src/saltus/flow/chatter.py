@@ -1,0 +1,48 @@
+"""Impacts without loss, too small and too many to follow: the averaged law.
+
+With the speeds v_s proportional to one speed v, the action v^2 sum v_s / abs(a_s) decays at the mean of the damping over the
+duration of a cycle, sum g_s v_s / abs(a_s) / sum v_s / abs(a_s), for any loads that press. The phase is lost.
+
+This text is compiled together with the kernel (see `kernel.py`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from saltus.flow.contact import contact_accelerations, rate_of
+from saltus.flow.jit import jit
+from saltus.flow.layout import *
+from saltus.flow.roots import horner
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@jit
+def chatter_sums(where, env, model, work, h, x, factor, t, origin):
+    """The sums over the sides of g v / abs(a) and v / abs(a), g the damping, for unit speed, at x of a step."""
+    b, order = work[7], where[ORDER]
+    damping, duration = 0.0, 0.0
+    for i in range(where[SIDES]):
+        side = 1.0 - 2.0 * i
+        pull = abs(horner(b[i], order, x * h))
+        share = (1.0 if side == where[SIDE] else factor) / pull
+        damping += share * model[3](t + x * h, origin, side, env, where[PIECE])
+        duration += share
+    return damping, duration
+
+
+@jit
+def chatter_decay(where, state, env, model, work, h, origin):
+    """Advance the chatter speed over a step: the action, v^2 times the duration sum v_s/abs(a_s), decays as the mean damping."""
+    t, side = state[TIME], float(where[SIDE])
+    contact_accelerations(where, env, model, work, t, origin)
+    next_side, after = model[2](t, origin, -state[SPEED] / rate_of(model, side), side, env, where[PIECE])
+    factor = rate_of(model, next_side) * after / state[SPEED]
+    decay = 0.0
+    for j in range(GAUSS_NODES.size):
+        damping, duration = chatter_sums(where, env, model, work, h, GAUSS_NODES[j], factor, t, origin)
+        decay += GAUSS_WEIGHTS[j] * h * damping / duration
+    _, before = chatter_sums(where, env, model, work, h, 0.0, factor, t, origin)
+    _, after_step = chatter_sums(where, env, model, work, h, 1.0, factor, t, origin)
+    state[SPEED] *= (math.exp(-decay) * before / after_step) ** (1.0 / 3.0)

@@ -1,0 +1,68 @@
+"""One step: how long it may be, and what is kept of it.
+
+This text is compiled together with the kernel (see `kernel.py`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.flow.jit import jit
+from saltus.flow.layout import *
+from saltus.flow.roots import horner
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@jit
+def step_size(coefficients, order, size, tol):
+    """h such that the last two terms of the series are below tol, relative to `size`."""
+    last, before = 0.0, 0.0
+    for i in range(coefficients.shape[0]):
+        last = max(last, abs(coefficients[i, order]))
+        before = max(before, abs(coefficients[i, order - 1]))
+    bound = max(size, SMALLEST) * tol
+    h = (bound / last) ** (1.0 / order) if last > 0.0 else np.inf
+    return SAFETY * (min(h, (bound / before) ** (1.0 / (order - 1))) if before > 0.0 else h)
+
+
+@jit
+def leaps(where, env, model, work, t, origin, h, size, tol):
+    """Whether a step goes past what its series cannot see, such as the bend of a saturated tanh, below rounding from afar.
+
+    The acceleration at the end of the step is then not the one that the series gives there.
+    """
+    q, v, a, _, _, w, _, _, (q_end, v_end, a_end, g_end, m_end) = work
+    order = where[ORDER]
+    for i in range(where[DOF]):
+        q_end[i, 0], v_end[i, 0] = horner(q[i], order, h), horner(v[i], order, h)
+    model[0](t + h, origin, float(where[SIDE]), env, where[PIECE], q_end, v_end, a_end, g_end, m_end, w, 0)
+    defect = 0.0
+    for i in range(where[DOF]):
+        defect = max(defect, abs(a_end[i, 0] - horner(a[i], order, h)))
+    return defect > DEFECT * tol * max(size, SMALLEST) / h
+
+
+@jit
+def record_event(where, events, kind, side, detail, t, before, after):
+    """Append an event: (period, kind, side, detail) and (local time, velocity before, velocity after)."""
+    labels, values = events
+    i = where[EVENTS]
+    labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = where[PERIOD], kind, side, detail
+    values[i, 0], values[i, 1], values[i, 2] = t, before, after
+    where[EVENTS] = i + 1
+
+
+@jit
+def record_step(where, steps, side, t, h, q):
+    """Append a step of the dense output: where it starts, how long it is, and the coordinates' series."""
+    if where[DENSE] == 0:
+        return
+    labels, spans, coefficients = steps
+    i = where[STEPS]
+    labels[i, 0], labels[i, 1] = where[PERIOD], side
+    spans[i, 0], spans[i, 1] = t, h
+    for d in range(q.shape[0]):
+        for k in range(where[ORDER] + 2):
+            coefficients[i, d, k] = q[d, k]
+    where[STEPS] = i + 1
