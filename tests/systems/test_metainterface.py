@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from saltus.errors import ParameterError
-from saltus.systems import Harmonic, Load, Metainterface, Record
+from saltus.systems import Harmonic, Load, Metainterface, Record, System
 
 angle = st.floats(0.1, 3.0)
 ratio = st.floats(0.1, 3.0)
@@ -200,3 +200,10 @@ def test_a_lower_load_that_vanishes_does_not_break_the_mirror():
     for nothing in (0.0, Harmonic(0.0), Harmonic(0.0, phase=1.0) + 0.0):
         assert model.mirror(Load(**upper, lower_horizontal=nothing)) is not None
     assert model.mirror(Load(**upper, lower_horizontal=Harmonic(0.1))) is None
+
+
+def test_a_lower_load_is_refused_where_the_sign_is_smoothed():
+    model = Metainterface(beta0=1.4, smoothing=100.0)
+    with pytest.raises(ParameterError, match=r"load\.lower_vertical cannot act with smoothing"):
+        System(model=model, load=Load(vertical=-0.5, lower_vertical=-0.1))
+    assert System(model=model, load=Load(vertical=-0.5, lower_vertical=0.0)).model is model

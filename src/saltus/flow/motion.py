@@ -130,7 +130,10 @@ class Motion:
         Raises:
             ParameterError: a time outside the motion, or a motion computed with dense=False.
         """
-        asked = np.atleast_1d(np.asarray(times, dtype=float))
+        try:
+            asked = np.atleast_1d(np.asarray(times, dtype=float))
+        except (TypeError, ValueError):
+            raise ParameterError(f"times must be a number or an array of numbers, got {times!r}") from None
         position, velocity, _ = self._states(asked)
         if len(self.system.model.coordinates) == 1:
             position, velocity = position[0], velocity[0]

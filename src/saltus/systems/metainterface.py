@@ -12,7 +12,7 @@ from saltus.errors import ParameterError
 from saltus.systems.checks import settle_number
 from saltus.systems.load import Load
 from saltus.systems.model import Model
-from saltus.systems.signals import Signal, scaled, vanishes
+from saltus.systems.signals import Constant, Signal, scaled, vanishes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +65,12 @@ class Metainterface(Model):
                     "smoothing is for symmetric layers only (stiffness_ratio 1, mass_ratio 0, dissipation_ratio 1); "
                     "drop it to compute the exact motion of unequal ones"
                 )
+
+    def check_load(self, load: Load) -> None:
+        """With a smoothed sign there is no lower layer to load on its own (errata 18)."""
+        for name in ("lower_horizontal", "lower_vertical"):
+            if self.smoothing is not None and not vanishes(load.channels.get(name, Constant(0.0))):
+                raise ParameterError(f"load.{name} cannot act with smoothing, which is for symmetric systems; drop one of them")
 
     @property
     def sides(self) -> tuple[int, ...]:

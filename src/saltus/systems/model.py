@@ -20,7 +20,7 @@ class Model:
        at which the gaps of all sides are zero. While the system rests there the accelerations at contact decide when it leaves;
     5. `reset`, the next side and the velocity after an impact, given the impact law;
     6. optionally `mirror` (the symmetry that maps motions to motions), `kinetic_energy` (for impact laws that need
-       it), `margins` (what must stay positive) and `stops` (the margins that end a motion unasked).
+       it), `margins` (what must stay positive), `stops` (the margins that end a motion unasked) and `check_load`.
 
     Every argument may be a number, an array or a symbol. With one degree of freedom the coordinate, the velocity and the
     acceleration are scalars; with several they are tuples.
@@ -65,6 +65,9 @@ class Model:
     def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Any) -> dict[str, Any]:
         """Named quantities that must stay positive for the motion to be one of the real mechanism."""
         return {}
+
+    def check_load(self, load: Any) -> None:
+        """Refuse, with a ParameterError, a load whose channels are known but cannot act on this model as it is."""
 
     def mirror(self, load: Any) -> Any:
         """The load under which -theta moves as theta does under `load`, or None where there is no such symmetry."""

@@ -24,7 +24,7 @@ class System:
     `model.damping`, `load.frequency`, `load.horizontal.amplitude`, `load.vertical`, `impact.e`.
 
     Raises:
-        ParameterError: a load channel that the model does not read.
+        ParameterError: a load channel that the model does not read, or cannot as it is.
     """
 
     model: Model
@@ -39,6 +39,7 @@ class System:
             if channel not in self.model.channels:
                 known = [*self.model.channels, "frequency"]
                 raise ParameterError(f"{type(self.model).__name__} does not read load.{channel}; {near(channel, known)}")
+        self.model.check_load(self.load)
 
     def with_(self, changes: Mapping[str, Any] | None = None, **more: Any) -> System:
         """A copy with the parts at the given dotted paths replaced: `system.with_({"load.frequency": 1.1})`.
