@@ -20,7 +20,8 @@ h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.5rem; border-top
 img { max-width: 100%; display: block; margin: 1rem auto; }
 p.caption { font-size: 0.95rem; } p.files { font-size: 0.85rem; }
 table { border-collapse: collapse; font-size: 0.85rem; width: 100%; margin: 1rem 0; }
-th, td { border: 1px solid #ccc; padding: 0.25rem 0.5rem; text-align: left; vertical-align: top; overflow-wrap: anywhere; }
+th, td { border: 1px solid #ccc; padding: 0.25rem 0.5rem; text-align: left; vertical-align: top; overflow-wrap: break-word; }
+th:nth-child(2) { width: 7rem; } th:nth-child(3), th:nth-child(4) { width: 6.5rem; } th:nth-child(5) { width: 5.5rem; }
 th { background: #f2f2f2; } td.agrees { background: #e6f2e9; }
 td.erratum { background: #fdf3d7; } td.disagrees { background: #fbe3e0; }
 nav a { margin-right: 0.8rem; } code { font-size: 0.85em; }
@@ -28,7 +29,7 @@ nav a { margin-right: 0.8rem; } code { font-size: 0.85em; }
 KINDS = {Verdict.AGREES: "agrees", Verdict.ERRATUM: "erratum", Verdict.DISAGREES: "disagrees"}
 
 
-def read_claims(figure: PaperFigure, folder: Path) -> list[Claim]:
+def compute_claims(figure: PaperFigure, folder: Path) -> list[Claim]:
     """The claims of a figure from the data that it left in `folder`."""
     import xarray
 
@@ -46,7 +47,7 @@ def write(figures: Iterable[PaperFigure], folder: Path, known: Mapping[str, Iter
         if figure.name in known:
             present[figure] = list(known[figure.name])
         elif state.up_to_date(figure, folder):
-            present[figure] = read_claims(figure, folder)
+            present[figure] = state.claims(figure, folder)
     claims = [claim for group in present.values() for claim in group]
     pages = {
         "claims.json": json.dumps([claim.to_dict() for claim in claims], indent=1, ensure_ascii=False) + "\n",

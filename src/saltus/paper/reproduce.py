@@ -82,8 +82,8 @@ def _make(figure: PaperFigure, output: Path, force: bool) -> Result:
     if stale:
         data = figure.compute(**figure.parameters)
         _write(figure, data, output)
-        state.write(figure, output)
-    claims = tuple(report.read_claims(figure, output))
+        state.write(figure, output, report.compute_claims(figure, output))
+    claims = tuple(state.claims(figure, output))
     files = tuple(output / name for name in figure.files())
     return Result(name=figure.name, made=stale, seconds=time.perf_counter() - start, files=files, claims=claims)
 

@@ -6,12 +6,14 @@ import ast
 import hashlib
 import importlib.util
 import json
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import saltus
 from saltus.files import write_text
+from saltus.paper.claim import Claim, Verdict
 from saltus.paper.figure import PaperFigure
 
 FOLDER = ".saltus"  # inside the output folder
@@ -72,7 +74,7 @@ def up_to_date(figure: PaperFigure, folder: Path) -> bool:
     if record is None or record.get("key") != key(figure):
         return False
     prints = record.get("files", {})
-    return all(name in prints and fingerprint(folder / name) == prints[name] for name in figure.files())
+    return "claims" in record and all(name in prints and fingerprint(folder / name) == prints[name] for name in figure.files())
 
 
 def read(figure: PaperFigure, folder: Path) -> dict[str, Any] | None:
@@ -84,9 +86,16 @@ def read(figure: PaperFigure, folder: Path) -> dict[str, Any] | None:
     return record if isinstance(record, dict) else None
 
 
-def write(figure: PaperFigure, folder: Path) -> None:
-    """Record what made the figure's outputs and their fingerprints; last of all, so that an interrupted run leaves none."""
-    record = {"key": key(figure), "files": {name: fingerprint(folder / name) for name in figure.files()}}
+def claims(figure: PaperFigure, folder: Path) -> list[Claim]:
+    """The claims of a figure that is up to date, as recorded when it was made."""
+    rows = (read(figure, folder) or {}).get("claims", [])
+    return [Claim(**{**row, "verdict": Verdict(row["verdict"])}) for row in rows]
+
+
+def write(figure: PaperFigure, folder: Path, made: Iterable[Claim]) -> None:
+    """Record what made the figure's outputs, their fingerprints and claims; last, so that an interrupted run leaves none."""
+    files = {name: fingerprint(folder / name) for name in figure.files()}
+    record = {"key": key(figure), "files": files, "claims": [claim.to_dict() for claim in made]}
     write_text(folder / FOLDER / f"{figure.name}.json", json.dumps(record, indent=1))
 
 
