@@ -158,3 +158,22 @@ def test_on_a_wall_the_action_is_the_cube_of_the_speed_over_the_pull(C):
         assert len(crossings) > 1000
     assert errors[0] < 1e-2
     assert errors[1] / errors[0] == pytest.approx(0.25, abs=0.03)  # every flight starts alike: no term of order v
+
+
+def test_chatter_does_not_begin_where_the_contact_hardly_holds_and_ends_where_its_speed_has_grown():
+    """The averaged law needs contact accelerations that change slowly over two impacts; near a release they do not."""
+    beta0 = math.radians(80)
+    loose = 0.5 / math.tan(beta0) * (1 - 1e-7)  # H just below Hcr, and falling
+    system = driven(C=0.0, V=-0.5, H=loose, W=0.5, phase=math.pi / 2)
+    resolved = simulate(system, theta=0.0, velocity=1.01e-5, duration=5.0)
+    below = simulate(system, theta=0.0, velocity=9.9e-6, duration=5.0)
+    assert resolved.phase_known
+    assert below.phase_known
+    speeds = [np.abs(m.crossings.velocity_after[-10:]).max() for m in (below, resolved)]
+    assert speeds[0] == pytest.approx(speeds[1] * 9.9 / 10.1, rel=0.2)
+    growing = driven(C=0.0, V=-0.5, H=0.98 * loose, W=0.05, phase=math.pi / 2)
+    motion = simulate(growing, theta=0.0, velocity=9.9e-6, duration=30.0)
+    assert [e.kind for e in motion.events][:2] == [EventKind.CHATTER, EventKind.CROSSING]
+    assert not motion.phase_known
+    assert motion.chatter_speed is None
+    assert abs(motion.crossings.velocity_before[0]) == pytest.approx(2e-5, rel=0.05)

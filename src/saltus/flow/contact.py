@@ -81,7 +81,8 @@ def accumulation(where, env, model, work, speed, t, origin, tol):
     ARC: of nothing. REST: of a Zeno accumulation. From the gap's speed v on side s the time left is
     2 v (1/abs(a_s) + e1/abs(a_n)) / (1 - e1 e2), with a_s, a_n the contact accelerations on this and on the next side and e1, e2
     the factors of the next two impacts; its error is of the order of the time left, squared, times the relative rate of
-    change of the accelerations. CHATTER: of impacts without loss, below CHATTER_SPEED.
+    change of the accelerations. CHATTER: of impacts without loss, below CHATTER_SPEED, while the
+    accelerations change slowly over two of them.
     """
     side, piece = float(where[SIDE]), where[PIECE]
     here, slope_here = contact_pull(side, env, model, piece, work, t, origin)
@@ -97,12 +98,13 @@ def accumulation(where, env, model, work, speed, t, origin, tol):
         third_side, last = model[2](t, origin, -after, next_side, env, piece)
         second = rate_of(model, third_side) * last / next_speed
     loss = 1.0 - first * second
+    cycle = 2.0 * speed * (1.0 / abs(here) + first / abs(there))
+    change = 1.0 + abs(slope_here / here) + abs(slope_there / there)
     if abs(loss) < LOSSLESS:
-        return CHATTER if speed < CHATTER_SPEED else ARC, 0.0
+        return CHATTER if speed < CHATTER_SPEED and cycle * change < SLOWLY else ARC, 0.0
     if not loss > 0.0:
         return ARC, 0.0
-    left = 2.0 * speed * (1.0 / abs(here) + first / abs(there)) / loss
-    change = 1.0 + abs(slope_here / here) + abs(slope_there / there)
+    left = cycle / loss
     return REST if 0.1 * left * left * change <= tol else ARC, left
 
 

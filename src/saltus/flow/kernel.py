@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from saltus.flow.chatter import chatter_decay
-from saltus.flow.contact import contact_accelerations, decide, hold, impact, leading
+from saltus.flow.contact import contact_accelerations, decide, hold, impact, leading, rate_of
 from saltus.flow.jit import ADVANCE, jit
 from saltus.flow.jit import not_here as cached_jit
 from saltus.flow.layout import *
@@ -118,6 +118,9 @@ def held(where, state, settings, env, model, work, steps, origin, target):
     record_step(where, steps, 0, t, tau, q)
     if first > 1.0:
         state[TIME] = target if h == target - t else t + tau
+        if where[MODE] == CHATTER and state[SPEED] > 2.0 * CHATTER_SPEED:  # grown again: followed one by one from here on
+            where[MODE], where[SKIP], where[HELD] = CONTACT, 0, 0
+            state[STATE + where[DOF]] = state[SPEED] / rate_of(model, float(where[SIDE]))
     else:
         where[MODE], where[SKIP] = CONTACT, released
         state[TIME] = t + tau if t + tau > t or released == 0 else np.nextafter(t, np.inf)  # time must go on

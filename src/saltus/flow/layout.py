@@ -20,12 +20,14 @@ TIME, SPEED, STATE = 0, 1, 2  # in `state`: local time, chatter speed, then the 
 LENGTH, END, TOLERANCE = 0, 1, 2  # in `settings`: the forcing period, the local time at the end, the tolerance
 
 SAFETY = 0.9  # of a step: its error is then a tenth of tol, and 1000 periods add up to a drift in energy below 1e-12
+GAP = 0.65  # in the log of the radius between the last terms and those before: 0.6 for a sine, more where they vanish
 DEFECT = 100.0  # between a series and the equation at the end of a step, in tol size / h: sound steps stay below 4
 SMALLEST = 1e-6  # size below which a step's error is absolute, not relative
 ZERO = 1e-14  # an acceleration at contact below this is zero: it is a difference of loads of order 1
 EXACT = 1e-15  # at rest a small error of the load would decide whether a touch is a release, and there steps cost little
 SLOW = 1e-2  # a faster impact cannot be the end of an accumulation, and is not tested for it
 CHATTER_SPEED = 1e-5  # the averaged law is then wrong by 5e-5 of the speed; following on takes 1e5 impacts a unit of time
+SLOWLY = 0.02  # the most that the contact accelerations may change over two impacts for the averaged law
 LOSSLESS = 1e-12  # a loss of speed over two impacts below this is rounding
 BATCH = 100_000  # passes of the loop before the caller may look (Ctrl-C)
 GAUSS_NODES = np.array([0.0694318442029737, 0.3300094782075719, 0.6699905217924281, 0.9305681557970263])

@@ -90,6 +90,7 @@ class Motion:
     side: int  # +1 or -1, and 0 at rest
     stop: Stop
     limit: str | None  # the margin that stopped it
+    chatter_speed: float | None  # of the gap just after impacts on `side`, if it ends in chatter; theta and theta' are then 0
     periods: int  # whole forcing periods since time 0
     events: Events
     crossings: Crossings

@@ -19,6 +19,7 @@ from saltus.systems import Record, System
 from saltus.systems.checks import check_number
 from saltus.systems.parameters import children, is_number, numbers
 
+MOST_PERIODS = 2**53  # as many as can be counted exactly
 MOST_EVENTS = 20_000_000  # beyond this an accumulation of impacts is not being resolved but endured
 
 
@@ -96,8 +97,13 @@ def simulate(
         ParameterError: an argument without meaning.
         MotionError: the motion is not unique, an impact has no solution, or the numbers overflow; with the instant.
     """
+    if not isinstance(system, System):
+        raise ParameterError(f"simulate takes a System(model=..., load=..., impact=...), got {system!r}")
     position, speeds = _start_state(system, velocity, coordinates)
-    limits = tuple(dict.fromkeys((*system.model.stops, *([stop_at] if isinstance(stop_at, str) else stop_at))))
+    try:
+        limits = tuple(dict.fromkeys((*system.model.stops, *([stop_at] if isinstance(stop_at, str) else stop_at))))
+    except TypeError:
+        raise ParameterError(f"stop_at must be the names of margins, such as ['kinematic_limit'], got {stop_at!r}") from None
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     check_number("time", time)
     if side not in (None, 1, -1):
@@ -166,6 +172,11 @@ def _prepare(
         # No periods to count: one leg, number 0, from `time` to the end.
         state[k.TIME], end, last, first, length = time, time + span, 0, 0.0, 0.0
     else:
+        reach = abs(time) / length + (span / length if periods is None else span)
+        if not reach < MOST_PERIODS:
+            raise ParameterError(
+                f"the motion must start and end within 2^53 forcing periods of {length:g}, got {reach:g} of them"
+            )
         first, local = divmod(time, length)
         if periods is None:
             whole, end = divmod(local + span, length)
@@ -252,7 +263,10 @@ def _refuse(system: System, status: int, where: np.ndarray, state: np.ndarray, s
             "sign that leads on meets the law (errata 26); use VelocityReduction there"
         )
     if status == k.NOT_FINITE:
-        raise MotionError(f"the motion leaves the range of numbers {at}; its velocity was last {velocity:.6g}")
+        raise MotionError(
+            f"the motion leaves the range of numbers {at}; its velocity was last "
+            f"{velocity:.6g}; a power or root of the model may have no Taylor series there, such as abs(x)**1.5 at x = 0"
+        )
     if status == k.STALLED:
         raise MotionError(f"the steps shrink to nothing {at}: the acceleration is singular there")
 
@@ -287,6 +301,7 @@ def _collect(
         side=side,
         stop=stop,
         limit=limit,
+        chatter_speed=float(state[k.SPEED]) if where[k.MODE] == k.CHATTER else None,
         periods=int(where[k.PERIOD]),
         events=events,
         crossings=events.crossings(),

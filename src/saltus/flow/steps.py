@@ -5,6 +5,8 @@ This text is compiled together with the kernel (see `kernel.py`).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from saltus.flow.jit import jit
@@ -15,15 +17,30 @@ from saltus.flow.roots import horner
 
 
 @jit
-def step_size(coefficients, order, size, tol):
-    """h such that the last two terms of the series are below tol, relative to `size`."""
-    last, before = 0.0, 0.0
+def growth(coefficients, first, last, size):
+    """The largest log(abs(c_k) / size) / k for first <= k <= last: minus the log of the radius that these terms tell of."""
+    largest = -np.inf
     for i in range(coefficients.shape[0]):
-        last = max(last, abs(coefficients[i, order]))
-        before = max(before, abs(coefficients[i, order - 1]))
-    bound = max(size, SMALLEST) * tol
-    h = (bound / last) ** (1.0 / order) if last > 0.0 else np.inf
-    return SAFETY * (min(h, (bound / before) ** (1.0 / (order - 1))) if before > 0.0 else h)
+        for k in range(first, last + 1):
+            if coefficients[i, k] != 0.0:
+                largest = max(largest, math.log(abs(coefficients[i, k]) / size) / k)
+    return largest
+
+
+@jit
+def step_size(coefficients, order, size, tol):
+    """h such that the last two terms of the series are below tol, relative to `size`.
+
+    By symmetry both may be far smaller than the series: x'' = -x^3 from x = 0 has every fourth coefficient only. Then the
+    upper half of the coefficients says how fast it grows.
+    """
+    size = max(size, SMALLEST)
+    at_end, before_end = growth(coefficients, order, order, size), growth(coefficients, order - 1, order - 1, size)
+    upper_half = growth(coefficients, order // 2, order - 2, size)
+    step = min(math.log(tol) / order - at_end, math.log(tol) / (order - 1) - before_end)
+    if upper_half - max(at_end, before_end) > GAP:
+        step = min(step, math.log(tol) / order - upper_half)
+    return SAFETY * math.exp(step) if step < 700.0 else np.inf
 
 
 @jit

@@ -54,7 +54,7 @@ class Load:
         frequency: the base angular frequency Omega > 0 of every harmonic, or None for a load without a period.
 
     Raises:
-        ParameterError: a harmonic without a frequency, a frequency without a harmonic, a record of the wrong quantity.
+        ParameterError: a harmonic without a frequency, a record of the wrong quantity.
     """
 
     __slots__ = ("channels", "frequency")
@@ -67,6 +67,7 @@ class Load:
         if frequency is not None:
             check_number("load.frequency", frequency, above=0.0)
             frequency = float(frequency)
+            check_number("the forcing period 2 pi / load.frequency", 2.0 * math.pi / frequency, above=0.0, below=1e300)
         for name, signal in signals.items():
             if signal.periodic and frequency is None:
                 raise ParameterError(f"load.{name} is harmonic, so load.frequency must be given")
