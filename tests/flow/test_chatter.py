@@ -176,4 +176,4 @@ def test_chatter_does_not_begin_where_the_contact_hardly_holds_and_ends_where_it
     assert [e.kind for e in motion.events][:2] == [EventKind.CHATTER, EventKind.CROSSING]
     assert not motion.phase_known
     assert motion.chatter_speed is None
-    assert abs(motion.crossings.velocity_before[0]) == pytest.approx(2e-5, rel=0.05)
+    assert 2e-5 < abs(motion.crossings.velocity_before[0]) < 4e-5  # noticed at the end of a step

@@ -21,8 +21,8 @@ def error(tol):
 
 def test_the_reference_motion_is_met_to_its_last_digits():
     motion = simulate(driven(H=0.5), theta=0.3, velocity=0.0, periods=20, tol=1e-15)
-    assert motion.theta == pytest.approx(THETA, abs=5e-14, rel=0)
-    assert motion.velocity == pytest.approx(VELOCITY, abs=5e-14, rel=0)
+    assert motion.theta == pytest.approx(THETA, abs=1e-14, rel=0)
+    assert motion.velocity == pytest.approx(VELOCITY, abs=1e-14, rel=0)
     assert len(motion.crossings) == CROSSINGS
 
 

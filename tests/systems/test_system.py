@@ -64,7 +64,8 @@ def systems(draw):
         record = records(["displacement", "velocity", "acceleration"] if ground else ["force"])
         single = st.one_of(finite, harmonics, record)
         channels[name] = draw(st.one_of(single, st.builds(lambda a, b: a + b, harmonics, single)))
-    return System(model=model, load=Load(frequency=draw(positive), **channels), impact=draw(impacts))
+    impact = draw(impacts) if model.sides else VelocityReduction()
+    return System(model=model, load=Load(frequency=draw(positive), **channels), impact=impact)
 
 
 EXAMPLE = System(
@@ -93,11 +94,41 @@ def test_every_number_has_a_path_that_reads_and_replaces_it(system, pick):
     assert system.get(path) == paths[path]
     assert system.with_({path: system.get(path)}) == system
     smoothed = getattr(system.model, "smoothing", None) is not None  # its ratios may not change
-    if not path.endswith(("order", "smoothing", *(("_ratio",) if smoothed else ()))):
+    bound = ("order", "smoothing", *(("_ratio",) if smoothed else ()), *(() if system.model.sides else ("impact.e",)))
+    if not path.endswith(bound):
         changed = system.with_({path: 0.25})
         assert changed.get(path) == 0.25
         others = {p: v for p, v in changed.parameters.items() if p != path}
         assert others == {p: v for p, v in paths.items() if p != path}
+
+
+def test_changes_apply_at_once_in_any_order():
+    block = RockingBlock(alpha=0.2)
+    smooth = System(model=Metainterface(beta0=1.4, smoothing=100.0))
+    for system, changes in (
+        (System(model=block), {"load.ground_horizontal": Harmonic(0.3), "load.frequency": 1.0}),
+        (EXAMPLE, {"model": block, "load": Load()}),
+        (smooth, {"model.mass_ratio": 1.0, "model.smoothing": None}),
+        (EXAMPLE, {"load.horizontal": Harmonic(0.1), "load.horizontal.amplitude": 0.7}),
+    ):
+        first, second = (system.with_(dict(order)) for order in (changes.items(), reversed(changes.items())))
+        assert first == second
+        assert all(first.get(path) == value for path, value in changes.items() if path != "load.horizontal")
+
+
+@pytest.mark.parametrize("text", ["garbage", "[1]", "3", '{"model": 3}', '{"model": {"type": 3}}', '{"model": {"type": []}}'])
+def test_what_is_no_system_in_json_is_refused_in_a_sentence(text):
+    with pytest.raises(ParameterError):
+        System.from_json(text)
+    with pytest.raises(ParameterError, match="not the TOML of a system"):
+        System.from_toml("= =")
+
+
+def test_an_impact_law_without_impacts_is_refused():
+    with pytest.raises(ParameterError, match="has no impacts"):
+        System(model=Metainterface(beta0=1.4, smoothing=50.0), impact=VelocityReduction(0.5))
+    with pytest.raises(ParameterError, match="has no impacts"):
+        System(model=TwoLayer(beta0=1.4), impact=EnergyRestitution(0.5))
 
 
 def test_a_load_answers_only_to_names_of_channels():

@@ -135,6 +135,8 @@ class Motion:
             asked = np.atleast_1d(np.asarray(times, dtype=float))
         except (TypeError, ValueError):
             raise ParameterError(f"times must be a number or an array of numbers, got {times!r}") from None
+        if asked.ndim > 1:
+            raise ParameterError(f"times must be a number or a list of numbers, got an array of shape {asked.shape}")
         position, velocity, _ = self._states(asked)
         if len(self.system.model.coordinates) == 1:
             position, velocity = position[0], velocity[0]

@@ -98,13 +98,6 @@ def claims(data: Any) -> list[Claim]:
             evidence=f"the motion from θ = {STARTS['b'][2][0]} goes round {rest[1].round(4).tolist()}",
         ),
         check(
-            "fig05-half-plane",
-            "section 5.2",
-            "k changes only the half-plane θ > 0 at a given energy: θ_II stays",
-            printed=found["a"][1] - found["b"][1],
-            evidence=f"θ_II = {found['a'][1]:.6f} for k = 0.5 and {found['b'][1]:.6f} for k = 1.1",
-        ),
-        check(
             "fig05a-one-layer",
             "Fig. 5a",
             "In these motions one layer stays closed while the other is open",

@@ -43,6 +43,7 @@ def portrait(system: System, starts: Sequence[tuple[float, float]], duration: fl
             "energy": (("trajectory", "sample"), _energy(system, theta, velocity), "K2", "kinetic and potential energy"),
             "end": ("trajectory", [m.theta for m in motions], "rad", "theta at the end"),
             "impacts": ("trajectory", [len(m.crossings) for m in motions], "1", "impacts in the time shown"),
+            "corner": ("trajectory", [_corner(m) for m in motions], "1", "jump of theta'' at the first impact upward, or NaN"),
             "wrong_reaction": (
                 "trajectory",
                 _shares(motions, "reaction"),
@@ -81,6 +82,19 @@ def portrait(system: System, starts: Sequence[tuple[float, float]], duration: fl
         system=system,
         tol=TOLERANCE,
     )
+
+
+def _corner(motion: Any) -> float:
+    """The jump of theta'' at the first impact with theta' > 0, from the series of the steps on both sides of it; NaN if none."""
+    dense = motion.dense
+    for time, velocity in zip(motion.crossings.time, motion.crossings.velocity_before, strict=True):
+        after = int(np.searchsorted(dense.start, time))
+        if velocity > 0 and 0 < after < dense.start.size:
+            powers = np.arange(dense.series.shape[2])
+            curvature = (powers * (powers - 1) * dense.series[after - 1, 0])[2:]
+            before = np.polynomial.polynomial.polyval(dense.length[after - 1], curvature)
+            return float(2 * dense.series[after, 0, 2] - before)
+    return math.nan
 
 
 def separatrices(system: System, points: Sequence[Equilibrium], bound: float) -> list[Manifold]:

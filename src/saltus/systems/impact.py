@@ -45,8 +45,8 @@ class EnergyRestitution(ImpactLaw):
     """T+ = r T-, with T the model's kinetic energy, ground velocities and unequal masses included (`rest_def`, errata 5, 26).
 
     T on the new side is a quadratic a v^2 + b v + c in the velocity; its root of the sign of v- is taken, and of two such the
-    one on the same side of the minimum -b / (2 a) as v-, which is v+ = v- at r = 1. Where no root has the sign of v- (small v-
-    on a moving ground) the motion cannot go on, and is refused with the instant and the numbers.
+    one on the same side of the minimum -b / (2 a) as v-. At r = 1 that is v+ = v- for m = 0 and nu' = 0. Where no root has the
+    sign of v- (small v- on a moving ground) the motion cannot go on, and is refused with the instant and the numbers.
     """
 
     r: float

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from saltus.errors import ParameterError, near
@@ -40,24 +41,33 @@ def numbers(node: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
             yield from numbers(child, path)
 
 
-def replace(node: Any, path: str, value: Any, whole: str = "") -> Any:
-    """A copy of `node` with the part at the dotted `path` replaced; numbers become constant signals where signals stand.
+def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
+    """A copy of `node` with the parts at the given dotted paths replaced, all at once, so that their order does not matter.
+
+    Where a part and something below it are both given, the part is replaced first. Numbers become constant signals where
+    signals stand.
 
     Raises:
-        ParameterError: a path that leads nowhere, with the near ones; a value that the part refuses.
+        ParameterError: a path that leads nowhere, with the near ones; a value that the new whole refuses.
     """
-    whole = whole or path
-    head, _, rest = path.partition(".")
-    parts = children(node)
-    new_channel = isinstance(node, Load) and head.isidentifier() and not rest
-    if head not in parts and not new_channel:
-        raise ParameterError(f"no parameter {whole!r}: {type(node).__name__} has no {head!r}; {near(head, parts)}")
-    part = replace(parts[head], rest, value, whole) if rest else value
+    parts, below = children(node), defaultdict[str, dict[str, Any]](dict)
+    for path, value in changes.items():
+        head, _, rest = str(path).partition(".")
+        if head not in parts and not (isinstance(node, Load) and head.isidentifier() and not rest):
+            raise ParameterError(
+                f"no parameter {where + str(path)!r}: {type(node).__name__} has no {head!r}; {near(head, children(node))}"
+            )
+        if rest:
+            below[head][rest] = value
+        else:
+            parts[head] = value
+    for head, deeper in below.items():
+        parts[head] = replace(parts[head], deeper, f"{where}{head}.")
     if isinstance(node, Load):
-        return Load(**{**parts, head: part})
+        return Load(**parts)
     if isinstance(node, Sum):
-        return Sum(tuple(as_signal(part, whole) if name == head else p for name, p in parts.items()))
-    return dataclasses.replace(node, **{head: part})
+        return Sum(tuple(as_signal(part, f"{where}{name}") for name, part in parts.items()))
+    return dataclasses.replace(node, **parts)
 
 
 def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -> Any:

@@ -40,6 +40,8 @@ def from_dict(kind: str, data: Any) -> Any:
     if "type" not in fields:
         raise ParameterError(f"{kind}.type is missing: it names the {kind}, such as 'Metainterface' or 'VelocityReduction'")
     name = fields.pop("type")
+    if not isinstance(name, str):
+        raise ParameterError(f"{kind}.type must be a name in quotes, got {name!r}")
     cls: Any = find_model(name) if kind == "model" else find_impact(name)
     return build(cls, fields, kind)
 

@@ -40,6 +40,8 @@ class System:
                 known = [*self.model.channels, "frequency"]
                 raise ParameterError(f"{type(self.model).__name__} does not read load.{channel}; {near(channel, known)}")
         self.model.check_load(self.load)
+        if not self.model.sides and self.impact != VelocityReduction():
+            raise ParameterError(f"this {type(self.model).__name__} has no impacts, so {self.impact!r} cannot act; leave it out")
 
     def with_(self, changes: Mapping[str, Any] | None = None, **more: Any) -> System:
         """A copy with the parts at the given dotted paths replaced: `system.with_({"load.frequency": 1.1})`.
@@ -47,9 +49,7 @@ class System:
         Raises:
             ParameterError: a path that leads nowhere, with the near ones, or a value that is refused there.
         """
-        system = self
-        for path, value in {**(changes or {}), **more}.items():
-            system = replace(system, path, value)
+        system: System = replace(self, {**(changes or {}), **more})
         return system
 
     def get(self, path: str) -> Any:
@@ -79,9 +79,11 @@ class System:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> System:
         """The inverse of `to_dict`; `load` and `impact` may be left out."""
+        if not isinstance(data, Mapping):
+            raise ParameterError(f"a system is a table with a model, a load and an impact law, got {data!r}")
         unknown = set(data) - {"model", "load", "impact"}
         if unknown:
-            name = sorted(unknown)[0]
+            name = min(map(str, unknown))
             raise ParameterError(f"unknown key {name!r} of a system; {near(name, ('model', 'load', 'impact'))}")
         if "model" not in data:
             raise ParameterError("a system needs a model, such as {'type': 'Metainterface', 'beta0': 1.4}")
@@ -94,8 +96,16 @@ class System:
 
     @classmethod
     def from_json(cls, text: str) -> System:
-        """The inverse of `to_json`."""
-        return cls.from_dict(json.loads(text))
+        """The inverse of `to_json`.
+
+        Raises:
+            ParameterError: text that is no JSON, or no system.
+        """
+        try:
+            data = json.loads(text)
+        except ValueError as error:
+            raise ParameterError(f"this is not the JSON of a system: {error}") from None
+        return cls.from_dict(data)
 
     def to_toml(self) -> str:
         """The system as TOML."""
@@ -105,5 +115,13 @@ class System:
 
     @classmethod
     def from_toml(cls, text: str) -> System:
-        """The inverse of `to_toml`."""
-        return cls.from_dict(tomllib.loads(text))
+        """The inverse of `to_toml`.
+
+        Raises:
+            ParameterError: text that is no TOML, or no system.
+        """
+        try:
+            data = tomllib.loads(text)
+        except ValueError as error:
+            raise ParameterError(f"this is not the TOML of a system: {error}") from None
+        return cls.from_dict(data)
