@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from saltus.errors import MotionError
 from saltus.flow import simulate
 from saltus.systems import Harmonic, Load, System, TwoLayer
 
@@ -41,3 +42,10 @@ def test_open_motion_agrees_with_an_independent_integrator_up_to_the_first_conta
     assert motion.limit == name
     assert motion.time == pytest.approx(expected.t[-1], abs=1e-10)
     assert [*motion.position, *motion.velocity] == pytest.approx(expected.y[:, -1], abs=1e-9)
+
+
+def test_a_motion_into_the_singular_mass_matrix_ends_in_a_sentence():
+    """det M = m + sin(beta_1 + beta_2)^2 vanishes at beta_1 + beta_2 = pi for m = 0: the acceleration is infinite there."""
+    system = System(model=TwoLayer(beta0=np.deg2rad(80), damping=0.1), load=Load(vertical=-0.5))
+    with pytest.raises(MotionError, match="the steps shrink to nothing at time"):
+        simulate(system, theta_1=0.3, theta_2=-0.2, velocity=(0.0, 0.0), duration=10.0)

@@ -88,7 +88,8 @@ def arc(where, state, settings, env, model, work, steps, events, origin, target)
     if hit >= 0:
         record_event(where, events, LIMIT, where[SIDE], hit, state[TIME], state[STATE + where[DOF]], state[STATE + where[DOF]])
         return LIMITED
-    return PAUSED if state[TIME] > t or h == target - t else STALLED
+    unit = min(settings[LENGTH], 1.0) if settings[LENGTH] > 0.0 else 1.0
+    return PAUSED if natural > SHORTEST * unit or h == target - t else STALLED
 
 
 @jit

@@ -22,6 +22,7 @@ LENGTH, END, TOLERANCE = 0, 1, 2  # in `settings`: the forcing period, the local
 SAFETY = 0.9  # of a step: its error is then a tenth of tol, and 1000 periods add up to a drift in energy below 1e-12
 GAP = 0.65  # in the log of the radius between the last terms and those before: 0.6 for a sine, more where they vanish
 DEFECT = 100.0  # between a series and the equation at the end of a step, in tol size / h: sound steps stay below 4
+SHORTEST = 1e-9  # step, in units of time or of a shorter forcing period: below it the acceleration is singular
 SMALLEST = 1e-6  # size below which a step's error is absolute, not relative
 ZERO = 1e-14  # an acceleration at contact below this is zero: it is a difference of loads of order 1
 EXACT = 1e-15  # at rest a small error of the load would decide whether a touch is a release, and there steps cost little
