@@ -7,10 +7,11 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
+from saltus.errors import ParameterError
 from saltus.flow import simulate
 from saltus.flow.compile import cache_directory
 from saltus.flow.simulation import _structures
-from saltus.systems import Harmonic, Load, Model, System, VelocityReduction
+from saltus.systems import Harmonic, Load, Model, System, VelocityReduction, WallOscillator
 from saltus.systems.registry import MODELS, register
 
 
@@ -156,3 +157,13 @@ def test_an_array_in_a_model_is_not_taken_from_another_one():
     one, four = (System(model=Tabulated(factors=np.array([f]))) for f in (1.0, 4.0))
     assert structure_key(one) != structure_key(four)
     assert [Interpreted(s).coefficients(0.0, 0.5, 0.0, 3)[0, 2] for s in (one, four)] == [-0.25, -1.0]
+
+
+@pytest.mark.parametrize(("gap", "message"), [("1 - x**2", "one contact point, not two stops"), ("2 - x", "must be 0 at")])
+def test_a_gap_that_does_not_fit_its_contact_is_refused(gap, message):
+    class Stops(WallOscillator):
+        def gap(self, x, side):
+            return eval(gap, {}, {"x": x})
+
+    with pytest.raises(ParameterError, match=message):
+        simulate(System(model=Stops()), x=0.0, duration=1.0)

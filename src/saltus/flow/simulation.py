@@ -15,7 +15,7 @@ from saltus.flow.compile import Structure, load_kernel, load_structure
 from saltus.flow.motion import Motion, Stop
 from saltus.flow.recorder import Recorder
 from saltus.flow.trace import Trace, record_table, trace
-from saltus.systems import Record, System
+from saltus.systems import Model, Record, System
 from saltus.systems.checks import check_number
 from saltus.systems.parameters import children, is_number, numbers
 
@@ -195,12 +195,25 @@ def taylor_order(tol: float) -> int:
     return round(10 + 1.25 * (-math.log10(tol) - 6))
 
 
+def _check_gap(model: Model) -> None:
+    """Refuse a gap that is not linear in the coordinate, or not zero at `contact`: a model has one contact point."""
+    point, name = float(model.contact), type(model).__name__
+    for side in model.sides:
+        at, below, above = (float(model.gap(point + x, side)) for x in (0.0, -1.0, 1.0))
+        rounding = 1e-9 * (abs(below) + abs(above))
+        if abs(at) > rounding:
+            raise ParameterError(f"{name}.gap must be 0 at {name}.contact = {point:g}, got {at:g} on side {side}; give both")
+        if abs(below + above) > rounding:
+            raise ParameterError(f"{name}.gap must be linear in the coordinate: a model has one contact point, not two stops")
+
+
 def _choose_side(system: System, where: np.ndarray, position: np.ndarray, speeds: np.ndarray) -> None:
     """The mode and the side of a state: by the gap, at contact by the velocity, and at rest there by the accelerations."""
     model = system.model
     where[k.MODE], where[k.SIDE] = k.ARC, 1
     if not model.sides:
         return
+    _check_gap(model)
     gaps = {s: float(model.gap(position[0], s)) for s in model.sides}
     inside = [s for s, gap in gaps.items() if gap > 0]
     if inside:
