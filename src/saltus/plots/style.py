@@ -61,6 +61,7 @@ RC: Any = {
     "lines.linewidth": 1.0,
     "lines.solid_capstyle": "round",
     "pdf.fonttype": 42,  # fonts embedded whole, so that a publisher can edit the text
+    "agg.path.chunksize": 20_000,  # a curve of a million points is drawn in pieces
     "savefig.dpi": RESOLUTION,
     "figure.dpi": 100,
     "axes.formatter.use_mathtext": True,
