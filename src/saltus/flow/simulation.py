@@ -100,10 +100,7 @@ def simulate(
     if not isinstance(system, System):
         raise ParameterError(f"simulate takes a System(model=..., load=..., impact=...), got {system!r}")
     position, speeds = _start_state(system, velocity, coordinates)
-    try:
-        limits = tuple(dict.fromkeys((*system.model.stops, *([stop_at] if isinstance(stop_at, str) else stop_at))))
-    except TypeError:
-        raise ParameterError(f"stop_at must be the names of margins, such as ['kinematic_limit'], got {stop_at!r}") from None
+    limits = _limits(system, stop_at)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     check_number("time", time)
     if side not in (None, 1, -1):
@@ -115,6 +112,13 @@ def simulate(
     where[k.FORCED], where[k.DENSE] = side or 0, int(dense or samples is not None)
     status = _advance(system, run, where, state, settings, recorder, progress)
     return _collect(system, run, where, state, settings, float(time), status, recorder)
+
+
+def _limits(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
+    try:
+        return tuple(dict.fromkeys((*system.model.stops, *([stop_at] if isinstance(stop_at, str) else stop_at))))
+    except TypeError:
+        raise ParameterError(f"stop_at must be the names of margins, such as ['kinematic_limit'], got {stop_at!r}") from None
 
 
 def _sample_times(samples: Any, start: float) -> np.ndarray:
@@ -273,7 +277,8 @@ def _refuse(system: System, status: int, where: np.ndarray, state: np.ndarray, s
     if status == k.NO_IMPACT:
         raise MotionError(
             f"{system.impact!r} has no velocity after the impact {at} with velocity {velocity:.6g} before it: no value of the "
-            "sign that leads on meets the law (errata 26); use VelocityReduction there"
+            "sign that leads on meets the law (errata 26; VelocityReduction always has one), or the model's reset leads "
+            "back into the contact"
         )
     if status == k.NOT_FINITE:
         raise MotionError(
