@@ -52,7 +52,7 @@ class Emitter:
     # --- scalars -------------------------------------------------------------------------------------------------------
 
     def _is_constant(self, node: Expr) -> bool:
-        return node.degree == 0 and not any(n.op == "side" for n in ordered([node]))
+        return node.degree == 0 and not any(n.op in ("side", "origin") for n in ordered([node]))
 
     def _constants(self) -> str:
         """The function that fills the table `c` from the parameters `p`, once for a motion."""
@@ -322,7 +322,14 @@ RECURRENCES: dict[str, Callable[[_SeriesWriter, Expr], None]] = {
 
 def _leaf(node: Expr) -> str:
     """The text of a leaf in a function of one instant."""
-    texts = {"parameter": f"p[{node.value}]", "time": "t", "side": "side", "coordinate": "q0", "velocity": "v0"}
+    texts = {
+        "parameter": f"p[{node.value}]",
+        "time": "t",
+        "origin": "origin",
+        "side": "side",
+        "coordinate": "q0",
+        "velocity": "v0",
+    }
     if node.op == "number":
         return "math.nan" if node.value != node.value else f"({node.value!r})"
     if node.op == "record":

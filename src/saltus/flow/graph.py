@@ -14,7 +14,7 @@ from saltus.errors import TraceError
 
 # What a reset, evaluated at one instant, may use besides the operations that have a Taylor recurrence.
 POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
-LEAVES = ("number", "parameter", "time", "side", "coordinate", "velocity", "acceleration", "record")
+LEAVES = ("number", "parameter", "time", "origin", "side", "coordinate", "velocity", "acceleration", "record")
 
 ALLOWED = (
     "+ - * /, powers, NumPy's sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, and abs of the coordinate "
@@ -145,7 +145,7 @@ class Expr:
 
 def _degree(op: str, args: tuple[Expr, ...]) -> int | None:
     """The degree in the time of the node's Taylor series, or None where it does not end."""
-    if op in ("number", "parameter", "side"):
+    if op in ("number", "parameter", "origin", "side"):
         return 0
     if op in ("coordinate", "velocity", "acceleration"):
         return None
@@ -295,7 +295,7 @@ def _chain(node: Expr, d: list[Expr]) -> Expr:
         "sub": lambda: d[0] - d[1],
         "mul": lambda: d[0] * b + a * d[1],
         "div": lambda: (d[0] - node * d[1]) / b,
-        "pow": lambda: b * power(a, b - 1) * d[0],
+        "pow": lambda: b * power(a, b - 1) * d[0] + (0.0 if d[1] is number(0.0) else node * combine("log", a) * d[1]),
         "sqrt": lambda: d[0] / (2.0 * node),
         "exp": lambda: node * d[0],
         "log": lambda: d[0] / a,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, TraceError, near
+from saltus.flow import tangent
 from saltus.flow.graph import POINTWISE, Expr, combine, differentiate, number, ordered, substitute
 from saltus.systems import Record, System
 from saltus.systems.parameters import substitute as substitute_numbers
@@ -68,9 +69,14 @@ class Trace:
     `acceleration`, one for each coordinate; `gap` and `gap_rate` (its derivative to the coordinate at contact); `contact`;
     `contact_acceleration`, the second derivative of the gap at rest at contact, a function of the time alone, and
     `contact_damping`, minus its derivative to the velocity; `next_side` and `velocity_after`, the reset; `margins` to stop at.
+
+    With `columns` of a tangent (see `tangent.py`) `acceleration` goes on after the model's own `dof` with those of the columns.
     """
 
     parameters: list[str] = field(default_factory=list)
+    dof: int = 1  # of the model
+    columns: int = 0
+    paths: tuple[str, ...] = ()  # of the parameters that the last columns are derivatives to
     records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative
     sides: int = 0  # of the contact
     acceleration: list[Expr] = field(default_factory=list)
@@ -89,14 +95,17 @@ class Trace:
         return Expr("parameter", (), len(self.parameters) - 1)
 
 
-def trace(system: System, stop_at: tuple[str, ...] = ()) -> Trace:
+def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None) -> Trace:
     """Trace the model, the load and the impact law of a system, and the margins that a motion stops at.
+
+    Given dotted paths (maybe none), trace the tangent as well: the derivatives to the state at the start and to those numbers.
 
     Raises:
         TraceError: an operation without a Taylor recurrence, a branch on the state, a time used outside the load.
-        ParameterError: a margin that the model does not have.
+        ParameterError: a margin that the model does not have; a path to no number.
     """
-    result = Trace(sides=len(system.model.sides))
+    paths = None if sensitivities is None else tangent.check_paths(system, sensitivities)
+    result = Trace(sides=len(system.model.sides), dof=len(system.model.coordinates))
     twin = substitute_numbers(system, result.symbol)
     _name_records(twin.load)
     object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
@@ -114,6 +123,8 @@ def trace(system: System, stop_at: tuple[str, ...] = ()) -> Trace:
         _trace_contact(result, twin, t, coordinates, velocities, side)
     _trace_margins(result, twin, t, q, v, side, stop_at)
     _check(result, type(system.model).__name__)
+    if paths is not None:
+        tangent.extend(result, paths)
     return result
 
 
@@ -211,13 +222,13 @@ def record_table(system: System, rows: list[tuple[str, int]]) -> tuple[np.ndarra
 def _fill(row: np.ndarray, breaks: np.ndarray, record: Record, order: int) -> None:
     from scipy.special import factorial
 
-    polynomial = record.polynomials[order]
+    polynomial = record.polynomials[order] if order < 3 else record.polynomials[2].derivative(order - 2)
     first, last = record.time[0], record.time[-1]
     inside = (breaks >= first) & (breaks < last)
     anchors = breaks[inside]
     for power in range(polynomial.c.shape[0]):
         row[1:][inside, power] = polynomial(anchors, nu=power) / factorial(power)
-    if record.quantity == "force" or order == 2:
+    if record.quantity == "force" or order >= 2:
         return
     for after in (False, True):  # the ground goes on with the velocity it has
         edge = last if after else first
