@@ -5,6 +5,8 @@ This text is compiled together with the kernel (see `kernel.py`, which says what
 
 from __future__ import annotations
 
+import math
+
 from saltus.flow.jit import jit
 from saltus.flow.layout import *
 from saltus.flow.steps import record_event, record_step
@@ -109,6 +111,12 @@ def accumulation(where, env, model, work, speed, t, origin, tol):
 
 
 @jit
+def slow_speed(tol):
+    """The speed of the gap after an impact below which it may be the end of an accumulation."""
+    return max(SLOW * math.sqrt(tol), CHATTER_SPEED)
+
+
+@jit
 def decide(where, state, settings, env, model, work, steps, events, origin, t_end):
     """At contact: find the next mode. Returns PAUSED to go on, or why the motion ends."""
     q = work[0]
@@ -125,7 +133,7 @@ def decide(where, state, settings, env, model, work, steps, events, origin, t_en
         return PAUSED
     where[MODE], where[SKIP], where[HELD] = ARC, 1, 0
     speed = rate_of(model, float(where[SIDE])) * velocity
-    if speed < SLOW:
+    if speed < slow_speed(settings[TOLERANCE]):
         mode, left = accumulation(where, env, model, work, speed, t, origin, settings[TOLERANCE])
         if mode == REST and where[PERIOD] == where[LAST] and t + left > t_end:
             mode = ARC  # the motion ends before the accumulation does

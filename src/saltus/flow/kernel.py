@@ -146,7 +146,9 @@ def advance(where, state, settings, env, model, steps, events):
         np.zeros((2, order + 2)),
         (np.zeros((dof, 2)), np.zeros((dof, 2)), np.zeros((dof, 2)), np.zeros(2), np.zeros((max(where[STOPS], 1), 2))),
     )
-    for _ in range(BATCH):
+    for batch in range(BATCH):
+        if where[VISIT] > 0 and batch > 0 and where[MODE] == ARC and where[SKIP] <= 1:
+            return VISITED
         if where[STEPS] >= steps[1].shape[0] - 4 or where[EVENTS] >= events[1].shape[0] - 4:
             return FULL
         origin = where[PERIOD] * settings[LENGTH]

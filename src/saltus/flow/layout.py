@@ -10,12 +10,14 @@ import numpy as np
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 ARC, CONTACT, REST, CHATTER = 0, 1, 2, 3  # modes
-DONE, FULL, PAUSED, NOT_UNIQUE, NO_IMPACT, NOT_FINITE, STALLED, LIMITED = 0, 1, 2, 3, 4, 5, 6, 7  # why `advance` returns
+DONE, FULL, PAUSED, NOT_UNIQUE, NO_IMPACT, NOT_FINITE, STALLED, LIMITED, VISITED = range(9)  # why `advance` returns
 CROSSING, GRAZING, RESTING, RELEASE, CHATTERING, LIMIT = 0, 1, 2, 3, 4, 5  # events
 PERIOD, MODE, SIDE, SKIP, PIECE, STEPS = 0, 1, 2, 3, 4, 5  # in `where`,
 EVENTS, LAST, ORDER, DENSE, FORCED, HELD = 6, 7, 8, 9, 10, 11
 DOF, STOPS, ROWS, SIDES = 12, 13, 14, 15  # and the structure's: coordinates, margins, workspace rows, sides of the contact,
 STEEP = 16  # whether it has functions whose bends a series may not see
+VISIT = 17  # whether `advance` returns VISITED as soon as a smooth motion is all there is (see `lanes.py`)
+WHERE = 18  # the length of `where`
 TIME, SPEED, STATE = 0, 1, 2  # in `state`: local time, chatter speed, then the coordinates and the velocities
 LENGTH, END, TOLERANCE = 0, 1, 2  # in `settings`: the forcing period, the local time at the end, the tolerance
 
@@ -26,7 +28,7 @@ SHORTEST = 1e-9  # step, in units of time or of a shorter forcing period: below 
 SMALLEST = 1e-6  # size below which a step's error is absolute, not relative
 ZERO = 1e-14  # an acceleration at contact below this is zero: it is a difference of loads of order 1
 EXACT = 1e-15  # at rest a small error of the load would decide whether a touch is a release, and there steps cost little
-SLOW = 1e-2  # a faster impact cannot be the end of an accumulation, and is not tested for it
+SLOW = 3.0  # in sqrt(tol): a faster impact is not tested for being the end of an accumulation
 CHATTER_SPEED = 1e-5  # the averaged law is then wrong by 5e-5 of the speed; following on takes 1e5 impacts a unit of time
 SLOWLY = 0.02  # the most that the contact accelerations may change over two impacts for the averaged law
 LOSSLESS = 1e-12  # a loss of speed over two impacts below this is rounding

@@ -163,7 +163,7 @@ def _prepare(
     tol: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The kernel's state at the start: counters, numbers and settings (see `kernel.py`)."""
-    where, state = np.zeros(17, dtype=np.int64), np.concatenate([[0.0, 0.0], position, speeds])
+    where, state = np.zeros(k.WHERE, dtype=np.int64), np.concatenate([[0.0, 0.0], position, speeds])
     length = system.load.period
     if (periods is None) == (duration is None):
         raise ParameterError("say how long: either periods=... or duration=...")
