@@ -18,7 +18,7 @@ class Interpreted:
     def __init__(self, system, stop_at=()):
         self.trace = trace(system, stop_at)
         self.source = Emitter(self.trace).source()
-        names = ["CONSTANTS", "GEOMETRY", "SERIES", "CONTACT_SERIES", "RESET", "CONTACT_DAMPING"]
+        names = ["CONSTANTS", "GEOMETRY", "SERIES", "CONTACT_SERIES", "RESET", "CONTACT_DAMPING", "TANGENT"]
         self.scope = {
             "math": math,
             "np": np,

@@ -32,7 +32,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.jit import ADVANCE, CONSTANTS, CONTACT_DAMPING, CONTACT_SERIES, GEOMETRY, RESET, SERIES, cached_jit, jit
+from saltus.flow.jit import ADVANCE, CONSTANTS, CONTACT_DAMPING, CONTACT_SERIES, GEOMETRY, RESET, SERIES, TANGENT, cached_jit, jit
 
 '''
 
@@ -74,7 +74,7 @@ class Structure:
     """The compiled functions of a traced structure, and its sizes."""
 
     module: ModuleType
-    functions: tuple[Pointer, ...]  # series, contact_series, reset, contact_damping: what the kernel calls
+    functions: tuple[Pointer, ...]  # series, contact_series, reset, contact_damping, tangent: what the kernel calls
 
     def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """The arguments `env` and `model` of the kernel for given numbers (see `kernel.py`)."""
@@ -82,12 +82,12 @@ class Structure:
         self.module.constants(parameters, constants)
         env = (parameters, constants, *records)
         self.module.geometry(env, geometry)
-        return env, (*self.functions, geometry)
+        return env, (*self.functions[:4], geometry, self.functions[4])
 
     @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """Coordinates, margins, rows of the workspace, sides of the contact, whether steps are checked."""
-        return self.module.DOF, self.module.STOPS, self.module.ROWS, self.module.SIDES, self.module.STEEP
+    def sizes(self) -> tuple[int, ...]:
+        """Coordinates, margins, rows of the workspace, sides, whether steps are checked, the model's coordinates, columns."""
+        return tuple(getattr(self.module, name) for name in ("DOF", "STOPS", "ROWS", "SIDES", "STEEP", "OWN", "COLUMNS"))
 
 
 @cache
@@ -102,7 +102,7 @@ def load_kernel() -> Callable[..., int]:
 def load_structure(trace: Trace) -> Structure:
     """The functions of a trace's structure, as `emit.py` generates them."""
     module = _load("structure", _body(records) + Emitter(trace).source())
-    names = ("series", "contact_series", "reset", "contact_damping")
+    names = ("series", "contact_series", "reset", "contact_damping", "tangent")
     return Structure(module, tuple(Pointer(getattr(module, name)) for name in names))
 
 

@@ -9,7 +9,7 @@ import math
 
 from saltus.flow.jit import jit
 from saltus.flow.layout import *
-from saltus.flow.steps import record_event, record_step
+from saltus.flow.steps import forget, record_event, record_shift, record_step
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -117,6 +117,33 @@ def slow_speed(tol):
 
 
 @jit
+def rest_columns(where, state, env, model, work, events, t, origin, tol):
+    """The tangent at rest, which begins at once: after an impact that leaves no speed it moves as that impact does.
+
+    A state next to one at rest comes to rest soon, unless impacts lose nothing: then there is no derivative to the state.
+    """
+    mode, _ = accumulation(where, env, model, work, TINY, t, origin, tol)
+    detail = AT_ONCE if mode == REST else NEVER_AGAIN
+    model[5](RESTING, detail, t, origin, float(where[SIDE]), env, where[PIECE], state)
+    events[0][where[EVENTS] - 1, 3] = detail
+    record_shift(where, state, events)
+
+
+@jit
+def release_columns(where, state, env, model, events, t, origin):
+    """How a release moves: with the contact acceleration's simple root, and not with a jump of the load, which has its time."""
+    breaks, piece = env[2], where[PIECE]
+    detail = AT_A_ROOT if where[SKIP] <= 3 else AT_NONE
+    if where[SKIP] == 2 and piece > 0 and abs(breaks[piece - 1] - origin - t) < 1e-12 * max(1.0, abs(origin)):
+        detail = AT_A_JUMP
+    model[5](RELEASE, detail, t, origin, float(where[SIDE]), env, piece, state)
+    for j in range(where[COLUMNS]):
+        if math.isnan(state[STATE + where[OWN] + j]):
+            state[STATE + 2 * where[DOF] + j] = math.nan
+    record_shift(where, state, events)
+
+
+@jit
 def decide(where, state, settings, env, model, work, steps, events, origin, t_end):
     """At contact: find the next mode. Returns PAUSED to go on, or why the motion ends."""
     q = work[0]
@@ -126,8 +153,12 @@ def decide(where, state, settings, env, model, work, steps, events, origin, t_en
             return NOT_UNIQUE
         if where[MODE] == REST and where[HELD] == 0:
             record_event(where, events, RESTING, 0, 0, t, 0.0, 0.0)
+            if where[COLUMNS] > 0:
+                rest_columns(where, state, env, model, work, events, t, origin, settings[TOLERANCE])
         if where[MODE] == ARC and where[HELD] != 0:
             record_event(where, events, RELEASE, where[SIDE], where[SKIP], t, 0.0, 0.0)
+            if where[COLUMNS] > 0:
+                release_columns(where, state, env, model, events, t, origin)
         where[HELD] = 1 if where[MODE] == REST else 0
         hold(where, state, model, q)
         return PAUSED
@@ -139,11 +170,15 @@ def decide(where, state, settings, env, model, work, steps, events, origin, t_en
             mode = ARC  # the motion ends before the accumulation does
         if mode == REST:
             record_event(where, events, RESTING, 0, 0, t + left, 0.0, 0.0)
+            if where[COLUMNS] > 0:
+                model[5](RESTING, AFTER_IMPACTS, t, origin, float(where[SIDE]), env, where[PIECE], state)
+                record_shift(where, state, events)
             hold(where, state, model, q)
             state[TIME] = min(t + left, t_end)
             record_step(where, steps, 0, t, state[TIME] - t, q)
         if mode == CHATTER:
             record_event(where, events, CHATTERING, where[SIDE], 0, t, velocity, velocity)
+            forget(where, state)
             hold(where, state, model, q)
             state[SPEED], where[SKIP] = speed, 0
         where[MODE], where[HELD] = mode, 0 if mode == ARC else 1
@@ -158,11 +193,15 @@ def impact(where, state, env, model, events, t, origin, before):
     where[MODE], where[SKIP], where[HELD] = CONTACT, 0, 0
     if rate_of(model, side) * before >= 0.0:  # a triple contact to within the working precision: no speed is left
         state[STATE + where[DOF]] = 0.0
-        record_event(where, events, GRAZING, where[SIDE], 0, t, before, 0.0)
+        record_event(where, events, GRAZING, where[SIDE], TRIPLE, t, before, 0.0)
+        forget(where, state)
         return PAUSED
     next_side, after = model[2](t, origin, before, side, env, piece)
     if not rate_of(model, next_side) * after >= 0.0:
         return NO_IMPACT
     record_event(where, events, CROSSING, where[SIDE], int(next_side), t, before, after)
+    if where[COLUMNS] > 0:
+        model[5](CROSSING, 0, t, origin, side, env, piece, state)
+        record_shift(where, state, events)
     where[SIDE], state[STATE + where[DOF]] = int(next_side), after
     return PAUSED

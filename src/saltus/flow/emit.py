@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from saltus.flow.emit_tangent import tangent_source
 from saltus.flow.graph import Expr, ordered, substitute
 from saltus.flow.trace import Trace
 
@@ -29,17 +30,20 @@ class Emitter:
         self.most_rows = 1
 
     def source(self) -> str:
-        """The functions `series`, `contact_series`, `reset`, `contact_damping`, `constants` and `geometry`, and their sizes."""
+        """`series`, `contact_series`, `reset`, `contact_damping`, `tangent`, `geometry` and `constants`, and their sizes."""
         trace = self.trace
         functions = [
             self._series(),
             self._contact_series(),
             self._pointwise("RESET", "reset", "t, origin, v0, side", [trace.next_side, trace.velocity_after]),
             self._pointwise("CONTACT_DAMPING", "contact_damping", "t, origin, side", [trace.contact_damping]),
+            tangent_source(self),
             self._geometry(),
         ]
         sizes = {
             "DOF": len(trace.acceleration),
+            "OWN": trace.dof,
+            "COLUMNS": trace.columns,
             "STOPS": len(trace.margins),
             "ROWS": self.most_rows,
             "SIDES": trace.sides,
@@ -83,21 +87,27 @@ class Emitter:
     def _pointwise(self, signature: str, name: str, arguments: str, roots: list[Expr | None]) -> str:
         """A function of one instant that returns the values of `roots`."""
         decorator = f"@cached_jit({signature}, fused=False)"
-        names: dict[Expr, str] = {}
-
-        def ref(node: Expr) -> str:
-            return self._constant(node) if self._is_constant(node) else names.get(node) or _leaf(node)
-
         head = f"def {name}({arguments + ', ' if arguments else ''}{CONTEXT}):"
         if roots[0] is None:
             return "\n".join([decorator, head, f"    return {', '.join(['0.0'] * len(roots))}", "", ""])
+        lines, results = self.statements([r for r in roots if r is not None], lambda node: f"{node.op[0].replace('c', 'q')}0")
+        return "\n".join([decorator, head, UNPACK, *(f"    {x}" for x in lines), f"    return {', '.join(results)}", "", ""])
+
+    def statements(self, roots: list[Expr], place: Callable[[Expr], str]) -> tuple[list[str], list[str]]:
+        """What computes `roots` at one instant, and their values' texts; `place` is the text of a coordinate or a velocity."""
+        names: dict[Expr, str] = {}
+
+        def ref(node: Expr) -> str:
+            if self._is_constant(node):
+                return self._constant(node)
+            return place(node) if node.op in ("coordinate", "velocity") else names.get(node) or _leaf(node)
+
         lines = []
-        for node in ordered([r for r in roots if r is not None]):
+        for node in ordered(roots):
             if not self._is_constant(node) and node.args:
                 names[node] = f"x{len(names)}"
-                lines.append(f"    {names[node]} = {_scalar(node, ref)}")
-        results = ", ".join(ref(r) for r in roots if r is not None)
-        return "\n".join([decorator, head, UNPACK, *lines, f"    return {results}", "", ""])
+                lines.append(f"{names[node]} = {_scalar(node, ref)}")
+        return lines, [ref(root) for root in roots]
 
     # --- series --------------------------------------------------------------------------------------------------------
 
@@ -322,14 +332,7 @@ RECURRENCES: dict[str, Callable[[_SeriesWriter, Expr], None]] = {
 
 def _leaf(node: Expr) -> str:
     """The text of a leaf in a function of one instant."""
-    texts = {
-        "parameter": f"p[{node.value}]",
-        "time": "t",
-        "origin": "origin",
-        "side": "side",
-        "coordinate": "q0",
-        "velocity": "v0",
-    }
+    texts = {"parameter": f"p[{node.value}]", "time": "t", "origin": "origin", "side": "side"}
     if node.op == "number":
         return "math.nan" if node.value != node.value else f"({node.value!r})"
     if node.op == "record":

@@ -43,6 +43,7 @@ SERIES = types.void(_f, _f, _f, ENV, _i, _f2, _f2, _f2, _f1, _f2, _f2, _i)
 CONTACT_SERIES = types.void(_f, _f, _f, ENV, _i, _f1, _f2, _i)
 RESET = types.UniTuple(_f, 2)(_f, _f, _f, _f, ENV, _i)
 CONTACT_DAMPING = _f(_f, _f, _f, ENV, _i)
+TANGENT = types.void(_i, _i, _f, _f, _f, ENV, _i, _f1)
 
 
 @contextmanager
@@ -54,7 +55,7 @@ def pointers() -> Iterator[None]:
 
 
 with pointers():
-    _functions = [types.FunctionType(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING)]
-    MODEL = types.Tuple((*_functions, _f1))
+    _functions = [types.FunctionType(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING, TANGENT)]
+    MODEL = types.Tuple((*_functions[:4], _f1, _functions[4]))
 STEP_BUFFERS, EVENT_BUFFERS = types.Tuple((_i2, _f2, _f3)), types.Tuple((_i2, _f2))
 ADVANCE = _i(_i1, _f1, _f1, ENV, MODEL, STEP_BUFFERS, EVENT_BUFFERS)

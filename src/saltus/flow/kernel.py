@@ -7,9 +7,13 @@ arguments. So these files are plain loops under the decorator `jit`, and share o
 A motion is in one of four modes. ARC: a smooth motion on one side. CONTACT: at the contact, to be decided. REST: held at the
 contact until an acceleration points outward. CHATTER: impacts without loss, too small and too many to follow one by one.
 
+With a tangent (see `tangent.py`) its columns are further coordinates, which `series` expands with the others. The steps are the
+motion's own, so its impacts are the same to the last bit, except where a column needs shorter ones. What an event makes of the
+columns, and how it moves, is the structure's function `tangent`; where it has none, it is nan.
+
 `env` = (parameters, constants, record breakpoints, record table). `model` = (the four functions; the coordinate at contact and
-the gap's rate of change with the coordinate there, on sides +1 and -1). `work` = (q, v, a, g, m, w, poly, b, end): the Taylor
-coefficients of coordinates, velocities, accelerations, gap and margins, the workspace of their recurrences, a scaled
+the gap's rate of change with the coordinate there, on sides +1 and -1; `tangent`). `work` = (q, v, a, g, m, w, poly, b, end):
+the Taylor coefficients of coordinates, velocities, accelerations, gap and margins, the workspace of their recurrences, a scaled
 polynomial, the contact accelerations of both sides, and the first five once more at the end of a step.
 """
 
@@ -25,7 +29,7 @@ from saltus.flow.jit import ADVANCE, jit
 from saltus.flow.jit import not_here as cached_jit
 from saltus.flow.layout import *
 from saltus.flow.roots import NEVER, SIMPLE, first_root, horner, scale_gap
-from saltus.flow.steps import leaps, record_event, record_step, step_size
+from saltus.flow.steps import column_step, leaps, record_event, record_shift, record_step, step_size
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -50,9 +54,12 @@ def arc(where, state, settings, env, model, work, steps, events, origin, target)
     order, t, size = where[ORDER], state[TIME], 0.0
     for i in range(where[DOF]):
         q[i, 0], v[i, 0] = state[STATE + i], state[STATE + where[DOF] + i]
-        size = max(size, abs(q[i, 0]), abs(v[i, 0]))
+        if i < where[OWN]:
+            size = max(size, abs(q[i, 0]), abs(v[i, 0]))
     model[0](t, origin, float(where[SIDE]), env, where[PIECE], q, v, a, g, m, w, order)
-    natural = step_size(v, order, size, settings[TOLERANCE])
+    natural = step_size(v[: where[OWN]], order, size, settings[TOLERANCE])
+    if where[COLUMNS] > 0:
+        natural = min(natural, column_step(where, q, v, a, order, ROUGHER * settings[TOLERANCE]))
     while where[STEEP] > 0 and leaps(where, env, model, work, t, origin, min(natural, target - t), size, settings[TOLERANCE]):
         natural = 0.5 * min(natural, target - t)
     h = min(natural, target - t)
@@ -78,7 +85,8 @@ def arc(where, state, settings, env, model, work, steps, events, origin, target)
     finite = True
     for i in range(where[DOF]):
         state[STATE + i], state[STATE + where[DOF] + i] = horner(q[i], order, tau), horner(v[i], order, tau)
-        finite = finite and math.isfinite(state[STATE + i]) and math.isfinite(state[STATE + where[DOF] + i])
+        if i < where[OWN]:
+            finite = finite and math.isfinite(state[STATE + i]) and math.isfinite(state[STATE + where[DOF] + i])
     if not finite or not h >= 0.0:
         return NOT_FINITE
     state[TIME] = target if hit < 0 and h == target - t else t + tau
@@ -87,6 +95,9 @@ def arc(where, state, settings, env, model, work, steps, events, origin, target)
         return impact(where, state, env, model, events, state[TIME], origin, state[STATE + where[DOF]])
     if hit >= 0:
         record_event(where, events, LIMIT, where[SIDE], hit, state[TIME], state[STATE + where[DOF]], state[STATE + where[DOF]])
+        if where[COLUMNS] > 0:
+            model[5](LIMIT, hit, state[TIME], origin, float(where[SIDE]), env, where[PIECE], state)
+            record_shift(where, state, events)
         return LIMITED
     unit = min(settings[LENGTH], 1.0) if settings[LENGTH] > 0.0 else 1.0
     return PAUSED if natural > SHORTEST * unit or h == target - t else STALLED

@@ -56,9 +56,9 @@ class Events(Sequence[Event]):
         return Events(self._times[chosen], self._labels[chosen], self._values[chosen])
 
     @property
-    def last_detail(self) -> int:
-        """What the kernel noted with the last event: of a limit, which margin it is."""
-        return int(self._labels[-1, 3])
+    def details(self) -> np.ndarray:
+        """What the kernel noted with each event, as `layout.py` says: of a limit, which margin it is."""
+        return self._labels[:, 3]
 
     def crossings(self) -> Crossings:
         """The impacts, as arrays."""
@@ -74,10 +74,12 @@ class Recorder:
     bounded by the samples and the events.
     """
 
-    def __init__(self, system: System, order: int, length: float, dense: bool, sample_times: np.ndarray | None) -> None:
+    def __init__(
+        self, system: System, order: int, length: float, dense: bool, sample_times: np.ndarray | None, columns: int = 0
+    ) -> None:
         dof, size = len(system.model.coordinates), BUFFER if dense or sample_times is not None else 8
         self.steps = (np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
-        self.events = (np.empty((BUFFER, 4), dtype=np.int64), np.empty((BUFFER, 3)))
+        self.events = (np.empty((BUFFER, 4), dtype=np.int64), np.empty((BUFFER, 3 + columns)))
         self.total = 0  # events so far
         self._kept = 0  # steps so far
         self._length, self._times = length, sample_times
@@ -119,7 +121,11 @@ class Recorder:
     def all_events(self) -> Events:
         """Everything that happened."""
         labels, values = (np.concatenate([chunk[i] for chunk in self._events]) for i in (0, 1))
-        return Events(labels[:, 0] * self._length + values[:, 0], labels, values)
+        return Events(labels[:, 0] * self._length + values[:, 0], labels, values[:, :3])
+
+    def event_shifts(self) -> np.ndarray:
+        """How the time of each event moves with each column of the tangent, (events, columns); nan where that is not known."""
+        return np.concatenate([values[:, 3:] for _, values in self._events])
 
     def dense(self) -> DenseOutput | None:
         """The whole dense output, or None where it was not kept."""

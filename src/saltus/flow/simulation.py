@@ -33,11 +33,11 @@ class Program:
     limits: tuple[str, ...]
 
 
-def program(system: System, limits: tuple[str, ...] = ()) -> Program:
-    """A system ready to run. Its structure is traced and compiled, or found; its numbers are only read."""
-    key = (structure_key(system), limits)
+def program(system: System, limits: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None) -> Program:
+    """A system ready to run, with a tangent if asked. Its structure is traced and compiled, or found; numbers are only read."""
+    key = (structure_key(system), limits, sensitivities)
     if key not in _structures:
-        traced = trace(system, limits)
+        traced = trace(system, limits, sensitivities)
         _structures[key] = traced, load_structure(traced)
     traced, structure = _structures[key]
     parameters = np.array([value for _, value in numbers(system)])
@@ -97,6 +97,50 @@ def simulate(
         ParameterError: an argument without meaning.
         MotionError: the motion is not unique, an impact has no solution, or the numbers overflow; with the instant.
     """
+    followed = follow(
+        system,
+        None,
+        velocity=velocity,
+        periods=periods,
+        duration=duration,
+        tol=tol,
+        time=time,
+        side=side,
+        stop_at=stop_at,
+        dense=dense,
+        samples=samples,
+        progress=progress,
+        coordinates=coordinates,
+    )
+    return followed.motion
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A motion, and what the kernel has left of its tangent."""
+
+    motion: Motion
+    columns: np.ndarray  # (2 degrees of freedom, columns): of the coordinates, then of the velocities, at the end
+    shifts: np.ndarray  # (events, columns): how the time of each event moves
+
+
+def follow(
+    system: System,
+    sensitivities: tuple[str, ...] | None,
+    *,
+    velocity: Any,
+    periods: float | None,
+    duration: float | None,
+    tol: float,
+    time: float,
+    side: int | None,
+    stop_at: Iterable[str],
+    dense: bool,
+    samples: Any,
+    progress: Callable[[float], object] | None,
+    coordinates: dict[str, float],
+) -> Followed:
+    """`simulate`, and its tangent if `sensitivities` is not None."""
     if not isinstance(system, System):
         raise ParameterError(f"simulate takes a System(model=..., load=..., impact=...), got {system!r}")
     position, speeds = _start_state(system, velocity, coordinates)
@@ -105,13 +149,21 @@ def simulate(
     check_number("time", time)
     if side not in (None, 1, -1):
         raise ParameterError(f"side must be +1 or -1, got {side!r}")
-    run = program(system, limits)
+    run = program(system, limits, sensitivities)
     where, state, settings = _prepare(system, run, position, speeds, periods, duration, float(time), tol)
     sample_times = None if samples is None else _sample_times(samples, float(time))
-    recorder = Recorder(system, int(where[k.ORDER]), float(settings[k.LENGTH]), dense, sample_times)
+    recorder = Recorder(system, int(where[k.ORDER]), float(settings[k.LENGTH]), dense, sample_times, int(where[k.COLUMNS]))
     where[k.FORCED], where[k.DENSE] = side or 0, int(dense or samples is not None)
     status = _advance(system, run, where, state, settings, recorder, progress)
-    return _collect(system, run, where, state, settings, float(time), status, recorder)
+    motion = _collect(system, run, where, state, settings, float(time), status, recorder)
+    return Followed(motion, _columns(where, state), recorder.event_shifts())
+
+
+def _columns(where: np.ndarray, state: np.ndarray) -> np.ndarray:
+    own, shape = where[k.OWN], (2, 1 + where[k.COLUMNS], where[k.OWN])
+    both = state[k.STATE : k.STATE + 2 * where[k.DOF]].reshape(shape)
+    columns: np.ndarray = both[:, 1:].transpose(0, 2, 1).reshape(2 * own, -1)
+    return columns
 
 
 def _limits(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
@@ -163,7 +215,7 @@ def _prepare(
     tol: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The kernel's state at the start: counters, numbers and settings (see `kernel.py`)."""
-    where, state = np.zeros(k.WHERE, dtype=np.int64), np.concatenate([[0.0, 0.0], position, speeds])
+    where, state = np.zeros(k.WHERE, dtype=np.int64), _first_state(run, position, speeds)
     length = system.load.period
     if (periods is None) == (duration is None):
         raise ParameterError("say how long: either periods=... or duration=...")
@@ -189,9 +241,17 @@ def _prepare(
         state[k.TIME], last = local, int(first + whole)
     where[k.PERIOD], where[k.LAST], where[k.ORDER] = int(first), last, taylor_order(tol)
     where[k.PIECE] = np.searchsorted(run.env[2], time, side="right")
-    where[[k.DOF, k.STOPS, k.ROWS, k.SIDES, k.STEEP]] = run.structure.sizes
+    where[[k.DOF, k.STOPS, k.ROWS, k.SIDES, k.STEEP, k.OWN, k.COLUMNS]] = run.structure.sizes
     _choose_side(system, where, position, speeds)
     return where, state, np.array([length, end, tol])
+
+
+def _first_state(run: Program, position: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    """Local time, chatter speed, coordinates and velocities, each followed by the tangent's columns, and the shifts."""
+    columns = run.structure.sizes[-1]
+    start = np.eye(columns, 2 * position.size)  # in row j what column j begins with
+    u, z = start[:, : position.size].ravel(), start[:, position.size :].ravel()
+    return np.concatenate([[0.0, 0.0], position, u, speeds, z, np.zeros(columns)])
 
 
 def taylor_order(tol: float) -> int:
@@ -268,7 +328,7 @@ def _global_time(where: np.ndarray, state: np.ndarray, settings: np.ndarray) -> 
 def _refuse(system: System, status: int, where: np.ndarray, state: np.ndarray, settings: np.ndarray) -> None:
     """Turn a status that is not an end into a sentence."""
     at = f"at time {_global_time(where, state, settings):.9g}"
-    velocity = state[k.STATE + len(system.model.coordinates)]
+    velocity = state[k.STATE + where[k.DOF]]
     if status == k.NOT_UNIQUE:
         raise MotionError(
             f"the motion from rest at contact {at} is not unique: the accelerations of both sides point away from it; "
@@ -304,9 +364,9 @@ def _collect(
     held = where[k.MODE] in (k.REST, k.CHATTER)
     stop, limit = (Stop.REST if where[k.MODE] == k.REST else Stop.HORIZON), None
     if status == k.LIMITED:
-        stop, limit = Stop.LIMIT, run.limits[events.last_detail]
+        stop, limit = Stop.LIMIT, run.limits[events.details[-1]]
     dof = len(system.model.coordinates)
-    position, velocity = state[k.STATE : k.STATE + dof], state[k.STATE + dof :]
+    position, velocity = (state[start : start + dof] for start in (k.STATE, k.STATE + where[k.DOF]))
     side = 0 if held else int(where[k.SIDE])
     samples = recorder.samples(time, position, velocity, side)
     return Motion(

@@ -55,19 +55,50 @@ def leaps(where, env, model, work, t, origin, h, size, tol):
         q_end[i, 0], v_end[i, 0] = horner(q[i], order, h), horner(v[i], order, h)
     model[0](t + h, origin, float(where[SIDE]), env, where[PIECE], q_end, v_end, a_end, g_end, m_end, w, 0)
     defect = 0.0
-    for i in range(where[DOF]):
+    for i in range(where[OWN]):
         defect = max(defect, abs(a_end[i, 0] - horner(a[i], order, h)))
     return defect > DEFECT * tol * max(size, SMALLEST) / h
 
 
 @jit
 def record_event(where, events, kind, side, detail, t, before, after):
-    """Append an event: (period, kind, side, detail) and (local time, velocity before, velocity after)."""
+    """Append an event: (period, kind, side, detail) and (local time, velocity before, velocity after, shifts)."""
     labels, values = events
     i = where[EVENTS]
     labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = where[PERIOD], kind, side, detail
     values[i, 0], values[i, 1], values[i, 2] = t, before, after
+    for j in range(where[COLUMNS]):
+        values[i, 3 + j] = math.nan  # unless `record_shift` knows better
     where[EVENTS] = i + 1
+
+
+@jit
+def record_shift(where, state, events):
+    """Note with the last event how its time moves with each column of the tangent, as `tangent` has left it in the state."""
+    for j in range(where[COLUMNS]):
+        events[1][where[EVENTS] - 1, 3 + j] = state[STATE + 2 * where[DOF] + j]
+
+
+@jit
+def forget(where, state):
+    """There is no tangent from here on."""
+    for i in range(where[OWN], where[DOF]):
+        state[STATE + i] = state[STATE + where[DOF] + i] = math.nan
+    for j in range(where[COLUMNS]):
+        state[STATE + 2 * where[DOF] + j] = math.nan
+
+
+@jit
+def column_step(where, q, v, a, order, tol):
+    """The longest step that the series of the tangent's columns allow, each relative to its own size."""
+    step, own = np.inf, where[OWN]
+    for first in range(own, where[DOF], own):
+        size = 0.0
+        for i in range(first, first + own):
+            size = max(size, abs(q[i, 0]), abs(v[i, 0]), abs(a[i, 0]))
+        if 0.0 < size < np.inf:
+            step = min(step, step_size(v[first : first + own], order, size, tol))
+    return step
 
 
 @jit
@@ -79,7 +110,7 @@ def record_step(where, steps, side, t, h, q):
     i = where[STEPS]
     labels[i, 0], labels[i, 1] = where[PERIOD], side
     spans[i, 0], spans[i, 1] = t, h
-    for d in range(q.shape[0]):
+    for d in range(where[OWN]):
         for k in range(where[ORDER] + 2):
             coefficients[i, d, k] = q[d, k]
     where[STEPS] = i + 1

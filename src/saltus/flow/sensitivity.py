@@ -1,0 +1,158 @@
+"""Sensitivities: the derivatives of a motion to the state that it starts from and to parameters, impacts included."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.flow import layout as k
+from saltus.flow.motion import EventKind, Motion, Stop
+from saltus.flow.simulation import Followed, follow
+from saltus.flow.tangent import FREQUENCY
+from saltus.systems import System
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """The derivatives of a motion of n degrees of freedom; a state is (coordinates, velocities), 2 n numbers.
+
+    They hold for the motion that `simulate` returns for the same arguments: at the end of a `duration`, at the end of so many
+    `periods` even as the load's frequency changes them, or where a margin ends it. A derivative is one-sided where the motion
+    starts at contact, is released by a jump of the load, ends on an event, or grazes the contact (see `grazings`).
+
+    `event_times` has a row for each of `motion.events` and a column for each initial coordinate, initial velocity and
+    parameter: the derivative of its time. It is nan where the event has none (a grazing, the beginning of chatter) or where
+    the motion had lost its derivative before.
+    """
+
+    motion: Motion
+    state: np.ndarray  # (2 n, 2 n): of the state at the end to the one at the start
+    parameters: np.ndarray  # (2 n, parameters): of the state at the end to each parameter
+    parameter_paths: tuple[str, ...]
+    event_times: np.ndarray  # (events, 2 n + parameters)
+    grazings: np.ndarray  # times at which the motion touches the contact; on the other side of a touch the derivative is another
+    undefined: str | None  # why the derivatives at the end, or some of them, do not exist; those are nan
+
+    @property
+    def determinant(self) -> float:
+        """Of `state`: by what factor the flow has scaled volumes of states; 0 after rest."""
+        return float(np.linalg.det(self.state))
+
+    def __repr__(self) -> str:
+        to = ", ".join(("state", *self.parameter_paths))
+        rest = f", undefined: {self.undefined}" if self.undefined else f", determinant={self.determinant:.6g}"
+        return f"Sensitivities(of {self.motion!r} to {to}{rest})"
+
+
+def sensitivities(
+    system: System,
+    *,
+    parameters: Iterable[str] = (),
+    velocity: Any = 0.0,
+    periods: float | None = None,
+    duration: float | None = None,
+    tol: float = 1e-12,
+    time: float = 0.0,
+    side: int | None = None,
+    stop_at: Iterable[str] = (),
+    dense: bool = True,
+    progress: Callable[[float], object] | None = None,
+    **coordinates: float,
+) -> Sensitivities:
+    """The derivatives of an exact motion to its initial state and to parameters, with the saltation of every event.
+
+    Along an arc u = dq/dc obeys u'' = a_q u + a_v u' + a_c, expanded beside the motion in the same steps. At an impact with
+    v+ = R(v-, t, c), whose time moves by dt = (x_c - u-) / v-, x(c) being the contact,
+
+        u+ = x_c - v+ dt,     u'+ = R_v (u'- + a_old dt) + R_t dt + R_c - a_new dt,
+
+    whose determinant is R_v v+ / v-. A release moves with the root of the contact acceleration; at rest the derivatives are
+    those of the contact.
+
+    Args:
+        system: what moves.
+        parameters: dotted paths of the numbers to differentiate to, such as "load.frequency", "impact.e".
+        velocity, periods, duration, tol, time, side, stop_at, dense, progress, coordinates: as for `simulate`.
+
+    Raises:
+        ParameterError: a path to no number, with the near ones; an argument without meaning.
+        MotionError: as for `simulate`.
+    """
+    paths = _paths(parameters)
+    followed = follow(
+        system,
+        paths,
+        velocity=velocity,
+        periods=periods,
+        duration=duration,
+        tol=tol,
+        time=time,
+        side=side,
+        stop_at=stop_at,
+        dense=dense,
+        samples=None,
+        progress=progress,
+        coordinates=coordinates,
+    )
+    motion, n = followed.motion, len(system.model.coordinates)
+    columns = followed.columns + np.outer(_rates(motion), _end_shift(followed, paths, periods))
+    return Sensitivities(
+        motion=motion,
+        state=columns[:, : 2 * n],
+        parameters=columns[:, 2 * n :],
+        parameter_paths=paths,
+        event_times=followed.shifts,
+        grazings=np.array([event.time for event in motion.events.of(EventKind.GRAZING)]),
+        undefined=_undefined(motion, columns),
+    )
+
+
+def _paths(parameters: Iterable[str]) -> tuple[str, ...]:
+    try:
+        return (parameters,) if isinstance(parameters, str) else tuple(parameters)
+    except TypeError:
+        raise ParameterError(f"parameters must be dotted paths, such as ['load.frequency'], got {parameters!r}") from None
+
+
+def _end_shift(followed: Followed, paths: tuple[str, ...], periods: float | None) -> np.ndarray:
+    """How the time at the end moves with each column: with a margin that ends the motion, or with the forcing period."""
+    motion, shift = followed.motion, np.zeros(followed.columns.shape[1])
+    if motion.stop is Stop.LIMIT:
+        return followed.shifts[-1]
+    if periods is not None and FREQUENCY in paths:
+        frequency = motion.system.load.frequency
+        assert frequency is not None
+        shift[followed.columns.shape[0] + paths.index(FREQUENCY)] = -2.0 * math.pi * periods / frequency**2
+    return shift
+
+
+def _rates(motion: Motion) -> np.ndarray:
+    """The time derivative of the state at the end."""
+    system, side = motion.system, motion.side
+    velocity = np.atleast_1d(motion.velocity)
+    if side == 0:
+        return np.zeros(2 * velocity.size)
+    acceleration = system.model.acceleration(motion.time, motion.position, motion.velocity, float(side), system.load)
+    return np.concatenate([velocity, np.atleast_1d(np.asarray(acceleration, dtype=float))])
+
+
+def _undefined(motion: Motion, columns: np.ndarray) -> str | None:
+    """Why not every column has a number: the last event that took its derivative from the motion."""
+    if np.isfinite(columns).all():
+        return None
+    for event, detail in zip(reversed(motion.events), motion.events.details[::-1], strict=True):
+        if event.kind is EventKind.CHATTER:
+            return f"at time {event.time:.9g} impacts without loss became too small to be followed, and their phase is lost"
+        if event.kind is EventKind.GRAZING and detail == k.TRIPLE:
+            return f"at time {event.time:.9g} the motion meets the contact without speed, where it has no derivative"
+        if event.kind is EventKind.REST and detail == k.NEVER_AGAIN:
+            return (
+                f"from time {event.time:.9g} on it rests at contact and impacts lose nothing, so that a motion from a state "
+                "beside it never comes to rest: there is no derivative to what moves it off the contact"
+            )
+    return "the derivatives leave the range of numbers"
