@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from saltus import flow, systems, theory
     from saltus.config import load_study
     from saltus.errors import MotionError, ParameterError, SaltusError, TraceError
-    from saltus.flow import EventKind, Motion, Stop, simulate
+    from saltus.flow import EventKind, Motion, Sensitivities, Stop, sensitivities, simulate
     from saltus.systems import (
         EnergyRestitution,
         Harmonic,
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "saltus.errors": ("MotionError", "ParameterError", "SaltusError", "TraceError"),
     "saltus.config": ("load_study",),
-    "saltus.flow": ("EventKind", "Motion", "Stop", "simulate"),
+    "saltus.flow": ("EventKind", "Motion", "Sensitivities", "Stop", "sensitivities", "simulate"),
     "saltus.systems": (
         "EnergyRestitution",
         "Harmonic",
@@ -71,6 +71,7 @@ __all__ = [
     "Record",
     "RockingBlock",
     "SaltusError",
+    "Sensitivities",
     "Stop",
     "System",
     "TraceError",
@@ -81,6 +82,7 @@ __all__ = [
     "flow",
     "load_study",
     "register",
+    "sensitivities",
     "simulate",
     "systems",
     "theory",

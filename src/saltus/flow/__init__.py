@@ -1,11 +1,23 @@
 """How it moves: a model is traced into Taylor recurrences, compiled once for its structure, and followed event by event.
 
 Impacts are roots of the gap's series, found for certain; rest, release, accumulations of impacts and chatter are modes of
-their own. Nothing is smoothed. `simulate` is the way in; `Motion` is what it returns.
+their own. Nothing is smoothed. `simulate` is the way in; `Motion` is what it returns, and `sensitivities` differentiates it.
 """
 
 from saltus.flow.motion import Crossings, DenseOutput, Event, EventKind, Motion, Stop
+from saltus.flow.sensitivity import Sensitivities, sensitivities
 from saltus.flow.simulation import simulate
 from saltus.flow.validity import Validity
 
-__all__ = ["Crossings", "DenseOutput", "Event", "EventKind", "Motion", "Stop", "Validity", "simulate"]
+__all__ = [
+    "Crossings",
+    "DenseOutput",
+    "Event",
+    "EventKind",
+    "Motion",
+    "Sensitivities",
+    "Stop",
+    "Validity",
+    "sensitivities",
+    "simulate",
+]
