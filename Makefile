@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+BENCH_READY := $(VENV)/.ready-bench
 
 .PHONY: help reproduce test lint bench lock clean
 
@@ -11,7 +12,7 @@ help:
 	@echo "make test        lint, type-check and run every test"
 	@echo "make bench       measure speed against other integrators, side by side"
 	@echo "make lint        ruff and mypy only"
-	@echo "make lock        renew requirements.lock from pyproject.toml"
+	@echo "make lock        renew both locks from pyproject.toml"
 
 reproduce: $(READY)
 	$(BIN)/saltus reproduce
@@ -24,8 +25,9 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-bench: $(READY)
-	$(BIN)/python benchmarks/run.py
+# BENCH passes options on: make bench BENCH="--quick --grid"
+bench: $(BENCH_READY)
+	$(BIN)/python benchmarks/run.py $(BENCH)
 
 # Debian splits ensurepip off into python3-venv; pip can fill a bare environment from outside.
 $(READY): requirements.lock pyproject.toml
@@ -36,9 +38,15 @@ $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -m pip --python $(BIN)/python install --quiet --no-deps --no-build-isolation -e .
 	@touch $@
 
+# What only the benchmarks need: the peers.
+$(BENCH_READY): $(READY) requirements-bench.lock
+	$(PYTHON) -m pip --python $(BIN)/python install --quiet --require-hashes -r requirements-bench.lock
+	@touch $@
+
 lock:
 	$(PYTHON) -m venv $(VENV)/lock && $(VENV)/lock/bin/pip install --quiet uv
-	$(VENV)/lock/bin/uv export --quiet --all-extras --no-emit-project --no-header --format requirements.txt -o requirements.lock
+	$(VENV)/lock/bin/uv export --quiet --extra test --no-emit-project --no-header --format requirements.txt -o requirements.lock
+	$(VENV)/lock/bin/uv export --quiet --extra bench --no-emit-project --no-header --format requirements.txt -o requirements-bench.lock
 	rm -rf $(VENV)/lock uv.lock
 
 clean:
