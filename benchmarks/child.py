@@ -23,11 +23,16 @@ def find(module: str, name: str) -> Any:
 
 
 def first(module: str, name: str, variant: str = "") -> dict[str, Any]:
-    """The first motions at 1e-10; a variant of the system is for saltus only."""
+    """Seconds for the first motion at 1e-10, after the imports; a variant of the system is for saltus only."""
     home = importlib.import_module(f"peers.{module}")
+    if module.startswith("saltus"):  # what its first use imports
+        import numba  # noqa: F401
+
+        import saltus.flow  # noqa: F401
+    start = time.perf_counter()
     flow = home.flow_of(variant, 1e-10) if variant else find(module, name).setup(1e-10)
     theta, _ = flow(np.array([0.3]), np.array([0.0]))
-    return {"theta": float(theta[0])}
+    return {"theta": float(theta[0]), "after_imports": time.perf_counter() - start}
 
 
 def zeno(module: str, name: str, enough: str) -> dict[str, Any]:

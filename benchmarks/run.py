@@ -38,7 +38,7 @@ def measure(peers: list[Peer], rounds: int, quick: bool) -> dict[str, Any]:
         "work": lambda: work_precision(peers, rounds, quick),
         "throughput": lambda: throughput(peers, min(rounds, 3), quick),
         "derivatives": lambda: derivative_cost(peers, rounds),
-        "startup": lambda: startup(peers, min(rounds, 2 if quick else 3)),
+        "startup": lambda: startup(peers, 1 if quick else min(rounds, 3)),
         "paper_way": lambda: paper_way(1 if quick else 2, quick),
         "zeno": lambda: zeno(peers),
     }

@@ -34,6 +34,11 @@ class Peer:
     derivatives_about: str = ""
     zeno: Callable[[int], dict[str, Any]] | None = None  # given how many impacts are enough
 
+    @property
+    def module(self) -> str:
+        """The file of the peer, for a process of its own to find it."""
+        return self.setup.__module__.removeprefix("peers.")
+
 
 def zeno_answer(*, time: float, theta: float, velocity: float, impacts: int, last: float) -> dict[str, Any]:
     """Where a code is with the accumulation of impacts when it ends: its time, its state, and its impacts."""

@@ -16,45 +16,44 @@ from peers import Peer
 from tasks.process import run_child
 
 LIMIT = 300.0
+COLD, CACHED = "cold, everything compiled", "cached"
+OTHER_NUMBERS, OTHER_STRUCTURE = "other numbers", "another structure, cold"
 
 
 def startup(peers: list[Peer], rounds: int) -> list[dict[str, Any]]:
-    """One row for each start: seconds, and the files that it added to the cache."""
+    """One row for each start of each package: seconds, how many of them after the imports, and the files added to the cache."""
     rows: list[dict[str, Any]] = []
-    for peer in peers:
-        module = peer.setup.__module__.removeprefix("peers.")
+    for module, peer in {peer.module: peer for peer in reversed(peers)}.items():
         if module.startswith("saltus"):
-            rows.extend(_saltus(module, peer.name, rounds))
+            rows.extend(_saltus(peer, rounds))
         elif module != "prototype":
-            rows.append(
-                _row(peer.name, "every start", [run_child("first", module, peer.name, limit=LIMIT) for _ in range(rounds)])
-            )
+            rows.append(_row(peer, "every start", [run_child("first", module, peer.name, limit=LIMIT) for _ in range(rounds)]))
     return rows
 
 
-def _saltus(module: str, name: str, rounds: int) -> list[dict[str, Any]]:
+def _saltus(peer: Peer, rounds: int) -> list[dict[str, Any]]:
     with tempfile.TemporaryDirectory() as cache:
 
         def start(label: str, variant: str, times: int) -> dict[str, Any]:
-            before = _files(cache)
-            answers = [
-                run_child("first", module, name, variant, limit=LIMIT, environment={"SALTUS_CACHE_DIR": cache})
-                for _ in range(times)
-            ]
-            return _row(name, label, answers) | {"new_files": len(_files(cache) - before)}
+            before, place = _files(cache), {"SALTUS_CACHE_DIR": cache}
+            runs = [run_child("first", peer.module, peer.name, variant, limit=LIMIT, environment=place) for _ in range(times)]
+            return _row(peer, label, runs) | {"new_files": len(_files(cache) - before)}
 
         return [
-            start("cold, everything compiled", "the case", 1),
-            start("cached", "the case", rounds),
-            start("other numbers", "other numbers", 1),
-            start("another structure, cold", "another structure", 1),
+            start(COLD, "the case", 1),
+            start(CACHED, "the case", rounds),
+            start(OTHER_NUMBERS, "other numbers", 1),
+            start(OTHER_STRUCTURE, "another structure", 1),
         ]
 
 
-def _row(name: str, label: str, answers: list[dict[str, Any]]) -> dict[str, Any]:
+def _row(peer: Peer, label: str, answers: list[dict[str, Any]]) -> dict[str, Any]:
+    row = {"peer": peer.name, "start": label}
     failed = [a["fails"] for a in answers if "fails" in a]
-    row = {"peer": name, "start": label}
-    return row | ({"fails": failed[0]} if failed else summary([a["wall"] for a in answers]).as_dict())
+    if failed:
+        return row | {"fails": failed[0]}
+    after = summary([a["after_imports"] for a in answers]).median
+    return row | summary([a["wall"] for a in answers]).as_dict() | {"after_imports": after}
 
 
 def _files(folder: str) -> set[tuple[str, int]]:
