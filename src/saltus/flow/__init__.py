@@ -1,9 +1,11 @@
 """How it moves: a model is traced into Taylor recurrences, compiled once for its structure, and followed event by event.
 
 Impacts are roots of the gap's series, found for certain; rest, release, accumulations of impacts and chatter are modes of
-their own. Nothing is smoothed. `simulate` is the way in; `Motion` is what it returns, and `sensitivities` differentiates it.
+their own. Nothing is smoothed. `simulate` is the way in; `Motion` is what it returns, `sensitivities` differentiates
+it, and `simulate_many` follows a million of them.
 """
 
+from saltus.flow.ensemble import simulate_many
 from saltus.flow.motion import Crossings, DenseOutput, Event, EventKind, Motion, Stop
 from saltus.flow.sensitivity import Sensitivities, sensitivities
 from saltus.flow.simulation import simulate
@@ -20,4 +22,5 @@ __all__ = [
     "Validity",
     "sensitivities",
     "simulate",
+    "simulate_many",
 ]

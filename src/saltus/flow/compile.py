@@ -93,27 +93,31 @@ class Structure:
 @cache
 def load_kernel() -> Callable[..., int]:
     """The kernel that advances every model, `advance` of `kernel.py`, called without numba's dispatch on argument types."""
-    advance = _load("kernel", "".join(_body(module) for module in (layout, roots, steps, contact, chatter, kernel))).advance
-    (result,) = advance.overloads.values()
+    (result,) = kernel_module().advance.overloads.values()
     entry: Callable[..., int] = result.entry_point
     return entry
 
 
+def kernel_module() -> ModuleType:
+    """The module of the scalar kernel."""
+    return load_module("kernel", "".join(body(module) for module in (layout, roots, steps, contact, chatter, kernel)))
+
+
 def load_structure(trace: Trace) -> Structure:
     """The functions of a trace's structure, as `emit.py` generates them."""
-    module = _load("structure", _body(records) + Emitter(trace).source())
+    module = load_module("structure", body(records) + Emitter(trace).source())
     names = ("series", "contact_series", "reset", "contact_damping", "tangent")
     return Structure(module, tuple(Pointer(getattr(module, name)) for name in names))
 
 
-def _body(module: ModuleType) -> str:
+def body(module: ModuleType) -> str:
     """The compiled part of a source file, below its marker."""
     return "\n" + inspect.getsource(module).split(MARKER, 1)[1].split("\n", 1)[1]
 
 
-def _load(kind: str, text: str) -> ModuleType:
+def load_module(kind: str, text: str, header: str = HEADER) -> ModuleType:
     """The module of a generated source: loaded, or written and compiled first."""
-    text = HEADER + text
+    text = header + text
     key = hashlib.sha256((text + inspect.getsource(jit)).encode()).hexdigest()[:20]
     name = f"saltus_{kind}_{key}"
     if name not in sys.modules:

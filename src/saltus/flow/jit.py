@@ -14,20 +14,23 @@ from numba import njit, types
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
 OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
-jit: Callable[[Any], Any] = njit(**OPTIONS)
+INNER: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **OPTIONS}  # for what only compiled code calls
+jit: Callable[[Any], Any] = njit(**INNER | {"_nrt": True})
+# For functions that make no array: numba then counts no references, which would cost more than the work between two calls.
+lean_jit: Callable[[Any], Any] = njit(**INNER | {"_nrt": False})
 
 
-def cached_jit(signature: Any, fused: bool = True) -> Callable[[Any], Any]:
-    """Compile for one signature at once, and keep the result on disk; without fused multiply-adds if asked.
+def cached_jit(signature: Any, fused: bool = True, nogil: bool = False) -> Callable[[Any], Any]:
+    """Compile for one signature at once, and keep the result on disk; if asked, without fused multiply-adds or Python's lock.
 
     A law that takes the difference of two equal products must get 0, not the rounding of one of them.
     """
     options = OPTIONS if fused else {**OPTIONS, "fastmath": False}
-    decorator: Callable[[Any], Any] = njit(signature, cache=True, **options)
+    decorator: Callable[[Any], Any] = njit(signature, cache=True, nogil=nogil, **options)
     return decorator
 
 
-def not_here(signature: Any) -> Callable[[Any], Any]:
+def not_here(signature: Any, **options: Any) -> Callable[[Any], Any]:
     """Stands for `cached_jit` where a text is only read or imported for its constants, and compiled elsewhere."""
     return lambda function: function
 

@@ -27,6 +27,7 @@ MOST_EVENTS = 20_000_000  # beyond this an accumulation of impacts is not being 
 class Program:
     """A system ready to run: its compiled kernel and its numbers."""
 
+    trace: Trace
     structure: Structure
     env: tuple[Any, ...]  # parameters, constants, record breakpoints, record table
     model: tuple[Any, ...]  # the structure's functions and the geometry of its contact
@@ -41,7 +42,7 @@ def program(system: System, limits: tuple[str, ...] = (), sensitivities: tuple[s
         _structures[key] = traced, load_structure(traced)
     traced, structure = _structures[key]
     parameters = np.array([value for _, value in numbers(system)])
-    return Program(structure, *structure.prepare(parameters, record_table(system, traced.records)), tuple(traced.margins))
+    return Program(traced, structure, *structure.prepare(parameters, record_table(system, traced.records)), tuple(traced.margins))
 
 
 _structures: dict[Any, tuple[Trace, Structure]] = {}
@@ -144,7 +145,7 @@ def follow(
     if not isinstance(system, System):
         raise ParameterError(f"simulate takes a System(model=..., load=..., impact=...), got {system!r}")
     position, speeds = _start_state(system, velocity, coordinates)
-    limits = _limits(system, stop_at)
+    limits = limits_of(system, stop_at)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     check_number("time", time)
     if side not in (None, 1, -1):
@@ -166,7 +167,8 @@ def _columns(where: np.ndarray, state: np.ndarray) -> np.ndarray:
     return columns
 
 
-def _limits(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
+def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
+    """The margins that end a motion: the model's own stops and those asked for."""
     try:
         return tuple(dict.fromkeys((*system.model.stops, *([stop_at] if isinstance(stop_at, str) else stop_at))))
     except TypeError:
@@ -259,7 +261,7 @@ def taylor_order(tol: float) -> int:
     return round(10 + 1.25 * (-math.log10(tol) - 6))
 
 
-def _check_gap(model: Model) -> None:
+def check_gap(model: Model) -> None:
     """Refuse a gap that is not linear in the coordinate, or not zero at `contact`: a model has one contact point."""
     point, name = float(model.contact), type(model).__name__
     for side in model.sides:
@@ -277,7 +279,7 @@ def _choose_side(system: System, where: np.ndarray, position: np.ndarray, speeds
     where[k.MODE], where[k.SIDE] = k.ARC, 1
     if not model.sides:
         return
-    _check_gap(model)
+    check_gap(model)
     gaps = {s: float(model.gap(position[0], s)) for s in model.sides}
     inside = [s for s, gap in gaps.items() if gap > 0]
     if inside:

@@ -1,0 +1,48 @@
+"""Where things lie in the memory of a group of lanes, and in the arrays that come with it.
+
+This text is compiled together with the lanes (see `driver.py`).
+"""
+
+from __future__ import annotations
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+# Slots of one vector: the state of each lane, what its step proposes, its contact, and what is recorded of its forcing period.
+NOW, ORIGIN, SIDE_NOW, NEW_TIME, NEW_SIDE, TARGET = 0, 1, 2, 3, 4, 5
+POINT, RATE_UP, RATE_DOWN, CAPTURE = 6, 7, 8, 9
+HIGHEST, LOWEST, LEAST, CROSSINGS = 10, 11, 12, 13
+FIRST_PLACE = 14
+# Then, from the slots that `at` lists, as many as the structure needs.
+POSITION, VELOCITY, NEW_POSITION, NEW_VELOCITY, AFTER_POSITION, AFTER_VELOCITY = 0, 1, 2, 3, 4, 5
+PARAMETERS, CONSTANTS_AT, RECORDS, POSITIONS, VELOCITIES, MARGINS, END_OF_MEMORY = 6, 7, 8, 9, 10, 11, 12
+
+HIGHEST_ORDER = 24  # of a lane's series
+STRIDE = HIGHEST_ORDER + 1  # slots of one series
+
+# Numbers of a structure and of a call, in `sizes`.
+MODEL_ROWS, COLUMN_COUNT, STOP_ROWS, SIDED, BENDS, RECORD_ROWS = 0, 1, 2, 3, 4, 5
+LANE_ORDER, SCALAR_ORDER, WORKSPACE, LAST_KEPT, WATCH, SETTLE = 6, 7, 8, 9, 10, 11
+
+SHORTEST_STEP, FAR, SLOWEST_IMPACT = 3, 4, 5  # in `settings`, after those of `layout.py`
+
+# For each lane: in `lane`, and in `gauge`.
+IDENT, LEG, LAST_LEG, PIECE_NOW, MODE_NOW, HELD_NOW, SKIP_NOW, FORCED_SIDE, COUNT, TOUCHES, LEGS_DONE = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+    9,
+    10,
+)
+PERIOD_LENGTH, END_TIME, CHATTER_NOW, TOP, BOTTOM, SLOWEST = 0, 1, 2, 3, 4, 5
+
+# Why a trajectory ended, after the reasons of `layout.py` (DONE, NOT_UNIQUE, NO_IMPACT, NOT_FINITE, STALLED, LIMITED).
+CAPTURED, SETTLED, OUTSIDE = 9, 10, 11
+BEYOND = 4  # a mode after those of `flow/layout.py`: on no side of the contact
+
+NO_ROOT, TOUCH = -1.0, -2.0  # instead of the time of a lane's root

@@ -1,0 +1,162 @@
+"""One step of a group of lanes: how long it may be, whether it meets the contact, and when.
+
+This text is compiled together with the lanes (see `driver.py`).
+"""
+
+from __future__ import annotations
+
+from saltus.flow.jit import lean_jit
+from saltus.flow.lanes.layout import *
+from saltus.flow.lanes.vector import *
+from saltus.flow.layout import *
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+ZERO_TERM = 1e-300
+LOG_ROUGHER = 6.64  # log2 of `ROUGHER` of `flow/layout.py`
+CONVERGED = 1e-10  # Newton's last step, relative to the time: the next one would be its square
+
+
+@lean_jit
+def natural_step(m, at, sizes, log_tol):
+    """The step of `steps.step_size` from the last two coefficients of the velocities, and the size of the state."""
+    order, size, last, before = sizes[LANE_ORDER], splat(SMALLEST), splat(ZERO_TERM), splat(ZERO_TERM)
+    for row in range(sizes[MODEL_ROWS]):
+        series = at[VELOCITIES] + row * STRIDE
+        size = maximum(size, maximum(absolute(load(m, at[POSITION] + row)), absolute(load(m, at[VELOCITY] + row))))
+        last = maximum(last, absolute(load(m, series + order)))
+        before = maximum(before, absolute(load(m, series + order - 1)))
+    wanted = log_tol + rough_log2(size)
+    step = minimum((wanted - rough_log2(last)) * (1.0 / order), (wanted - rough_log2(before)) * (1.0 / (order - 1)))
+    for column in range(sizes[COLUMN_COUNT]):
+        step = minimum(step, column_step(m, at, sizes, (column + 1) * sizes[MODEL_ROWS], log_tol + LOG_ROUGHER))
+    return SAFETY * rough_exp2(maximum(minimum(step, splat(500.0)), splat(-500.0))), size
+
+
+@lean_jit
+def column_step(m, at, sizes, first, log_tol):
+    """log2 of the step that the series of a column of the tangent allows, relative to its own size (`steps.column_step`)."""
+    order, size, last, before = sizes[LANE_ORDER], splat(ZERO_TERM), splat(ZERO_TERM), splat(ZERO_TERM)
+    for row in range(first, first + sizes[MODEL_ROWS]):
+        series = at[VELOCITIES] + row * STRIDE
+        size = maximum(size, maximum(absolute(load(m, at[POSITION] + row)), absolute(load(m, at[VELOCITY] + row))))
+        size = maximum(size, absolute(load(m, series + 1)))
+        last = maximum(last, absolute(load(m, series + order)))
+        before = maximum(before, absolute(load(m, series + order - 1)))
+    wanted = log_tol + rough_log2(size)
+    return minimum((wanted - rough_log2(last)) * (1.0 / order), (wanted - rough_log2(before)) * (1.0 / (order - 1)))
+
+
+@lean_jit
+def sweep(m, positions, velocities, order, h):
+    """Position and velocity at h, B = sum_{k>=4} k (k-1) abs(q_k) h^k, and the part of B / h^half with k >= half of the order.
+
+    B bounds how far the second derivative in u = t/h strays from that of the cubic q_0 + ... + q_3 h^3 u^3.
+    """
+    x, v = load(m, positions + order), load(m, velocities + order)
+    bend = absolute(x) * (order * (order - 1.0))
+    half = order // 2
+    for k in range(order - 1, half - 1, -1):
+        coefficient = load(m, positions + k)
+        x, v = fma(x, h, coefficient), fma(v, h, load(m, velocities + k))
+        bend = fma(bend, h, absolute(coefficient) * (k * (k - 1.0)))
+    tail = bend
+    for k in range(half - 1, 3, -1):
+        coefficient = load(m, positions + k)
+        x, v = fma(x, h, coefficient), fma(v, h, load(m, velocities + k))
+        bend = fma(bend, h, absolute(coefficient) * (k * (k - 1.0)))
+    for k in range(3, -1, -1):
+        x, v = fma(x, h, load(m, positions + k)), fma(v, h, load(m, velocities + k))
+    square = h * h
+    return x, v, bend * (square * square), tail
+
+
+@lean_jit
+def both_at(m, positions, velocities, order, h):
+    """Position and velocity at h, even and odd powers apart so that the processor works on four sums at once."""
+    square = h * h
+    top = order - (order & 1)
+    x, v = load(m, positions + top), load(m, velocities + top)
+    y, w = splat(0.0), splat(0.0)
+    if order & 1:
+        y, w = load(m, positions + order), load(m, velocities + order)
+    for k in range(top - 2, -1, -2):
+        x, v = fma(x, square, load(m, positions + k)), fma(v, square, load(m, velocities + k))
+        y, w = fma(y, square, load(m, positions + k + 1)), fma(w, square, load(m, velocities + k + 1))
+    return fma(y, h, x), fma(w, h, v)
+
+
+@lean_jit
+def shape(g0, g1, g2, g3, bend, skip):
+    """What is certain of a gap p0 + p1 u + p2 u^2 + p3 u^3 + ..., u in [0, 1], beyond its cubic bounded by B (see `sweep`).
+
+    Returns bits of the lanes in which it has no root (where `skip` is set: but the one at 0), in which it falls, and in which
+    it is concave, or convex; by the Bernstein coefficients of the cubic, of its derivative, or of the gap over u.
+    """
+    rest = bend * (1.0 / 12.0)
+    end = g0 + g1 + g2 + g3
+    low = minimum(minimum(g0, g0 + g1 * (1.0 / 3.0)), minimum(g0 + (2.0 * g1 + g2) * (1.0 / 3.0), end))
+    low = select(mask(skip), minimum(minimum(g1, g1 + 0.5 * g2), g1 + g2 + g3), low)
+    steepest = maximum(maximum(g1, g1 + g2), g1 + 2.0 * g2 + 3.0 * g3)
+    falls = bits(steepest < bend * (-1.0 / 3.0))
+    first, last = 2.0 * g2, 2.0 * g2 + 6.0 * g3
+    return bits(low > rest), falls, bits(maximum(first, last) < -bend), bits(minimum(first, last) > bend)
+
+
+@lean_jit
+def only_root(m, positions, velocities, order, h, point, sign, g0, g1, x, v, chosen):
+    """The root in (0, h] of gaps that have one there, not negative at 0 (if zero, then growing) and negative at h.
+
+    Newton's method, with bisection where it leaves the bracket; it begins at the root near h of the parabola that touches the
+    cubic through both ends. A lane stays where it has converged, whatever the others do.
+    """
+    f, slope = sign * (x - point), sign * v
+    bent = (6.0 * (g0 - f) / h + 2.0 * g1 / h + 4.0 * slope) / h  # second derivative at h of the Hermite cubic
+    under = maximum(slope * slope - 2.0 * f * bent, splat(0.0))
+    low, high = splat(0.0), h
+    tau = h + 2.0 * f / (square_root(under) - slope)
+    tau = select(mask(bits(tau > 0.0) & bits(tau < h)), tau, 0.5 * h)
+    active = chosen
+    for _ in range(60):
+        x, v = both_at(m, positions, velocities, order, tau)
+        f, slope = sign * (x - point), sign * v
+        before = mask(bits(f > 0.0))
+        low, high = select(before, tau, low), select(before, high, tau)
+        following = tau - f / slope
+        inside = mask(bits(following >= low) & bits(following <= high))
+        following = select(inside, following, 0.5 * (low + high))
+        moved = absolute(following - tau)
+        tau = select(mask(active), following, tau)
+        active &= bits(moved > CONVERGED * tau)
+        if active == 0:
+            break
+    return tau
+
+
+@lean_jit
+def margins_certain(m, at, sizes, h):
+    """Bits of the lanes in which every margin stays positive over the step for certain."""
+    sure = ALL
+    for stop in range(sizes[STOP_ROWS]):
+        series = at[MARGINS] + stop * STRIDE
+        rest = splat(0.0)
+        for k in range(sizes[LANE_ORDER] - 1, 0, -1):
+            rest = fma(rest, h, absolute(load(m, series + k)))
+        sure &= bits(load(m, series) > rest * h)
+    return sure
+
+
+@lean_jit
+def series_true(code, m, at, sizes, tol, h, size):
+    """Bits of the lanes whose series at the end of the step gives the acceleration that the model has there.
+
+    The new state must be in place. See `steps.leaps`.
+    """
+    code[2](m)
+    defect = splat(0.0)
+    for row in range(sizes[MODEL_ROWS]):
+        series, slope = at[VELOCITIES] + row * STRIDE, splat(0.0)
+        for k in range(sizes[LANE_ORDER], 0, -1):
+            slope = fma(slope, h, k * load(m, series + k))
+        defect = maximum(defect, absolute(load(m, at[AFTER_VELOCITY] + row) - slope))
+    return bits(defect * h <= (DEFECT * tol) * size)
