@@ -30,11 +30,10 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.intervals import ROUNDING, Interval
+from saltus.flow.intervals import ROUNDING, SLACK, Interval
 
 ODD_1 = 0.385  # above the largest x (1 - x^2), 2 / sqrt(27)
 ODD_2 = 0.2863  # above the largest x (1 - x^2)^2, 16 / (25 sqrt(5))
-SLACK = 1e-9  # relative, far above the rounding of what is not an interval
 TINY = 1e-12
 TRIALS = 0.8 ** np.arange(9)  # of the largest speed for which the bounds hold
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, near
-from saltus.flow.adiabatic import SLACK, budget, first_guess, largest_start, normal_form
+from saltus.flow.adiabatic import budget, first_guess, largest_start, normal_form
 from saltus.flow.barrier import WIDEST, climb
 from saltus.flow.graph import Expr, differentiate, number, substitute
-from saltus.flow.intervals import Interval, enclose
+from saltus.flow.intervals import SLACK, Interval, enclose
 from saltus.flow.opening import SPEED, Leaves, Opening, reads
 from saltus.flow.trace import Trace, record_table, trace
 from saltus.systems import System
@@ -188,9 +188,10 @@ class _Law:
 
     def _by_energy(self, side: int, leaves: Leaves, loss: Any, steady: Any, limit: Any) -> Any:
         """The speed up to which flights on one side, with the impact after, lose energy."""
-        a, a_u = self.sides[side].a, self.sides[side].a_u
+        a, a_w, a_u = (getattr(self.sides[side], name) for name in ("a", "a_w", "a_u"))
         allowed = np.where(steady, np.inf, np.exp(2 * loss) * (1 - SLACK))
-        turning, lo, hi = climb(lambda opening: -enclose([a], replace(leaves, opening=opening))[0], allowed)
+        pull, slope = (lambda w, e=e: -enclose([e], replace(leaves, opening=w))[0] for e in (a, a_w))
+        turning, lo, hi = climb(pull, slope, allowed)
         top = np.sqrt(2 * hi)
         (growth,) = enclose([a_u], replace(leaves, opening=Interval(0 * turning, turning), speed=Interval(-top, top)))
         falls = (lo > 0) & ((growth.hi < 0) | ((growth.hi <= 0) & (loss > 0)))

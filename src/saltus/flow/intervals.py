@@ -17,6 +17,7 @@ from saltus.flow.graph import Expr, ordered
 
 ROUNDING = 2.0**-51  # relative, four times that of + - * / and sqrt: a literal factor such as 1/3 may be rounded too
 LIBRARY = 2.0**-48  # relative, of the elementary functions: NumPy promises 4 units in the last place
+SLACK = 1e-9  # relative, far above the rounding of the few steps after the intervals
 TURN = 2 * math.pi
 EXACT = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # factors that do not round
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.adiabatic import SLACK, Box, Side
+from saltus.flow.adiabatic import Box, Side
 from saltus.flow.graph import Expr, differentiate, ordered, substitute
-from saltus.flow.intervals import Interval, enclose
+from saltus.flow.intervals import SLACK, Interval, enclose
 from saltus.flow.trace import Trace
 
 OPENING, SPEED, TIME = Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("time")
