@@ -10,6 +10,7 @@ from tasks.startup import CACHED, OTHER_NUMBERS, OTHER_STRUCTURE
 
 TARGETS = (1e-6, 1e-8, 1e-10, 1e-12, 1e-13, 1e-14)
 OURS = "saltus lanes"
+LOST = 1e-2  # an error above this is a motion lost, not a motion followed coarsely
 AT_LEAST = {"heyoka.py batch": 5.0, "SciPy DOP853": 1000.0, "SciPy LSODA": 1000.0}
 
 
@@ -17,7 +18,7 @@ def at_equal_error(work: list[dict[str, Any]]) -> dict[str, list[float]]:
     """Microseconds for one motion over one period at each of TARGETS, by peer; NaN where a code does not get there."""
     columns: dict[str, list[float]] = {}
     for name in dict.fromkeys(row["peer"] for row in work):
-        rows = [row for row in work if row["peer"] == name]
+        rows = [row for row in work if row["peer"] == name and row["error"] < LOST]
         columns[name] = equal_error([r["error"] for r in rows], [r["median"] for r in rows], TARGETS).tolist()
     return columns
 

@@ -7,17 +7,17 @@ from typing import Any
 
 from saltus.plots.style import DOUBLE_COLUMN, FAINT, new_figure, panel_label, style
 
-# Okabe and Ito's colours; each with a marker and a dash of its own, so that greyscale and colour-blindness do not matter
+# Okabe and Ito's colours, near ones for one package; and a marker for each code, for greyscale and the colour-blind
 LOOKS = {
     "saltus lanes": ("#0072B2", "o", "-"),
     "saltus scalar": ("#56B4E9", "s", "-"),
     "heyoka.py batch": ("#D55E00", "^", (0, (6, 1.5))),
     "heyoka.py scalar": ("#E69F00", "v", (0, (6, 1.5))),
     "diffrax Dopri8": ("#009E73", "D", (0, (3, 1.2))),
-    "diffrax Tsit5": ("#000000", "P", (0, (3, 1.2))),
+    "diffrax Tsit5": ("#009E73", "P", (0, (1, 1.2))),
     "SciPy DOP853": ("#CC79A7", "X", (0, (5, 1.2, 1, 1.2))),
-    "SciPy LSODA": ("#8A8A00", "*", (0, (5, 1.2, 1, 1.2))),
-    "prototype lanes": ("#7a7a7a", "h", (0, (1, 1.2))),
+    "SciPy LSODA": ("#CC79A7", "*", (0, (1, 1.2))),
+    "prototype lanes": ("#000000", "h", (0, (1, 1.2))),
 }
 
 

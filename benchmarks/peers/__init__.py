@@ -9,7 +9,15 @@ from peers.peer import AbsentError, DerivativeFlow, Flow, Peer, zeno_answer
 MODULES = ("saltus_lanes", "saltus_scalar", "heyoka_batch", "heyoka_scalar", "diffrax_batch", "scipy_restarts", "prototype")
 PROTOTYPE = "SALTUS_BENCHMARK_PROTOTYPE"  # the environment variable by which run.py hands --prototype on
 
-__all__ = ["MODULES", "PROTOTYPE", "AbsentError", "DerivativeFlow", "Flow", "Peer", "load_peers", "zeno_answer"]
+__all__ = ["MODULES", "PROTOTYPE", "AbsentError", "DerivativeFlow", "Flow", "Peer", "firsts", "load_peers", "zeno_answer"]
+
+
+def firsts(peers: list[Peer]) -> list[Peer]:
+    """One peer of each file: the first, where several methods of one package are measured."""
+    seen: dict[str, Peer] = {}
+    for peer in peers:
+        seen.setdefault(peer.module, peer)
+    return list(seen.values())
 
 
 def load_peers(modules: tuple[str, ...] = MODULES) -> tuple[list[Peer], dict[str, str]]:

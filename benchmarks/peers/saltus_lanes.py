@@ -47,8 +47,8 @@ def derivatives(tol: float) -> DerivativeFlow:
 
     def flow(theta: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         ends = run(what, theta, velocity, tol, 1, sensitivities=(AMPLITUDE_PATH,))
-        columns = ends["parameters"].values.reshape(len(theta), 2)
-        return ends["theta"].values, ends["velocity"].values, columns[:, 0], columns[:, 1]
+        slopes = ends["derivative"].sel(column=AMPLITUDE_PATH).values
+        return ends["theta"].values, ends["velocity"].values, slopes[:, 0], slopes[:, 1]
 
     return flow
 

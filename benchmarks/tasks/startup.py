@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from measure import summary
-from peers import Peer
+from peers import Peer, firsts
 
 from tasks.process import run_child
 
@@ -23,7 +23,8 @@ OTHER_NUMBERS, OTHER_STRUCTURE = "other numbers", "another structure, cold"
 def startup(peers: list[Peer], rounds: int) -> list[dict[str, Any]]:
     """One row for each start of each package: seconds, how many of them after the imports, and the files added to the cache."""
     rows: list[dict[str, Any]] = []
-    for module, peer in {peer.module: peer for peer in reversed(peers)}.items():
+    for peer in firsts(peers):
+        module = peer.module
         if module.startswith("saltus"):
             rows.extend(_saltus(peer, rounds))
         elif module != "prototype":
