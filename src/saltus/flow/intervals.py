@@ -109,17 +109,17 @@ def enclose(roots: list[Expr], leaf: Callable[[Expr], Interval]) -> list[Interva
 def _apply(node: Expr, x: list[Interval]) -> Interval:
     if node.op == "mul" and node.args[0] is node.args[1]:
         return x[0].square()
-    if node.op == "sub" and node.args[0] is node.args[1]:
-        return Interval(0.0)
     return _OPERATIONS[node.op](*x)
 
 
 def _increasing(function: Any) -> Callable[[Interval], Interval]:
-    return lambda x: outward(function(x.lo), function(x.hi), LIBRARY)
+    """A function that increases; where it has no value at the lower end, nothing is known of the upper one either."""
 
+    def bounds(x: Interval) -> Interval:
+        low = function(x.lo)
+        return outward(low, np.where(np.isnan(low), np.nan, function(x.hi)), LIBRARY)
 
-def _sqrt(x: Interval) -> Interval:
-    return outward(np.sqrt(x.lo), np.sqrt(x.hi))
+    return bounds
 
 
 def _wave(function: Any, peak: float) -> Callable[[Interval], Interval]:
@@ -133,7 +133,8 @@ def _wave(function: Any, peak: float) -> Callable[[Interval], Interval]:
             return np.floor((x.hi - point) / TURN + LIBRARY) >= np.ceil((x.lo - point) / TURN - LIBRARY)
 
         result = outward(np.minimum(at_lo, at_hi), np.maximum(at_lo, at_hi), LIBRARY)
-        whole = ~(x.hi - x.lo < TURN)
+        whole = x.hi - x.lo >= TURN  # and a NaN stays one
+        result.lo, result.hi = (np.where(whole, 0.0, end) for end in (result.lo, result.hi))  # the sine of infinity is a NaN
         low = np.where(whole | passes(peak + math.pi), -1.0, np.maximum(result.lo, -1.0))
         return Interval(low, np.where(whole | passes(peak), 1.0, np.minimum(result.hi, 1.0)))
 
@@ -175,7 +176,7 @@ _OPERATIONS: dict[str, Callable[..., Interval]] = {
     "mul": Interval.__mul__,
     "div": Interval.__truediv__,
     "pow": _pow,
-    "sqrt": _sqrt,
+    "sqrt": _increasing(np.sqrt),
     "exp": _increasing(np.exp),
     "log": _increasing(np.log),
     "sinh": _increasing(np.sinh),
