@@ -15,8 +15,8 @@ from saltus.systems.parameters import numbers
 class Interpreted:
     """A system's `series` and the other generated functions, with its numbers."""
 
-    def __init__(self, system, stop_at=()):
-        self.trace = trace(system, stop_at)
+    def __init__(self, system, stop_at=(), sensitivities=None):
+        self.trace = trace(system, stop_at, sensitivities)
         self.source = Emitter(self.trace).source()
         names = ["CONSTANTS", "GEOMETRY", "SERIES", "CONTACT_SERIES", "RESET", "CONTACT_DAMPING", "TANGENT"]
         self.scope = {

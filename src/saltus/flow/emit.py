@@ -7,6 +7,7 @@ function obeys; for instance s = sin u, c = cos u: k s_k = sum_{j=1..k} j u_j c_
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from saltus.flow.emit_tangent import tangent_source
@@ -93,8 +94,11 @@ class Emitter:
         lines, results = self.statements([r for r in roots if r is not None], lambda node: f"{node.op[0].replace('c', 'q')}0")
         return "\n".join([decorator, head, UNPACK, *(f"    {x}" for x in lines), f"    return {', '.join(results)}", "", ""])
 
-    def statements(self, roots: list[Expr], place: Callable[[Expr], str]) -> tuple[list[str], list[str]]:
-        """What computes `roots` at one instant, and their values' texts; `place` is the text of a coordinate or a velocity."""
+    def statements(self, roots: list[Expr], place: Callable[[Expr], str], first: int = 0) -> tuple[list[str], list[str]]:
+        """What computes `roots` at one instant, and their values' texts; `place` is the text of a coordinate or a velocity.
+
+        The names of its statements are numbered from `first`: numba is slow where a name is used twice.
+        """
         names: dict[Expr, str] = {}
 
         def ref(node: Expr) -> str:
@@ -105,7 +109,7 @@ class Emitter:
         lines = []
         for node in ordered(roots):
             if not self._is_constant(node) and node.args:
-                names[node] = f"x{len(names)}"
+                names[node] = f"x{first + len(names)}"
                 lines.append(f"{names[node]} = {_scalar(node, ref)}")
         return lines, [ref(root) for root in roots]
 
@@ -334,7 +338,8 @@ def _leaf(node: Expr) -> str:
     """The text of a leaf in a function of one instant."""
     texts = {"parameter": f"p[{node.value}]", "time": "t", "origin": "origin", "side": "side"}
     if node.op == "number":
-        return "math.nan" if node.value != node.value else f"({node.value!r})"
+        sign = "-" if node.value < 0 else ""
+        return f"({node.value!r})" if math.isfinite(node.value) else f"({sign}math.{abs(node.value)!r})"
     if node.op == "record":
         return f"record_value(table[{node.value}, piece], anchor(breaks, piece), t + origin)"
     return texts[node.op]

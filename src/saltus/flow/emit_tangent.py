@@ -38,7 +38,7 @@ def tangent_source(emitter: Emitter) -> str:
     lines = ["@cached_jit(TANGENT, fused=False)", "def tangent(kind, detail, t, origin, side, env, piece, state):"]
     lines.append("    p, c, breaks, table = env")
     for kind, detail, changes in _events(trace) if trace.columns else []:
-        statements, values = emitter.statements(list(changes.values()), lambda node: _place(trace, node))
+        statements, values = emitter.statements(list(changes.values()), lambda node: _place(trace, node), first=len(lines))
         targets = ", ".join(_place(trace, target) for target in changes)
         lines.append(f"    if kind == {kind} and detail == {detail}:")
         lines += [f"        {line}" for line in [*statements, f"{targets} = {', '.join(values)}"]]

@@ -40,8 +40,8 @@ class Sensitivities:
 
     @property
     def determinant(self) -> float:
-        """Of `state`: by what factor the flow has scaled volumes of states; 0 after rest."""
-        return float(np.linalg.det(self.state))
+        """Of `state`: by what factor the flow has scaled volumes of states; 0 after rest, nan where `state` is."""
+        return float(np.linalg.det(self.state)) if np.isfinite(self.state).all() else math.nan
 
     def __repr__(self) -> str:
         to = ", ".join(("state", *self.parameter_paths))

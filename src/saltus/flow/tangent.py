@@ -12,6 +12,7 @@ n W (origin + t), so a_c = a_W + (origin / W) a_t, a_t without the records.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -106,10 +107,15 @@ def contact_shift(trace: Trace, j: int) -> Expr:
 
 
 def release_shift(trace: Trace) -> list[Expr]:
-    """dt of a release from rest, where the contact acceleration b(t, c) of the side passes through 0: -b_c / b_t."""
+    """dt of a release from rest, where the contact acceleration b(t, c) of the side passes through 0: -b_c / b_t.
+
+    Under constant loads there is none.
+    """
     pull = trace.contact_acceleration
     assert pull is not None
     slope = rate(trace, pull)
+    if slope is number(0.0):
+        return [number(math.nan)] * trace.columns
     return [-partial(trace, pull, j) / slope for j in range(trace.columns)]
 
 
