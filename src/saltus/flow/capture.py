@@ -30,8 +30,9 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     From any impact, at any time and to any side, that leaves abs(gap_rate * velocity) below the returned speed, the motion
     stays near the contact under all later loads and its speed falls to zero: in finite time where impacts lose speed, else as
     damping has it. No later release is possible: the contact accelerations press on every side at all times. 0 where nothing
-    is proved, as where the load can lift the system off, or where neither impacts nor damping take energy. (Margins of the
-    model that a motion is asked to stop at are not looked at.)
+    is proved, as where the load can lift the system off, where neither impacts nor damping take energy, or where the law of
+    impact has no bounded slope at rest (`EnergyRestitution`). Margins of the model that a motion is asked to stop at are not
+    looked at.
 
     On side s the gap obeys w'' = A(t, w, u), u = w'. With f the factor of the gap's speed at impact, and the gap of one side in
     units that make the factors of both sides equal, the larger of two speeds is returned.
