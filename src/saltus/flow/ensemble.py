@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.errors import ParameterError, near
 from saltus.flow.emit import Emitter
-from saltus.flow.ensemble_dataset import KEPT, to_dataset
+from saltus.flow.ensemble_dataset import KEPT, check_dims, to_dataset
 from saltus.flow.lanes.compile import load_lane_functions
 from saltus.flow.lanes.run import Jobs, Lanes, available_cores
 from saltus.flow.simulation import MOST_PERIODS, Program, check_gap, limits_of, program
@@ -80,11 +80,14 @@ def simulate_many(
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     sample, until = _names("sample", sample, tuple(KEPT)), _names("until", until, ENDINGS)
     paths = None if sensitivities is None else _names("sensitivities", sensitivities, None)
-    if side not in (None, 1, -1):
+    if side is not None and (np.ndim(side) or side not in (1, -1)):
         raise ParameterError(f"side must be +1 or -1, got {side!r}")
     threads = available_cores() if threads is None else threads
-    check_number("threads", threads, at_least=1)
-    dims, shape, inputs = _broadcast(_inputs(system, velocity, time, dict(parameters or {}), coordinates))
+    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
+        raise ParameterError(f"threads must be a whole number of at least 1, got {threads!r}")
+    parameters = _mapping(parameters)
+    dims, shape, coords, inputs = _broadcast(_inputs(system, velocity, time, parameters, coordinates))
+    check_dims(dims, system)
     limits = limits_of(system, stop_at)
     run = program(system, limits, paths)
     check_gap(system.model)
@@ -92,13 +95,13 @@ def simulate_many(
     if "rest" in until and system.model.sides:
         from saltus.flow.capture import capture_speed
 
-        columns = {path: inputs[path] for path in parameters or {}}
+        columns = {path: inputs[path] for path in parameters}
         jobs.numbers[:, 3] = capture_speed(system, columns)
-    legs = int(np.max(jobs.labels[:, 1] - jobs.labels[:, 0], initial=0)) + 1
+    legs = int(np.max(jobs.labels[:, 1] - jobs.labels[:, 0] + (jobs.numbers[:, 2] > 0), initial=1))
     lanes = _lanes(system, run, tol, sample, _kept(last, legs), "settled" in until)
     total = float(np.sum(jobs.labels[:, 1] - jobs.labels[:, 0] + 1))
     ends = lanes.run(jobs, int(threads), progress, total)
-    return to_dataset(system, jobs, ends, dims, shape, inputs, limits, paths, sample, periods, tol, until)
+    return to_dataset(system, jobs, ends, dims, shape, coords, inputs, limits, paths, sample, periods, tol, until)
 
 
 def _names(argument: str, given: Any, known: tuple[str, ...] | None) -> tuple[str, ...]:
@@ -113,7 +116,7 @@ def _names(argument: str, given: Any, known: tuple[str, ...] | None) -> tuple[st
 
 
 def _kept(last: Any, legs: int) -> int:
-    if last == "all":
+    if isinstance(last, str) and last == "all":
         return legs
     if isinstance(last, bool) or not isinstance(last, (int, np.integer)) or last < 0:
         raise ParameterError(f'last must be a whole number of forcing periods, or "all", got {last!r}')
@@ -173,18 +176,26 @@ def _inputs(system: System, velocity: Any, time: Any, parameters: dict[str, Any]
     return inputs | parameters
 
 
+def _mapping(parameters: Any) -> dict[str, Any]:
+    if not isinstance(parameters or {}, Mapping):
+        raise ParameterError(f"parameters must be arrays by dotted path, such as {{'load.frequency': ...}}, got {parameters!r}")
+    return dict(parameters or {})
+
+
 def _rate(name: str, names: tuple[str, ...]) -> str:
     """The name of a coordinate's velocity."""
     return "velocity" if len(names) == 1 else f"{name}_velocity"
 
 
-def _broadcast(inputs: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int, ...], dict[str, np.ndarray]]:
-    """The dimensions of an ensemble, its shape, and each input as a flat array or as one number."""
+def _broadcast(inputs: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int, ...], dict[Any, Any], dict[str, np.ndarray]]:
+    """The dimensions of an ensemble, its shape, its coordinates, and each input as a flat array or as one number."""
     import xarray
 
     arrays: dict[str, Any] = {}
     for name, given in inputs.items():
         try:
+            if np.iscomplexobj(given):
+                raise TypeError
             array = given.astype(float) if isinstance(given, xarray.DataArray) else np.asarray(given, dtype=float)
         except (TypeError, ValueError):
             raise ParameterError(f"{name} must be a number or an array of numbers, got {given!r}") from None
@@ -195,8 +206,20 @@ def _broadcast(inputs: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int, ...]
     plain = [name for name, a in arrays.items() if not isinstance(a, xarray.DataArray) and a.ndim]
     if named and plain:
         raise ParameterError(f"{named[0]} has named dimensions and {plain[0]} has not; give DataArrays or arrays, not both")
+    coords: dict[Any, Any] = {}
     if named:
-        together = xarray.broadcast(*(arrays[name] for name in named))
+        try:
+            together = xarray.broadcast(*xarray.align(*(arrays[name] for name in named), join="exact"))
+        except ValueError:
+            raise ParameterError(
+                f"the DataArrays ({', '.join(named)}) have dimensions of the same name with other lengths or coordinates; "
+                "give such dimensions different names"
+            ) from None
+        for name in named:
+            coords |= arrays[name].coords
+        for name in named:  # an array along a dimension of its own name is the dimension's coordinate
+            if arrays[name].dims in ((name,), (f"initial_{name}",)):
+                coords.setdefault(arrays[name].dims[0], arrays[name].values)
         arrays |= dict(zip(named, together, strict=True))
         dims, shape = tuple(str(d) for d in together[0].dims), together[0].shape
     else:
@@ -210,7 +233,7 @@ def _broadcast(inputs: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int, ...]
     for name, array in arrays.items():
         values = np.asarray(array)
         flat[name] = np.broadcast_to(values, shape).reshape(-1) if values.ndim else values
-    return dims, shape, flat
+    return dims, shape, coords, flat
 
 
 def _check_parameters(system: System, columns: dict[str, np.ndarray]) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.errors import ParameterError
 from saltus.flow import layout as k
 from saltus.flow.lanes import layout as at
 from saltus.flow.tangent import FREQUENCY
@@ -51,12 +52,27 @@ MEANINGS = {
 }
 
 
+# Names that the dataset needs for itself, besides the coordinates and velocities of the model.
+TAKEN = (
+    *("period", "state", "column", "time", "side", "stop", "limit", "cycle", "crossings", "grazings", "periods"),
+    *("chatter_speed", "derivative", "least_speed", "period_crossings"),
+)
+
+
+def check_dims(dims: tuple[str, ...], system: System) -> None:
+    """Refuse a dimension that has the name of a result."""
+    for dim in dims:
+        if dim in (*TAKEN, *system.model.coordinates) or (dim.endswith("velocity") and not dim.startswith("initial_")):
+            raise ParameterError(f"a dimension cannot be called {dim!r}, as a result is; call it initial_{dim}, or as you like")
+
+
 def to_dataset(
     system: System,
     jobs: Jobs,
     ends: Ends,
     dims: tuple[str, ...],
     shape: tuple[int, ...],
+    coords: dict[Any, Any],
     inputs: dict[str, Any],
     limits: tuple[str, ...],
     paths: tuple[str, ...] | None,
@@ -72,11 +88,12 @@ def to_dataset(
 
     names = system.model.coordinates
     own, rows = len(names), jobs.states.shape[1] // 2
-    dataset = xarray.Dataset()
+    known = {name: given if hasattr(given, "dims") else (name, given) for name, given in coords.items()}
+    variables: dict[str, Any] = {}
 
-    def add(name: str, values: np.ndarray, unit: str, text: str, *extra: str) -> None:
-        reshaped = values.reshape(*shape, *values.shape[1:])
-        dataset[name] = ((*dims, *extra), reshaped, {"units": unit, "long_name": text})
+    def add(name: str, values: np.ndarray, unit: str, text: str, *extra: str, **more: Any) -> None:
+        reshaped = values.reshape((*shape, *values.shape[1:]))
+        variables[name] = ((*dims, *extra), reshaped, {"units": unit, "long_name": text} | more)
 
     rates = ["velocity" if own == 1 else f"{name}_velocity" for name in names]
     for i, (name, rate) in enumerate(zip(names, rates, strict=True)):
@@ -90,12 +107,12 @@ def to_dataset(
     add("crossings", ends.labels[:, 5], "1", "impacts")
     add("grazings", ends.labels[:, 6], "1", "touches of the contact without an impact")
     add("periods", ends.labels[:, 7], "1", "forcing periods that were ended")
-    _add_stops(dataset, add, ends, limits, until)
+    _add_stops(add, ends, limits, until)
     add("chatter_speed", ends.numbers[:, 1], "1", "speed of the gap after impacts too small to be followed, else 0")
     _add_samples(add, ends, names, rates, sample)
     if paths is not None:
-        _add_derivatives(dataset, add, jobs, ends, names, rates, paths, periods)
-    dataset.attrs = {
+        _add_derivatives(add, jobs, ends, names, rates, paths, periods)
+    attributes: dict[str, Any] = {
         "title": "ensemble computed by saltus",
         "saltus_version": __version__,
         "system": system.to_json(),
@@ -104,35 +121,36 @@ def to_dataset(
     }
     for name, values in inputs.items():
         where = f"initial_{name}" if name in (*names, *rates, "time") else name
+        if where in dims:  # it is a coordinate
+            continue
         if np.ndim(values):
             add(where, values, "1", f"{name} at the start" if where != name else f"parameter {name}")
         else:
-            dataset.attrs[where] = float(values)
-    return dataset
+            attributes[where] = float(values)
+    if paths is not None:
+        known |= {"state": ("state", [*names, *rates]), "column": ("column", [*names, *rates, *paths])}
+    return xarray.Dataset(variables, known, attributes)
 
 
-def _add_stops(dataset: Any, add: Any, ends: Ends, limits: tuple[str, ...], until: tuple[str, ...]) -> None:
+def _add_stops(add: Any, ends: Ends, limits: tuple[str, ...], until: tuple[str, ...]) -> None:
     reasons = ends.labels[:, 0].copy()
     reasons[(reasons == k.DONE) & (ends.labels[:, 2] == k.REST)] = -1
     codes = np.full(reasons.shape, -1, dtype=np.int8)
     for code, reason in enumerate(STOPS):
         codes[reasons == reason] = code
-    add("stop", codes, "1", "why it ended")
-    dataset["stop"].attrs |= {
-        "flag_values": np.arange(len(STOPS), dtype=np.int8),
-        "flag_meanings": " ".join(STOPS.values()),
-        "comment": "; ".join(f"{name}: {MEANINGS[name]}" for name in STOPS.values()),
-    }
+    comment = "; ".join(f"{name}: {MEANINGS[name]}" for name in STOPS.values())
+    add("stop", codes, "1", "why it ended", **_flags(tuple(STOPS.values())), comment=comment)
     if limits:
         which = np.where(reasons == k.LIMITED, ends.labels[:, 1], -1).astype(np.int8)
-        add("limit", which, "1", "the margin that ended it, -1 for none")
-        dataset["limit"].attrs |= {
-            "flag_values": np.arange(len(limits), dtype=np.int8),
-            "flag_meanings": " ".join(limits),
-        }
+        add("limit", which, "1", "the margin that ended it, -1 for none", **_flags(limits))
     if "settled" in until:
         cycle = np.where(reasons == at.SETTLED, ends.labels[:, 1], 0)
         add("cycle", cycle, "1", "forcing periods after which it repeats itself, 0 where it has not settled")
+
+
+def _flags(names: tuple[str, ...]) -> dict[str, Any]:
+    """What the numbers 0, 1, ... stand for, as the CF conventions write it."""
+    return {"flag_values": np.arange(len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
 
 
 def _add_samples(add: Any, ends: Ends, names: Any, rates: list[str], sample: tuple[str, ...]) -> None:
@@ -161,7 +179,7 @@ def _add_samples(add: Any, ends: Ends, names: Any, rates: list[str], sample: tup
 
 
 def _add_derivatives(
-    dataset: Any, add: Any, jobs: Jobs, ends: Ends, names: Any, rates: list[str], paths: tuple[str, ...], periods: float | None
+    add: Any, jobs: Jobs, ends: Ends, names: Any, rates: list[str], paths: tuple[str, ...], periods: float | None
 ) -> None:
     """The derivatives of the end state to the initial one and to parameters, (..., state, column)."""
     own, rows = len(names), jobs.states.shape[1] // 2
@@ -178,5 +196,3 @@ def _add_derivatives(
         slope = np.concatenate([ends.states[:, rows : rows + own], ends.numbers[:, 5 : 5 + own]], axis=1)
         derivative[:, :, columns.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)
     add("derivative", derivative, "1", "derivative of the state at the end", "state", "column")
-    dataset.coords["state"] = ("state", [*names, *rates])
-    dataset.coords["column"] = ("column", columns)

@@ -18,6 +18,7 @@ INNER: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **OPTIONS}  
 jit: Callable[[Any], Any] = njit(**INNER | {"_nrt": True})
 # For functions that make no array: numba then counts no references, which would cost more than the work between two calls.
 lean_jit: Callable[[Any], Any] = njit(**INNER | {"_nrt": False})
+inline_jit: Callable[[Any], Any] = njit(**INNER | {"_nrt": False, "forceinline": True})
 
 
 def cached_jit(signature: Any, fused: bool = True, nogil: bool = False) -> Callable[[Any], Any]:

@@ -19,7 +19,7 @@ PERIOD, MODE, SIDE, SKIP, PIECE, STEPS = 0, 1, 2, 3, 4, 5  # in `where`,
 EVENTS, LAST, ORDER, DENSE, FORCED, HELD = 6, 7, 8, 9, 10, 11
 DOF, STOPS, ROWS, SIDES = 12, 13, 14, 15  # and the structure's: coordinates, margins, workspace rows, sides of the contact,
 STEEP = 16  # whether it has functions whose bends a series may not see
-VISIT = 17  # whether `advance` returns VISITED as soon as a smooth motion is all there is (see `lanes.py`)
+VISIT = 17  # whether `advance` returns VISITED as soon as a smooth motion is all there is (see `driver.py`)
 OWN, COLUMNS = 18, 19  # the model's own coordinates, and the columns of a tangent: DOF = OWN (1 + COLUMNS) are followed
 WHERE = 20  # the length of `where`
 TIME, SPEED, STATE = 0, 1, 2  # in `state`: local time, chatter speed, then DOF coordinates, DOF velocities, COLUMNS shifts

@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.jit import lean_jit
+from saltus.flow.jit import inline_jit, lean_jit
 from saltus.flow.jit import not_here as cached_jit
 from saltus.flow.lanes.layout import *
 from saltus.flow.lanes.observe import LONGEST_CYCLE, cycle_length, watch_range
@@ -159,7 +159,7 @@ def arrive(lane, sizes, at, m, lanes, tables, results):
     last = leg == where[lane, LAST_LEG]
     t_end = gauge[lane, END_TIME] if last else gauge[lane, PERIOD_LENGTH]
     if now >= t_end:
-        if last and (t_end <= 0.0 and leg > 0):  # whole periods end where the next one would begin: nothing to record
+        if last and t_end <= 0.0 and where[lane, LEGS_DONE] > 0:  # the end of whole periods: there is nothing to record
             return DONE, 0
         cycle = end_leg(lane, sizes, at, m, lanes, results)
         if last:
@@ -210,7 +210,7 @@ def expand_records(sizes, at, m, flags, lanes, tables, row):
                     m[(at[RECORDS] + r * table.shape[2] + k) * WIDTH + lane] = row[k]
 
 
-@lean_jit
+@inline_jit
 def propose(code, sizes, at, m, flags, settings, helpers, poly, gap):
     """The step of every lane up to its first contact, put at NEW_*. Returns (bits that hit, bits to visit, h, tau, bend)."""
     order, tol = sizes[LANE_ORDER], settings[TOLERANCE]
@@ -256,7 +256,7 @@ def sizes_rows(at):
     return at[VELOCITY] - at[POSITION]
 
 
-@lean_jit
+@inline_jit
 def meet(sizes, at, m, flags, h, x, v, bend, alive, helpers, poly, gap):
     """Which of the lanes in `alive` meet the contact within the step, which are in doubt, and when."""
     order, skip = sizes[LANE_ORDER], flags[AT_CONTACT]
@@ -300,7 +300,7 @@ def meet(sizes, at, m, flags, h, x, v, bend, alive, helpers, poly, gap):
     return hit, doubtful, tau
 
 
-@lean_jit
+@inline_jit
 def strike(code, sizes, at, m, settings, hit):
     """Impacts at the new state. Returns (bits that went through, bits to visit, bits that are captured)."""
     code[1](m)
@@ -318,7 +318,7 @@ def strike(code, sizes, at, m, settings, hit):
     return good, hit & ~good, captured
 
 
-@lean_jit
+@inline_jit
 def commit(at, m, moved, hit):
     """Make the new state of the lanes in `moved` their state, and what is after an impact that of those in `hit`."""
     going, struck = mask(moved), mask(hit)
@@ -330,7 +330,7 @@ def commit(at, m, moved, hit):
         store(m, at[POSITION] + row, select(going, new, load(m, at[POSITION] + row)))
 
 
-@lean_jit
+@inline_jit
 def fly(code, sizes, at, m, flags, settings, helpers, poly, gap):
     """One step of all lanes. Returns (bits to visit, bits captured, bits out of range)."""
     hit, away, h, tau, bend = propose(code, sizes, at, m, flags, settings, helpers, poly, gap)
@@ -382,7 +382,7 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
             if flags[AWAKE] != flags[PARKED]:
                 doubtful, captured = fly(code, sizes, at, m, flags, settings, helpers, poly, gap)
                 away |= doubtful
-            for lane in range(WIDTH):
+            for lane in range(WIDTH if away | captured else 0):
                 if (captured >> lane) & 1:
                     finish(lane, CAPTURED, 0, code, sizes, at, m, flags, lanes, results)
                 elif (away >> lane) & 1:
@@ -390,7 +390,7 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
                     if reason != PAUSED:
                         finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results)
             arrived = bits(load(m, NOW) >= load(m, TARGET)) & flags[AWAKE]
-        for lane in range(WIDTH):
+        for lane in range(WIDTH if arrived else 0):
             if (arrived >> lane) & 1:
                 before = lanes[0][lane, LEGS_DONE]
                 reason, detail = arrive(lane, sizes, at, m, lanes, tables, results)

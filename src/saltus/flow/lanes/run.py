@@ -158,5 +158,5 @@ class Lanes:
 
 
 def lane_order(tol: float) -> int:
-    """The order that pays in lanes: as for one trajectory."""
-    return taylor_order(tol)
+    """The order that pays in lanes: 12 at 1e-6, 16 at 1e-10, 20 at 1e-14; their series cost little beside the rest of a step."""
+    return round(6 - math.log10(tol))

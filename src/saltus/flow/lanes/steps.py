@@ -5,7 +5,7 @@ This text is compiled together with the lanes (see `driver.py`).
 
 from __future__ import annotations
 
-from saltus.flow.jit import lean_jit
+from saltus.flow.jit import inline_jit, lean_jit
 from saltus.flow.lanes.layout import *
 from saltus.flow.lanes.vector import *
 from saltus.flow.layout import *
@@ -13,11 +13,12 @@ from saltus.flow.layout import *
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 ZERO_TERM = 1e-300
+LANE_SAFETY = 1.0  # of a step: its error is then about tol
 LOG_ROUGHER = 6.64  # log2 of `ROUGHER` of `flow/layout.py`
-CONVERGED = 1e-10  # Newton's last step, relative to the time: the next one would be its square
+CONVERGED = 1e-17  # the error that Newton's last step leaves, relative to the time, judged by the curvature
 
 
-@lean_jit
+@inline_jit
 def natural_step(m, at, sizes, log_tol):
     """The step of `steps.step_size` from the last two coefficients of the velocities, and the size of the state."""
     order, size, last, before = sizes[LANE_ORDER], splat(SMALLEST), splat(ZERO_TERM), splat(ZERO_TERM)
@@ -30,7 +31,7 @@ def natural_step(m, at, sizes, log_tol):
     step = minimum((wanted - rough_log2(last)) * (1.0 / order), (wanted - rough_log2(before)) * (1.0 / (order - 1)))
     for column in range(sizes[COLUMN_COUNT]):
         step = minimum(step, column_step(m, at, sizes, (column + 1) * sizes[MODEL_ROWS], log_tol + LOG_ROUGHER))
-    return SAFETY * rough_exp2(maximum(minimum(step, splat(500.0)), splat(-500.0))), size
+    return LANE_SAFETY * rough_exp2(maximum(minimum(step, splat(500.0)), splat(-500.0))), size
 
 
 @lean_jit
@@ -47,7 +48,7 @@ def column_step(m, at, sizes, first, log_tol):
     return minimum((wanted - rough_log2(last)) * (1.0 / order), (wanted - rough_log2(before)) * (1.0 / (order - 1)))
 
 
-@lean_jit
+@inline_jit
 def sweep(m, positions, velocities, order, h):
     """Position and velocity at h, B = sum_{k>=4} k (k-1) abs(q_k) h^k, and the part of B / h^half with k >= half of the order.
 
@@ -71,7 +72,7 @@ def sweep(m, positions, velocities, order, h):
     return x, v, bend * (square * square), tail
 
 
-@lean_jit
+@inline_jit
 def both_at(m, positions, velocities, order, h):
     """Position and velocity at h, even and odd powers apart so that the processor works on four sums at once."""
     square = h * h
@@ -86,7 +87,7 @@ def both_at(m, positions, velocities, order, h):
     return fma(y, h, x), fma(w, h, v)
 
 
-@lean_jit
+@inline_jit
 def shape(g0, g1, g2, g3, bend, skip):
     """What is certain of a gap p0 + p1 u + p2 u^2 + p3 u^3 + ..., u in [0, 1], beyond its cubic bounded by B (see `sweep`).
 
@@ -103,7 +104,7 @@ def shape(g0, g1, g2, g3, bend, skip):
     return bits(low > rest), falls, bits(maximum(first, last) < -bend), bits(minimum(first, last) > bend)
 
 
-@lean_jit
+@inline_jit
 def only_root(m, positions, velocities, order, h, point, sign, g0, g1, x, v, chosen):
     """The root in (0, h] of gaps that have one there, not negative at 0 (if zero, then growing) and negative at h.
 
@@ -114,6 +115,7 @@ def only_root(m, positions, velocities, order, h, point, sign, g0, g1, x, v, cho
     bent = (6.0 * (g0 - f) / h + 2.0 * g1 / h + 4.0 * slope) / h  # second derivative at h of the Hermite cubic
     under = maximum(slope * slope - 2.0 * f * bent, splat(0.0))
     low, high = splat(0.0), h
+    curved = absolute(bent / slope)
     tau = h + 2.0 * f / (square_root(under) - slope)
     tau = select(mask(bits(tau > 0.0) & bits(tau < h)), tau, 0.5 * h)
     active = chosen
@@ -127,7 +129,7 @@ def only_root(m, positions, velocities, order, h, point, sign, g0, g1, x, v, cho
         following = select(inside, following, 0.5 * (low + high))
         moved = absolute(following - tau)
         tau = select(mask(active), following, tau)
-        active &= bits(moved > CONVERGED * tau)
+        active &= bits(moved * moved * curved > CONVERGED * tau)
         if active == 0:
             break
     return tau

@@ -18,7 +18,7 @@ from numba.extending import intrinsic
 from saltus.flow.emit import Emitter
 from saltus.flow.graph import Expr
 from saltus.flow.lanes.layout import FIRST_PLACE, HIGHEST_ORDER, NEW_SIDE, NEW_TIME, NOW, ORIGIN, SIDE_NOW, STRIDE
-from saltus.flow.lanes.vector import LONG, VECTOR, Vec, slot_pointer
+from saltus.flow.lanes.vector import LONG, VECTOR, WIDTH, Vec, slot_pointer
 from saltus.flow.tangent import saltation
 from saltus.flow.trace import RECORD_WIDTH, Trace
 
@@ -169,8 +169,12 @@ class Writer:
             elif len(node) < 2 or op in ("number", "parameter", "constant"):
                 values.append(self.known(node))
             else:
-                values.append(operation(op, [values[i] for i in node[1:]]))
+                values.append(operation(op, [values[i] for i in node[1:]], self.number))
         return values
+
+    def number(self, value: float) -> Vec:
+        """One number in all lanes."""
+        return Vec(self.builder, ir.Constant(VECTOR, [value] * WIDTH), self.fused)
 
     def _record(self, row: int) -> Vec:
         """A record's piece at the new time, from its expansion at the start of the step."""
@@ -181,8 +185,8 @@ class Writer:
         return value
 
 
-def operation(op: str, args: list[Any]) -> Any:
-    """An operation at one instant, on vectors and numbers; comparisons give masks."""
+def operation(op: str, args: list[Any], splat: Callable[[float], Vec]) -> Any:
+    """An operation at one instant, on vectors and numbers; comparisons give masks. `splat` makes a vector of a number."""
     a, b = args[0], args[-1]
     signs = {"greater": ">", "less": "<", "greater_equal": ">=", "less_equal": "<="}
     if op in ("add", "sub", "mul", "div"):
@@ -190,9 +194,9 @@ def operation(op: str, args: list[Any]) -> Any:
     if op in signs:
         return a.compare(signs[op], b) if isinstance(a, Vec) else b.compare(signs[op].translate(MIRRORED), a)
     if op == "where":
-        return _vector(args[1], like=args[2]).select(a, args[2])
+        return (args[1] if isinstance(args[1], Vec) else splat(args[1])).select(a, args[2])
     if op in ("maximum", "minimum"):
-        a = _vector(a, like=b)
+        a = a if isinstance(a, Vec) else splat(a)
         return a.select(a.compare(">" if op == "maximum" else "<", b), b)
     if op in ("sin", "cos"):
         return a.sin_cos()[op == "cos"]
@@ -200,10 +204,6 @@ def operation(op: str, args: list[Any]) -> Any:
 
 
 MIRRORED = str.maketrans("<>", "><")
-
-
-def _vector(a: Any, like: Any) -> Vec:
-    return a if isinstance(a, Vec) else like * 0.0 + a
 
 
 def _add(a: Any, b: Any) -> Any:

@@ -11,12 +11,14 @@ import operator
 import os
 import platform
 from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 from llvmlite import binding, ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, models, overload, register_model
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
 
 DOUBLE, BIT, LONG = ir.DoubleType(), ir.IntType(1), ir.IntType(64)
 
@@ -267,28 +269,48 @@ def _function(result: Any, write: Callable[..., Any], count: int) -> Any:
     return intrinsic(lambda typing, a, b, c: (result(a, b, c), code))
 
 
-def _operator(symbol: Any, function: Any) -> None:
-    """Let Python's operator mean a function where a vector is on either side."""
+def _operator(symbol: Any, result: Any, write: Callable[..., Any], count: int = 2) -> None:
+    """Let Python's operator mean `write` where a vector is among its operands; the others may be numbers.
 
-    call: Any = lambda a, b: function(a, b)  # noqa: E731  (numba compares names and annotations: neither may differ)
-    overload(symbol)(lambda a, b: call if isinstance(a, VectorType) or isinstance(b, VectorType) else None)
+    numba's `overload` would compile a function for every pair of types.
+    """
+
+    class Meaning(AbstractTemplate):
+        key = symbol
+
+        def generic(self, args: Any, kws: Any) -> Any:
+            vectors = [isinstance(kind, VectorType) for kind in args]
+            if (
+                len(args) == count
+                and any(vectors)
+                and all(v or isinstance(k, types.Number) for v, k in zip(vectors, args, strict=True))
+            ):
+                return signature(result, *args)
+            return None
+
+    infer_global(symbol)(Meaning)
+
+    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        written = write(*(_lift(builder, kind, value) for kind, value in zip(sig.args, args, strict=True)))
+        return written.value if isinstance(written, Vec) else written
+
+    for kinds in product((VectorType, types.Number), repeat=count):
+        if VectorType in kinds:
+            lower_builtin(symbol, *kinds)(code)
 
 
 for _symbol in (operator.add, operator.sub, operator.mul, operator.truediv):
-    _operator(_symbol, _function(vector_type, _symbol, 2))
+    _operator(_symbol, vector_type, _symbol)
 for _symbol, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")):
-    _operator(_symbol, _function(mask_type, lambda a, b, sign=_sign: a.compare(sign, b), 2))
+    _operator(_symbol, mask_type, lambda a, b, sign=_sign: a.compare(sign, b))
+_operator(operator.neg, vector_type, operator.neg, 1)
 
-negative = _function(vector_type, operator.neg, 1)
 absolute = _function(vector_type, lambda a: a._call("llvm.fabs", a.value), 1)
 minimum = _function(vector_type, lambda a, b: a.select(a.compare("<", b), b), 2)
 maximum = _function(vector_type, lambda a, b: a.select(a.compare(">", b), b), 2)
 fma = _function(vector_type, lambda a, b, c: a.fma(b, c), 3)
 square_root = _function(vector_type, lambda a: a.sqrt(), 1)
 splat = _function(vector_type, lambda a: a, 1)
-
-
-overload(operator.neg)(lambda a: (lambda a: negative(a)) if isinstance(a, VectorType) else None)
 
 
 def _log2(a: Vec) -> Vec:
