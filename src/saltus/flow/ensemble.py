@@ -90,7 +90,8 @@ def simulate_many(
     check_dims(dims, system)
     limits = limits_of(system, stop_at)
     run = program(system, limits, paths)
-    check_gap(system.model)
+    if system.model.sides:
+        check_gap(system.model)
     jobs = _jobs(system, run.env[2], inputs, periods, duration, side or 0, run.structure.module.COLUMNS)
     if "rest" in until and system.model.sides:
         from saltus.flow.capture import capture_speed

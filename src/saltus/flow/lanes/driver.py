@@ -91,7 +91,7 @@ def begin_mode(sides, position, velocity, geometry):
     return (CONTACT, into) if into != 0 else (ARC, 1)
 
 
-@lean_jit
+@inline_jit
 def begin_leg(lane, m, lanes, tables):
     """Set where a lane's next stop is: the end of its forcing period, of its motion, or a breakpoint of the records."""
     where, gauge, breaks = lanes[0], lanes[1], tables[0]
@@ -107,7 +107,7 @@ def begin_leg(lane, m, lanes, tables):
     m[ORIGIN * WIDTH + lane], m[TARGET * WIDTH + lane] = origin, target
 
 
-@lean_jit
+@inline_jit
 def begin_records(lane, m):
     """Start what is recorded of a forcing period."""
     x = -np.inf
@@ -115,7 +115,7 @@ def begin_records(lane, m):
     m[LEAST * WIDTH + lane], m[CROSSINGS * WIDTH + lane] = np.inf, 0.0
 
 
-@lean_jit
+@inline_jit
 def end_leg(lane, sizes, at, m, lanes, results):
     """Keep the state at the end of a forcing period and what happened in it; the cycle it has settled on, or 0."""
     where, gauge, _, _, ring, streak = lanes
@@ -138,7 +138,7 @@ def end_leg(lane, sizes, at, m, lanes, results):
     return cycle_length(ring[lane], streak[lane], legs + 1, own)
 
 
-@lean_jit
+@inline_jit
 def total_up(lane, m, lanes):
     """Add what was recorded of a forcing period to what is recorded of the trajectory, and start anew."""
     where, gauge = lanes[0], lanes[1]
@@ -151,7 +151,7 @@ def total_up(lane, m, lanes):
     begin_records(lane, m)
 
 
-@lean_jit
+@inline_jit
 def arrive(lane, sizes, at, m, lanes, tables, results):
     """At the end of a leg or at a breakpoint: go on. Returns DONE, SETTLED, or PAUSED, and the length of the cycle."""
     where, gauge = lanes[0], lanes[1]
@@ -220,29 +220,28 @@ def propose(code, sizes, at, m, flags, settings, helpers, poly, gap):
     h = minimum(natural, target - now)
     alive = flags[AWAKE] & ~flags[PARKED]
     sound = bits(natural > settings[SHORTEST_STEP]) & bits(size < FAST)
-    x, v, bend, tail = sweep(m, at[POSITIONS], at[VELOCITIES], order, h)
+    point = load(m, POINT)
+    start = load(m, at[POSITION]) - point  # counted from the contact: near it the gap keeps its digits
+    x, v, a, bend, tail = sweep(m, at, order, start, h)
     half = order // 2
-    far = settings[FAR] * size * (half * half)
+    far = settings[FAR] * size * half
     scale = h
-    for _ in range(half - 1):
+    for _ in range(half):
         scale = scale * h
     sound &= bits(tail * scale < far)
     if sizes[STOP_ROWS] > 0:
         sound &= margins_certain(m, at, sizes, h)
-    hit, tau = 0, h
+    hit, tau, at_root = 0, h, v
     if sizes[SIDED] > 0:
-        hit, doubtful, tau = meet(sizes, at, m, flags, h, x, v, bend, alive & sound, helpers, poly, gap)
+        hit, doubtful, tau, at_root = meet(sizes, at, m, flags, h, start, x, v, a, bend, alive & sound, helpers, poly, gap)
         sound &= ~doubtful
-    point = load(m, POINT)
     struck = mask(hit)
     store(m, NEW_TIME, select(mask(bits(natural >= target - now) & ~hit), target, now + tau))
-    if hit:
-        _, at_root = both_at(m, at[POSITIONS], at[VELOCITIES], order, tau)
-        x, v = select(struck, point, x), select(struck, at_root, v)
-    store(m, at[NEW_POSITION], x)
-    store(m, at[NEW_VELOCITY], v)
+    store(m, at[NEW_POSITION], select(struck, point, x + point))
+    store(m, at[NEW_VELOCITY], select(struck, at_root, v))
     for row in range(1, sizes_rows(at)):
-        q, w = both_at(m, at[POSITIONS] + row * STRIDE, at[VELOCITIES] + row * STRIDE, order, tau)
+        series = at[POSITIONS] + row * STRIDE
+        q, w = both_at(m, series, at[VELOCITIES] + row * STRIDE, order, load(m, series), tau)
         store(m, at[NEW_POSITION] + row, q)
         store(m, at[NEW_VELOCITY] + row, w)
     if sizes[BENDS] > 0:
@@ -257,24 +256,23 @@ def sizes_rows(at):
 
 
 @inline_jit
-def meet(sizes, at, m, flags, h, x, v, bend, alive, helpers, poly, gap):
+def meet(sizes, at, m, flags, h, start, x, v, a, bend, alive, helpers, poly, gap):
     """Which of the lanes in `alive` meet the contact within the step, which are in doubt, and when."""
     order, skip = sizes[LANE_ORDER], flags[AT_CONTACT]
-    point = load(m, POINT)
     sign = select(mask(bits(load(m, SIDE_NOW) > 0.0)), load(m, RATE_UP), load(m, RATE_DOWN))
     curve = bend * absolute(sign)
-    g0 = sign * (load(m, at[POSITIONS]) - point)
+    g0 = sign * start
     g1, g2 = sign * load(m, at[POSITIONS] + 1) * h, sign * load(m, at[POSITIONS] + 2) * (h * h)
     g3 = sign * load(m, at[POSITIONS] + 3) * (h * h * h)
     doubtful = ((bits(g0 <= 0.0) & ~skip) | (bits(g1 <= 0.0) & skip)) & alive
     clear, falls, concave, convex = shape(g0, g1, g2, g3, curve, skip)
-    over = bits(sign * (x - point) <= 0.0)
+    over = bits(sign * x <= 0.0)
     single = concave | (falls & ~skip) | (convex & over)
     hit = alive & ~doubtful & ~clear & single & over
-    tau = h
+    tau, at_root = h, v
     if hit:
-        root = only_root(m, at[POSITIONS], at[VELOCITIES], order, h, point, sign, g0, g1, x, v, hit)
-        tau = select(mask(hit), root, h)
+        root, speed = only_root(m, at, order, h, start, sign, g0, g1, g2, x, v, a, hit)
+        tau, at_root = select(mask(hit), root, h), select(mask(hit), speed, v)
     unclear = alive & ~doubtful & ~clear & ~single
     if unclear:
         for lane in range(WIDTH):
@@ -297,7 +295,8 @@ def meet(sizes, at, m, flags, h, x, v, bend, alive, helpers, poly, gap):
                 elif root >= 0.0:
                     hit |= 1 << lane
                     tau = with_lane(tau, lane, root)
-    return hit, doubtful, tau
+                    at_root = with_lane(at_root, lane, lane_value(m, at[VELOCITIES], order, lane, root))
+    return hit, doubtful, tau, at_root
 
 
 @inline_jit

@@ -22,12 +22,12 @@ def turning_value(m, at, order, h, v0, chosen):
     low, high, tau = splat(0.0), h, 0.5 * h
     active, x = chosen, splat(0.0)
     for _ in range(60):
-        x, v = both_at(m, at[POSITIONS], at[VELOCITIES], order, tau)
+        x, v = both_at(m, at[POSITIONS], at[VELOCITIES], order, load(m, at[POSITION]), tau)
         before = mask(bits(v * v0 > 0.0))
         low, high = select(before, tau, low), select(before, high, tau)
         slope = splat(0.0)
-        for k in range(order, 0, -1):
-            slope = fma(slope, tau, k * load(m, at[VELOCITIES] + k))
+        for k in range(order - 1, -1, -1):
+            slope = fma(slope, tau, load(m, at[ACCELERATIONS] + k))
         following = tau - v / slope
         inside = mask(bits(following >= low) & bits(following <= high))
         following = select(inside, following, 0.5 * (low + high))
@@ -35,7 +35,7 @@ def turning_value(m, at, order, h, v0, chosen):
         tau = following
         if active == 0:
             break
-    x, v = both_at(m, at[POSITIONS], at[VELOCITIES], order, tau)
+    x, v = both_at(m, at[POSITIONS], at[VELOCITIES], order, load(m, at[POSITION]), tau)
     return x
 
 

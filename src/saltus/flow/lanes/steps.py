@@ -15,7 +15,7 @@ from saltus.flow.layout import *
 ZERO_TERM = 1e-300
 LANE_SAFETY = 1.0  # of a step: its error is then about tol
 LOG_ROUGHER = 6.64  # log2 of `ROUGHER` of `flow/layout.py`
-CONVERGED = 1e-17  # the error that Newton's last step leaves, relative to the time, judged by the curvature
+NEARLY = 1e-5  # of the time, and of the slope: a step of Halley's method below it leaves an error of its cube
 
 
 @inline_jit
@@ -49,41 +49,43 @@ def column_step(m, at, sizes, first, log_tol):
 
 
 @inline_jit
-def sweep(m, positions, velocities, order, h):
-    """Position and velocity at h, B = sum_{k>=4} k (k-1) abs(q_k) h^k, and the part of B / h^half with k >= half of the order.
+def sweep(m, at, order, start, h):
+    """Position from `start` on, velocity and acceleration at h, B = h^2 sum_{j>=2} abs(a_j) h^j, and part of its last terms.
 
     B bounds how far the second derivative in u = t/h strays from that of the cubic q_0 + ... + q_3 h^3 u^3.
     """
-    x, v = load(m, positions + order), load(m, velocities + order)
-    bend = absolute(x) * (order * (order - 1.0))
-    half = order // 2
-    for k in range(order - 1, half - 1, -1):
-        coefficient = load(m, positions + k)
-        x, v = fma(x, h, coefficient), fma(v, h, load(m, velocities + k))
-        bend = fma(bend, h, absolute(coefficient) * (k * (k - 1.0)))
-    tail = bend
-    for k in range(half - 1, 3, -1):
-        coefficient = load(m, positions + k)
-        x, v = fma(x, h, coefficient), fma(v, h, load(m, velocities + k))
-        bend = fma(bend, h, absolute(coefficient) * (k * (k - 1.0)))
-    for k in range(3, -1, -1):
+    positions, velocities, accelerations = at[POSITIONS], at[VELOCITIES], at[ACCELERATIONS]
+    x, v, a = load(m, positions + order), load(m, velocities + order), load(m, accelerations + order - 1)
+    bend, half = absolute(a), order // 2
+    x, v = fma(x, h, load(m, positions + order - 1)), fma(v, h, load(m, velocities + order - 1))
+    for k in range(order - 2, half - 1, -1):
+        coefficient = load(m, accelerations + k)
         x, v = fma(x, h, load(m, positions + k)), fma(v, h, load(m, velocities + k))
+        a, bend = fma(a, h, coefficient), fma(bend, h, absolute(coefficient))
+    tail = bend
+    for k in range(half - 1, 1, -1):
+        coefficient = load(m, accelerations + k)
+        x, v = fma(x, h, load(m, positions + k)), fma(v, h, load(m, velocities + k))
+        a, bend = fma(a, h, coefficient), fma(bend, h, absolute(coefficient))
+    x, v, a = fma(x, h, load(m, positions + 1)), fma(v, h, load(m, velocities + 1)), fma(a, h, load(m, accelerations + 1))
     square = h * h
-    return x, v, bend * (square * square), tail
+    return fma(x, h, start), fma(v, h, load(m, velocities)), fma(a, h, load(m, accelerations)), bend * (square * square), tail
 
 
 @inline_jit
-def both_at(m, positions, velocities, order, h):
-    """Position and velocity at h, even and odd powers apart so that the processor works on four sums at once."""
+def both_at(m, positions, velocities, order, start, h):
+    """Position from `start` on and velocity at h, even and odd powers apart so that the processor works on four sums at once."""
     square = h * h
     top = order - (order & 1)
     x, v = load(m, positions + top), load(m, velocities + top)
     y, w = splat(0.0), splat(0.0)
     if order & 1:
         y, w = load(m, positions + order), load(m, velocities + order)
-    for k in range(top - 2, -1, -2):
+    for k in range(top - 2, 0, -2):
         x, v = fma(x, square, load(m, positions + k)), fma(v, square, load(m, velocities + k))
         y, w = fma(y, square, load(m, positions + k + 1)), fma(w, square, load(m, velocities + k + 1))
+    x, v = fma(x, square, start), fma(v, square, load(m, velocities))
+    y, w = fma(y, square, load(m, positions + 1)), fma(w, square, load(m, velocities + 1))
     return fma(y, h, x), fma(w, h, v)
 
 
@@ -105,34 +107,63 @@ def shape(g0, g1, g2, g3, bend, skip):
 
 
 @inline_jit
-def only_root(m, positions, velocities, order, h, point, sign, g0, g1, x, v, chosen):
+def first_guess(g0, g1, g2, f, slope, pull):
+    """The root d in [0, 1], counted back from the end, of the quintic with these values and derivatives at both ends.
+
+    Scaled to a step of 1: g0 + g1 u + g2 u^2 + ... at the start, and f, its slope and twice its next coefficient at the end. Two
+    of Newton's steps from the parabola at the end. Returns also the second derivative at the root.
+    """
+    a, b, c = g0 - f + slope - 0.5 * pull, slope - g1 - pull, 2.0 * g2 - pull
+    c3, c4, c5 = 10.0 * a - 4.0 * b + 0.5 * c, 7.0 * b - 15.0 * a - c, 6.0 * a - 3.0 * b + 0.5 * c
+    root = square_root(maximum(slope * slope - 2.0 * f * pull, splat(0.0)))
+    d = 2.0 * f / (slope - root)
+    for _ in range(2):
+        value = fma(fma(fma(fma(fma(c5, d, c4), d, c3), d, 0.5 * pull), d, -slope), d, f)
+        along = fma(fma(fma(fma(5.0 * c5, d, 4.0 * c4), d, 3.0 * c3), d, pull), d, -slope)
+        d = d - value / along
+    curve = fma(fma(fma(20.0 * c5, d, 12.0 * c4), d, 6.0 * c3), d, pull)
+    return d, curve
+
+
+@inline_jit
+def only_root(m, at, order, h, start, sign, g0, g1, g2, x, v, a, chosen):
     """The root in (0, h] of gaps that have one there, not negative at 0 (if zero, then growing) and negative at h.
 
-    Newton's method, with bisection where it leaves the bracket; it begins at the root near h of the parabola that touches the
-    cubic through both ends. A lane stays where it has converged, whatever the others do.
+    Halley's method from `first_guess`, with bisection where it leaves the bracket. A lane stays where it has converged, whatever
+    the others do. Returns the root and the velocity there.
     """
-    f, slope = sign * (x - point), sign * v
-    bent = (6.0 * (g0 - f) / h + 2.0 * g1 / h + 4.0 * slope) / h  # second derivative at h of the Hermite cubic
-    under = maximum(slope * slope - 2.0 * f * bent, splat(0.0))
-    low, high = splat(0.0), h
-    curved = absolute(bent / slope)
-    tau = h + 2.0 * f / (square_root(under) - slope)
-    tau = select(mask(bits(tau > 0.0) & bits(tau < h)), tau, 0.5 * h)
+    positions, velocities = at[POSITIONS], at[VELOCITIES]
+    d, curve = first_guess(g0, g1, g2, sign * x, sign * v * h, sign * a * (h * h))
+    curve = curve / (h * h)
+    low, high, tau = splat(0.0), h, h - d * h
+    tau = select(mask(bits(tau > 0.0) & bits(tau <= h)), tau, 0.5 * h)
     active = chosen
     for _ in range(60):
-        x, v = both_at(m, positions, velocities, order, tau)
-        f, slope = sign * (x - point), sign * v
+        x, v = both_at(m, positions, velocities, order, start, tau)
+        f, slope = sign * x, sign * v
         before = mask(bits(f > 0.0))
         low, high = select(before, tau, low), select(before, high, tau)
-        following = tau - f / slope
+        newton = f / slope
+        following = tau - newton / (1.0 - 0.5 * newton * curve / slope)
         inside = mask(bits(following >= low) & bits(following <= high))
         following = select(inside, following, 0.5 * (low + high))
         moved = absolute(following - tau)
         tau = select(mask(active), following, tau)
-        active &= bits(moved * moved * curved > CONVERGED * tau)
+        active &= bits(moved > NEARLY * tau) | bits(moved * absolute(curve) > NEARLY * absolute(slope))
         if active == 0:
             break
-    return tau
+    x, v = both_at(m, positions, velocities, order, start, tau)
+    rest = x / v
+    return tau - rest, v - sign * curve * rest
+
+
+@lean_jit
+def lane_value(m, series, order, lane, t):
+    """The value at t of one lane's series."""
+    value = m[(series + order) * WIDTH + lane]
+    for k in range(order - 1, -1, -1):
+        value = value * t + m[(series + k) * WIDTH + lane]
+    return value
 
 
 @lean_jit
@@ -157,8 +188,8 @@ def series_true(code, m, at, sizes, tol, h, size):
     code[2](m)
     defect = splat(0.0)
     for row in range(sizes[MODEL_ROWS]):
-        series, slope = at[VELOCITIES] + row * STRIDE, splat(0.0)
-        for k in range(sizes[LANE_ORDER], 0, -1):
-            slope = fma(slope, h, k * load(m, series + k))
+        series, slope = at[ACCELERATIONS] + row * STRIDE, splat(0.0)
+        for k in range(sizes[LANE_ORDER] - 1, -1, -1):
+            slope = fma(slope, h, load(m, series + k))
         defect = maximum(defect, absolute(load(m, at[AFTER_VELOCITY] + row) - slope))
     return bits(defect * h <= (DEFECT * tol) * size)

@@ -31,6 +31,7 @@ class Slots:
     """Where everything lies in the memory of a group of lanes, in slots of one vector (see `driver.py`)."""
 
     rows: int  # coordinates, those of the sensitivities included
+    own: int  # the model's
     parameters: int
     constants: int
     records: int
@@ -51,6 +52,7 @@ class Slots:
             "records": self.records * RECORD_WIDTH,
             "position_series": self.rows * STRIDE,
             "velocity_series": self.rows * STRIDE,
+            "acceleration_series": self.own * STRIDE,
             "margin_series": self.stops * STRIDE,
         }
         places, slot = {}, FIRST_PLACE
@@ -95,13 +97,15 @@ def source(trace: Trace, emitter: Emitter) -> str:
     """The functions of a structure for lanes; `emitter` has written its scalar ones and knows its constants."""
     rows = len(trace.acceleration)
     margins = list(trace.margins.values())
-    slots = Slots(rows, max(1, len(trace.parameters)), max(1, len(emitter.constants)), len(trace.records), len(margins))
+    slots = Slots(
+        rows, trace.dof, max(1, len(trace.parameters)), max(1, len(emitter.constants)), len(trace.records), len(margins)
+    )
     impact = [] if trace.next_side is None else [trace.next_side, *impact_roots(trace)]
     series = tape([*trace.acceleration, *margins], emitter.constants)
     reset = tape(impact, emitter.constants)
     acceleration = tape(trace.acceleration, emitter.constants)
     lines = [
-        f"SLOTS = Slots{(slots.rows, slots.parameters, slots.constants, slots.records, slots.stops)!r}",
+        f"SLOTS = Slots{(slots.rows, slots.own, slots.parameters, slots.constants, slots.records, slots.stops)!r}",
         *(f"{name} = {_listing(*listed)}" for name, listed in (("SERIES", series), ("IMPACT", reset), ("FIELD", acceleration))),
         "_series, _impact, _field = write_series(SLOTS, *SERIES), write_impact(SLOTS, *IMPACT), write_field(SLOTS, *FIELD)",
     ]
@@ -435,6 +439,9 @@ def _write_orders(w: Series, slots: Slots, nodes: Tape, roots: list[int], order:
             v.append(_multiply(1.0 / (k + 1), w.series[roots[row]][k]))
             for name, value in (("position_series", q[k + 1]), ("velocity_series", v[k + 1])):
                 w.store(w.at[name] + row * STRIDE + k + 1, 0.0 if value is None else value)
+            if row < slots.own:
+                pull = w.series[roots[row]][k]
+                w.store(w.at["acceleration_series"] + row * STRIDE + k, 0.0 if pull is None else pull)
         for stop, root in enumerate(roots[slots.rows :]):
             value = w.series[root][k]
             w.store(w.at["margin_series"] + stop * STRIDE + k, 0.0 if value is None else value)
