@@ -93,16 +93,34 @@ def simulate_many(
     if system.model.sides:
         check_gap(system.model)
     jobs = _jobs(system, run.env[2], inputs, periods, duration, side or 0, run.structure.module.COLUMNS)
-    if "rest" in until and system.model.sides:
-        from saltus.flow.capture import capture_speed
-
-        columns = {path: inputs[path] for path in parameters}
-        jobs.numbers[:, 3] = capture_speed(system, columns)
+    if "rest" in until:
+        jobs.numbers[:, 3] = _capture(system, {path: inputs[path] for path in parameters}, limits)
     legs = int(np.max(jobs.labels[:, 1] - jobs.labels[:, 0] + (jobs.numbers[:, 2] > 0), initial=1))
     lanes = _lanes(system, run, tol, sample, _kept(last, legs), "settled" in until)
     total = float(np.sum(jobs.labels[:, 1] - jobs.labels[:, 0] + 1))
     ends = lanes.run(jobs, int(threads), progress, total)
     return to_dataset(system, jobs, ends, dims, shape, coords, inputs, limits, paths, sample, periods, tol, until)
+
+
+def _capture(system: System, columns: dict[str, np.ndarray], limits: tuple[str, ...]) -> Any:
+    """The speed below which each trajectory is proved to be captured, computed once for equal parameters.
+
+    Raises:
+        ParameterError: a margin to stop at besides the model's own, which a captured motion may still reach.
+    """
+    from saltus.flow.capture import capture_speed
+
+    asked = [name for name in limits if name not in system.model.stops]
+    if asked:
+        raise ParameterError(f'until="rest" proves nothing about {asked[0]}; leave out either it or stop_at')
+    if not system.model.sides:
+        return 0.0
+    varied = {path: values for path, values in columns.items() if values.ndim}
+    if not varied:
+        return capture_speed(system, columns)
+    sets, place = np.unique(np.stack(list(varied.values()), axis=1), axis=0, return_inverse=True)
+    distinct = dict(zip(varied, sets.T, strict=True))
+    return capture_speed(system, columns | distinct)[place.reshape(-1)]
 
 
 def _names(argument: str, given: Any, known: tuple[str, ...] | None) -> tuple[str, ...]:
