@@ -115,17 +115,26 @@ def body(module: ModuleType) -> str:
     return "\n" + inspect.getsource(module).split(MARKER, 1)[1].split("\n", 1)[1]
 
 
+def module_name(kind: str, text: str, header: str = HEADER) -> str:
+    """The name of a generated source's module, with a digest of all that its compiled code depends on."""
+    return f"saltus_{kind}_{hashlib.sha256((header + text + inspect.getsource(jit)).encode()).hexdigest()[:20]}"
+
+
+def is_compiled(name: str) -> bool:
+    """Whether a module's compiled code is on disk."""
+    stem = name.removeprefix("saltus_")
+    return any((cache_directory() / "__pycache__").glob(f"{stem}.*.nbi"))
+
+
 def load_module(kind: str, text: str, header: str = HEADER) -> ModuleType:
     """The module of a generated source: loaded, or written and compiled first."""
-    text = header + text
-    key = hashlib.sha256((text + inspect.getsource(jit)).encode()).hexdigest()[:20]
-    name = f"saltus_{kind}_{key}"
+    name = module_name(kind, text, header)
     if name not in sys.modules:
-        path = cache_directory() / f"{kind}_{key}.py"
+        path = cache_directory() / f"{name.removeprefix('saltus_')}.py"
         if not path.exists():
             handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
             with os.fdopen(handle, "w") as file:
-                file.write(text)
+                file.write(header + text)
             os.utime(temporary, (0, 0))  # numba trusts what it kept for a file of the same time: equal texts have equal times
             os.replace(temporary, path)
         spec = importlib.util.spec_from_file_location(name, path)

@@ -11,7 +11,7 @@ import numpy as np
 from saltus.errors import ParameterError, near
 from saltus.flow.emit import Emitter
 from saltus.flow.ensemble_dataset import KEPT, check_dims, to_dataset
-from saltus.flow.lanes.compile import load_lane_functions
+from saltus.flow.lanes.compile import compile_driver_aside, load_advance, load_helpers, load_lane_functions
 from saltus.flow.lanes.run import Jobs, Lanes, available_cores
 from saltus.flow.simulation import MOST_PERIODS, Program, check_gap, limits_of, program
 from saltus.systems import System
@@ -89,6 +89,7 @@ def simulate_many(
     dims, shape, coords, inputs = _broadcast(_inputs(system, velocity, time, parameters, coordinates))
     check_dims(dims, system)
     limits = limits_of(system, stop_at)
+    aside = compile_driver_aside()
     run = program(system, limits, paths)
     if system.model.sides:
         check_gap(system.model)
@@ -97,6 +98,9 @@ def simulate_many(
         jobs.numbers[:, 3] = _capture(system, {path: inputs[path] for path in parameters}, limits)
     legs = int(np.max(jobs.labels[:, 1] - jobs.labels[:, 0] + (jobs.numbers[:, 2] > 0), initial=1))
     lanes = _lanes(system, run, tol, sample, _kept(last, legs), "settled" in until)
+    if aside is not None:
+        load_helpers(), load_advance()
+        aside.wait()
     total = float(np.sum(jobs.labels[:, 1] - jobs.labels[:, 0] + 1))
     ends = lanes.run(jobs, int(threads), progress, total)
     return to_dataset(system, jobs, ends, dims, shape, coords, inputs, limits, paths, sample, periods, tol, until)

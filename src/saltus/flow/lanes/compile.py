@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from functools import cache
 
 from saltus.flow import layout as scalar_layout
 from saltus.flow import records, roots
-from saltus.flow.compile import Pointer, body, load_module
+from saltus.flow.compile import Pointer, body, is_compiled, load_module, module_name
 from saltus.flow.emit import Emitter
 from saltus.flow.lanes import alone, driver, layout, observe, steps, straight, vector, visits
 from saltus.flow.lanes.straight import Slots
@@ -29,11 +31,24 @@ from saltus.flow.lanes.vector import *
 @cache
 def load_driver() -> Callable[..., None]:
     """The driver of all lanes, `run_lanes` of `driver.py`; it works without Python's lock."""
-    texts = (scalar_layout, layout, records, steps, observe, driver)
-    run = load_module("lanes", "".join(body(text) for text in texts), _header()).run_lanes
+    run = load_module("lanes", _driver_text(), _header()).run_lanes
     (result,) = run.overloads.values()
     entry: Callable[..., None] = result.entry_point
     return entry
+
+
+def _driver_text() -> str:
+    return "".join(body(text) for text in (scalar_layout, layout, records, steps, observe, driver))
+
+
+def compile_driver_aside() -> subprocess.Popen[bytes] | None:
+    """Where the driver is not on disk yet, a process that compiles it, as this one has much else to compile; else None."""
+    if is_compiled(module_name("lanes", _driver_text(), _header())):
+        return None
+    try:
+        return subprocess.Popen([sys.executable, "-c", f"from {__name__} import load_driver; load_driver()"])
+    except OSError:
+        return None
 
 
 @cache
