@@ -14,11 +14,12 @@ from numba import njit, types
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
 OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
-INNER: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **OPTIONS}  # for what only compiled code calls
-jit: Callable[[Any], Any] = njit(**INNER | {"_nrt": True})
-# For functions that make no array: numba then counts no references, which would cost more than the work between two calls.
-lean_jit: Callable[[Any], Any] = njit(**INNER | {"_nrt": False})
-inline_jit: Callable[[Any], Any] = njit(**INNER | {"_nrt": False, "forceinline": True})
+jit: Callable[[Any], Any] = njit(**OPTIONS | {"_nrt": True})
+# For functions that make no array and that only compiled code may call: numba then counts no references, which would cost more
+# than the work between two calls, and writes no wrappers.
+_LEAN: Any = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, **OPTIONS}
+lean_jit: Callable[[Any], Any] = njit(**_LEAN)
+inline_jit: Callable[[Any], Any] = njit(**_LEAN, forceinline=True)  # for what every step of the lanes calls
 
 
 def cached_jit(signature: Any, fused: bool = True, nogil: bool = False) -> Callable[[Any], Any]:

@@ -108,10 +108,10 @@ def begin_leg(lane, m, lanes, tables):
 
 
 @inline_jit
-def begin_records(lane, m):
-    """Start what is recorded of a forcing period."""
-    x = -np.inf
-    m[HIGHEST * WIDTH + lane], m[LOWEST * WIDTH + lane] = x, -x
+def begin_records(lane, at, m):
+    """Start what is recorded of a forcing period, with the position at its beginning."""
+    x = m[at[POSITION] * WIDTH + lane]
+    m[HIGHEST * WIDTH + lane], m[LOWEST * WIDTH + lane] = x, x
     m[LEAST * WIDTH + lane], m[CROSSINGS * WIDTH + lane] = np.inf, 0.0
 
 
@@ -126,7 +126,7 @@ def end_leg(lane, sizes, at, m, lanes, results):
         row[d], row[own + d] = m[(at[POSITION] + d) * WIDTH + lane], m[(at[VELOCITY] + d) * WIDTH + lane]
     for j in range(4):
         row[2 * own + j] = m[(HIGHEST + j) * WIDTH + lane]
-    total_up(lane, m, lanes)
+    total_up(lane, at, m, lanes)
     where[lane, LEGS_DONE] = legs + 1
     if sizes[SETTLE] == 0:
         return 0
@@ -139,7 +139,7 @@ def end_leg(lane, sizes, at, m, lanes, results):
 
 
 @inline_jit
-def total_up(lane, m, lanes):
+def total_up(lane, at, m, lanes):
     """Add what was recorded of a forcing period to what is recorded of the trajectory, and start anew."""
     where, gauge = lanes[0], lanes[1]
     where[lane, COUNT] += int(m[CROSSINGS * WIDTH + lane])
@@ -148,7 +148,7 @@ def total_up(lane, m, lanes):
         min(gauge[lane, BOTTOM], m[LOWEST * WIDTH + lane]),
     )
     gauge[lane, SLOWEST] = min(gauge[lane, SLOWEST], m[LEAST * WIDTH + lane])
-    begin_records(lane, m)
+    begin_records(lane, at, m)
 
 
 @inline_jit
@@ -178,7 +178,7 @@ def finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results):
     where, gauge = lanes[0], lanes[1]
     state, numbers, labels, _ = results
     i, half = where[lane, IDENT], state.shape[1] // 2
-    total_up(lane, m, lanes)
+    total_up(lane, at, m, lanes)
     for row in range(half):
         state[i, row], state[i, half + row] = m[(at[POSITION] + row) * WIDTH + lane], m[(at[VELOCITY] + row) * WIDTH + lane]
     numbers[i, 0], numbers[i, 1] = m[NOW * WIDTH + lane], gauge[lane, CHATTER_NOW]
@@ -367,7 +367,7 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
             while (flags[AWAKE] >> lane) & 1:
                 lane += 1
             fill(lane, following, code, sizes, at, m, flags, lanes, jobs, tables)
-            begin_records(lane, m)
+            begin_records(lane, at, m)
             following += 1
             if lanes[0][lane, MODE_NOW] == BEYOND:
                 finish(lane, OUTSIDE, 0, code, sizes, at, m, flags, lanes, results)

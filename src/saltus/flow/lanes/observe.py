@@ -14,6 +14,7 @@ from saltus.flow.lanes.vector import *
 
 LONGEST_CYCLE = 16  # forcing periods
 CLOSE = 1e-10  # two states that count as one, relative to their size or to 1
+DOUBTFUL = 1e4  # times CLOSE: not so far apart that they are surely two
 
 
 @lean_jit
@@ -31,8 +32,9 @@ def turning_value(m, at, order, h, v0, chosen):
         following = tau - v / slope
         inside = mask(bits(following >= low) & bits(following <= high))
         following = select(inside, following, 0.5 * (low + high))
-        active &= bits(absolute(following - tau) > 1e-9 * h)
-        tau = following
+        moved = absolute(following - tau)
+        tau = select(mask(active), following, tau)  # a lane stays where it has converged, whatever the others do
+        active &= bits(moved > 1e-9 * h)
         if active == 0:
             break
     x, v = both_at(m, at[POSITIONS], at[VELOCITIES], order, load(m, at[POSITION]), tau)
@@ -71,15 +73,20 @@ def watch_range(m, at, sizes, h, tau, bend, chosen, helpers, poly, gap):
 def cycle_length(ring, streak, legs, own):
     """The length in forcing periods of the cycle on which a trajectory has settled, or 0; `ring` holds its last states.
 
-    It has settled on q periods when 2 q + 2 states in a row agree with those q periods before. The smallest q counts.
+    It has settled on q periods when 2 q + 2 states in a row agree with those q periods before. The smallest q counts,
+    and none while the states of a part of it are not clearly apart.
     """
-    here = legs % (2 * LONGEST_CYCLE)
-    found = 0
+    here, found, near = legs % (2 * LONGEST_CYCLE), 0, 0
     for q in range(1, min(LONGEST_CYCLE, legs) + 1):
-        there, same = (legs - q) % (2 * LONGEST_CYCLE), True
+        there, apart = (legs - q) % (2 * LONGEST_CYCLE), 0.0
         for i in range(2 * own):
-            same = same and abs(ring[here, i] - ring[there, i]) <= CLOSE * max(1.0, abs(ring[here, i]))
-        streak[q] = streak[q] + 1 if same else 0
+            apart = max(apart, abs(ring[here, i] - ring[there, i]) / max(1.0, abs(ring[here, i])))
+        streak[q] = streak[q] + 1 if apart <= CLOSE else 0
+        if apart <= DOUBTFUL * CLOSE:
+            near |= 1 << q
         if found == 0 and streak[q] >= 2 * q + 2:
             found = q
+    for d in range(1, found):  # a shorter cycle that is still being approached
+        if found % d == 0 and (near >> d) & 1:
+            return 0
     return found
