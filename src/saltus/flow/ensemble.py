@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError, near
+from saltus.flow.clock import clock
 from saltus.flow.emit import Emitter
 from saltus.flow.ensemble_dataset import KEPT, check_dims, to_dataset
 from saltus.flow.lanes.compile import compile_driver_aside, load_advance, load_helpers, load_lane_functions
 from saltus.flow.lanes.run import Jobs, Lanes, available_cores
-from saltus.flow.simulation import MOST_PERIODS, Program, check_gap, limits_of, program
+from saltus.flow.simulation import Program, check_gap, limits_of, program
 from saltus.systems import System
 from saltus.systems.checks import check_number
 from saltus.systems.parameters import numbers
@@ -298,32 +299,10 @@ def _jobs(
         {known.index(path): np.broadcast_to(a, n) for path, a in columns.items()},
     )
     frequency = inputs.get("load.frequency", system.load.frequency)
-    _set_times(jobs, np.asarray(inputs["time"]), frequency, periods, duration)
+    length = None if frequency is None else 2.0 * math.pi / np.asarray(frequency, dtype=float)
+    at = clock(np.asarray(inputs["time"]), length, periods, duration)
+    jobs.numbers[:, 0], jobs.numbers[:, 1], jobs.numbers[:, 2] = at.local, at.length, at.end
+    jobs.labels[:, 0], jobs.labels[:, 1] = at.first, at.last
     jobs.labels[:, 2] = side
     jobs.labels[:, 3] = np.searchsorted(breaks, inputs["time"], side="right")
     return jobs
-
-
-def _set_times(jobs: Jobs, time: np.ndarray, frequency: Any, periods: float | None, duration: float | None) -> None:
-    """First and last forcing period, and local times at the start and at the end, as `simulation.py` sets them."""
-    if (periods is None) == (duration is None):
-        raise ParameterError("say how long: either periods=... or duration=...")
-    span = periods if duration is None else duration
-    check_number("periods" if duration is None else "duration", span, at_least=0.0)
-    assert span is not None
-    if frequency is None:
-        if periods is not None:
-            raise ParameterError("the load has no frequency, so there are no forcing periods; give duration=... instead")
-        jobs.numbers[:, 0], jobs.numbers[:, 2] = time, time + span
-        return
-    length = 2.0 * math.pi / np.asarray(frequency, dtype=float)
-    reach = np.max(np.abs(time) / length + (span / length if periods is None else span), initial=0.0)
-    if not reach < MOST_PERIODS:
-        raise ParameterError(f"trajectories must start and end within 2^53 forcing periods, got {reach:g} of them")
-    first, local = np.divmod(time, length)
-    if periods is None:
-        whole, end = np.divmod(local + span, length)
-    else:
-        whole, end = np.floor(periods), local + (periods - math.floor(periods)) * length
-    jobs.numbers[:, 0], jobs.numbers[:, 1], jobs.numbers[:, 2] = local, length, end
-    jobs.labels[:, 0], jobs.labels[:, 1] = first, first + whole

@@ -11,6 +11,7 @@ import numpy as np
 
 from saltus.errors import MotionError, ParameterError, near
 from saltus.flow import layout as k
+from saltus.flow.clock import clock
 from saltus.flow.compile import Structure, load_kernel, load_structure
 from saltus.flow.motion import Motion, Stop
 from saltus.flow.recorder import Recorder
@@ -19,7 +20,6 @@ from saltus.systems import Model, Record, System
 from saltus.systems.checks import check_number
 from saltus.systems.parameters import children, is_number, numbers
 
-MOST_PERIODS = 2**53  # as many as can be counted exactly
 MOST_EVENTS = 20_000_000  # beyond this an accumulation of impacts is not being resolved but endured
 
 
@@ -218,34 +218,13 @@ def _prepare(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The kernel's state at the start: counters, numbers and settings (see `kernel.py`)."""
     where, state = np.zeros(k.WHERE, dtype=np.int64), _first_state(run, position, speeds)
-    length = system.load.period
-    if (periods is None) == (duration is None):
-        raise ParameterError("say how long: either periods=... or duration=...")
-    span = periods if duration is None else duration
-    check_number("periods" if duration is None else "duration", span, at_least=0.0)
-    assert span is not None
-    if length is None:
-        if periods is not None:
-            raise ParameterError("the load has no frequency, so there are no forcing periods; give duration=... instead")
-        # No periods to count: one leg, number 0, from `time` to the end.
-        state[k.TIME], end, last, first, length = time, time + span, 0, 0.0, 0.0
-    else:
-        reach = abs(time) / length + (span / length if periods is None else span)
-        if not reach < MOST_PERIODS:
-            raise ParameterError(
-                f"the motion must start and end within 2^53 forcing periods of {length:g}, got {reach:g} of them"
-            )
-        first, local = divmod(time, length)
-        if periods is None:
-            whole, end = divmod(local + span, length)
-        else:
-            whole, end = math.floor(periods), local + (periods - math.floor(periods)) * length
-        state[k.TIME], last = local, int(first + whole)
-    where[k.PERIOD], where[k.LAST], where[k.ORDER] = int(first), last, taylor_order(tol)
+    at = clock(time, system.load.period, periods, duration)
+    state[k.TIME] = at.local
+    where[k.PERIOD], where[k.LAST], where[k.ORDER] = int(at.first), int(at.last), taylor_order(tol)
     where[k.PIECE] = np.searchsorted(run.env[2], time, side="right")
     where[[k.DOF, k.STOPS, k.ROWS, k.SIDES, k.STEEP, k.OWN, k.COLUMNS]] = run.structure.sizes
     _choose_side(system, where, position, speeds)
-    return where, state, np.array([length, end, tol])
+    return where, state, np.array([at.length, at.end, tol])
 
 
 def _first_state(run: Program, position: np.ndarray, speeds: np.ndarray) -> np.ndarray:
