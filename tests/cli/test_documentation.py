@@ -1,14 +1,24 @@
-"""What docs/study.md shows is true."""
+"""What the documentation shows is true, and the examples run."""
 
 import dataclasses
+import inspect
 import re
+import runpy
+import sys
+import types
 from pathlib import Path
+
+import numpy as np
+import pytest
 
 import saltus
 from saltus.config import load_study
+from saltus.flow.capture import capture_speed
 from saltus.systems import IMPACTS, MODELS
 
-TEXT = (Path(__file__).parents[2] / "docs" / "study.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
+ENSEMBLES = (ROOT / "docs" / "ensembles.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
 
 
@@ -41,3 +51,68 @@ def test_the_impact_laws_are_all_named():
     rows = dict(re.findall(r"^\| `(\w+)` \| ([^|]*)\| [^|]*\|$", TEXT, re.MULTILINE))
     for name, law in IMPACTS.items():
         assert re.findall(r"`(\w+)`", rows[name]) == [f.name for f in dataclasses.fields(law)]
+
+
+# --- Python ------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/ensembles.md", "docs/models.md"])
+def test_every_snippet_runs(name, monkeypatch):
+    text = (ROOT / name).read_text(encoding="utf-8")
+    code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)).replace(", 200)", ", 12)")  # coarser grids
+    module = types.ModuleType("snippet")
+    monkeypatch.setitem(sys.modules, "snippet", module)
+    exec(compile(code, name, "exec"), vars(module))
+
+
+@pytest.mark.parametrize("script", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
+def test_every_example_asserts_what_it_says(script):
+    text = script.read_text(encoding="utf-8")
+    assert "\n    assert " in text or "\nassert " in text
+    assert len(text.splitlines()) < 60
+    runpy.run_path(str(script), run_name="__main__")
+
+
+def section(title):
+    return ENSEMBLES.split(f"\n## {title}\n")[1].split("\n## ")[0]
+
+
+def test_the_arguments_of_simulate_many_are_all_there():
+    named = re.findall(r"`(\w+)`", " ".join(re.findall(r"^\| (`[^|]*)\|", section("Arguments"), re.MULTILINE)))
+    arguments = set(inspect.signature(saltus.simulate_many).parameters) - {"system", "coordinates"}
+    assert set(named) - {"theta", "x", "theta_1", "theta_2"} == arguments
+
+
+def test_the_variables_and_the_stops_of_an_ensemble_are_all_there():
+    block = saltus.System(
+        model=saltus.RockingBlock(alpha=0.2),
+        load=saltus.Load(frequency=3.0, ground_horizontal=saltus.Harmonic(amplitude=0.1)),
+        impact=saltus.VelocityReduction(0.9),
+    )
+    ensemble = saltus.simulate_many(
+        block,
+        theta=[0.01, 0.02],
+        velocity=[0.0, 0.1],
+        time=[0.0, 1.0],
+        periods=2,
+        sample=("state", "extrema", "crossings", "speed"),
+        until=("rest", "settled"),
+        sensitivities=(),
+    )
+    tables = section("What is returned").split("| `stop` | |")
+    variables, stops = (re.findall(r"`(\w+)`", " ".join(re.findall(r"^\| (`[^|]*)\|", t, re.MULTILINE))) for t in tables)
+    assert set(variables) == set(ensemble)
+    assert stops == ensemble.stop.attrs["flag_meanings"].split()
+
+
+def test_the_thresholds_of_capture_are_those_of_the_system_above():
+    numbers = np.array(
+        re.findall(r"^\| ([\d.]+) \| ([\d.e-]+) \| ([\d.e-]+) \|$", section("Ending early"), re.MULTILINE), dtype=float
+    )
+    assert len(numbers) == 5
+    system = saltus.System(
+        model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
+        load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(amplitude=0.05), vertical=-0.5),
+    )
+    paths = {"load.horizontal.amplitude": numbers[:, :1], "impact.e": np.array([1.0, 0.9])}
+    np.testing.assert_allclose(capture_speed(system, paths), numbers[:, 1:], rtol=0.05)
