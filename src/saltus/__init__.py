@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from saltus import flow, systems, theory
     from saltus.config import load_study
     from saltus.errors import MotionError, ParameterError, SaltusError, TraceError
-    from saltus.flow import EventKind, Motion, Sensitivities, Stop, sensitivities, simulate, simulate_many
+    from saltus.flow import EventKind, Motion, Sensitivities, Stop, capture_speed, sensitivities, simulate, simulate_many
     from saltus.systems import (
         EnergyRestitution,
         Harmonic,
@@ -34,7 +34,16 @@ if TYPE_CHECKING:
 _HOMES = {
     "saltus.errors": ("MotionError", "ParameterError", "SaltusError", "TraceError"),
     "saltus.config": ("load_study",),
-    "saltus.flow": ("EventKind", "Motion", "Sensitivities", "Stop", "sensitivities", "simulate", "simulate_many"),
+    "saltus.flow": (
+        "EventKind",
+        "Motion",
+        "Sensitivities",
+        "Stop",
+        "capture_speed",
+        "sensitivities",
+        "simulate",
+        "simulate_many",
+    ),
     "saltus.systems": (
         "EnergyRestitution",
         "Harmonic",
@@ -79,6 +88,7 @@ __all__ = [
     "UnitCell",
     "VelocityReduction",
     "WallOscillator",
+    "capture_speed",
     "flow",
     "load_study",
     "register",

@@ -5,6 +5,7 @@ their own. Nothing is smoothed. `simulate` is the way in; `Motion` is what it re
 it, and `simulate_many` follows a million of them.
 """
 
+from saltus.flow.capture import capture_speed
 from saltus.flow.ensemble import simulate_many
 from saltus.flow.motion import Crossings, DenseOutput, Event, EventKind, Motion, Stop
 from saltus.flow.sensitivity import Sensitivities, sensitivities
@@ -20,6 +21,7 @@ __all__ = [
     "Sensitivities",
     "Stop",
     "Validity",
+    "capture_speed",
     "sensitivities",
     "simulate",
     "simulate_many",

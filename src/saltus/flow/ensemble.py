@@ -142,8 +142,8 @@ def _names(argument: str, given: Any, known: tuple[str, ...] | None) -> tuple[st
 def _kept(last: Any, legs: int) -> int:
     if isinstance(last, str) and last == "all":
         return legs
-    if isinstance(last, bool) or not isinstance(last, (int, np.integer)) or last < 0:
-        raise ParameterError(f'last must be a whole number of forcing periods, or "all", got {last!r}')
+    if isinstance(last, bool) or not isinstance(last, (int, np.integer)) or last < 1:
+        raise ParameterError(f'last must be a whole number of forcing periods from 1 on, or "all", got {last!r}')
     return max(1, min(int(last), legs))
 
 

@@ -187,12 +187,14 @@ def _add_derivatives(
     q = ends.states[:, own:rows].reshape(-1, len(columns), own)
     v = ends.states[:, rows + own :].reshape(-1, len(columns), own)
     derivative = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
+    slope = np.concatenate([ends.states[:, rows : rows + own], ends.numbers[:, 5 : 5 + own]], axis=1)
+    limited = ends.labels[:, 0] == k.LIMITED  # the end moves with the margin
+    derivative[limited] += slope[limited, :, None] * ends.numbers[limited, None, 5 + own :]
     if periods is not None and FREQUENCY in paths:
         moving = np.isin(ends.labels[:, 0], (k.DONE, at.SETTLED)) & (ends.labels[:, 2] == k.ARC)
         length = jobs.numbers[:, 1]
         start = jobs.labels[:, 0] * length + jobs.numbers[:, 0]
         span = ends.labels[:, 4] * length + ends.numbers[:, 0] - start
         shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # d(end)/dW = -span / W
-        slope = np.concatenate([ends.states[:, rows : rows + own], ends.numbers[:, 5 : 5 + own]], axis=1)
         derivative[:, :, columns.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)
     add("derivative", derivative, "1", "derivative of the state at the end", "state", "column")

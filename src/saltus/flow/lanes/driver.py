@@ -190,6 +190,8 @@ def finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results):
         code[2](m)
         for row in range(sizes[MODEL_ROWS]):
             numbers[i, 5 + row] = m[(at[AFTER_VELOCITY] + row) * WIDTH + lane]
+        for j in range(sizes[COLUMN_COUNT]):
+            numbers[i, 5 + sizes[MODEL_ROWS] + j] = m[(at[AFTER_POSITION] + j) * WIDTH + lane]
     labels[i, 0], labels[i, 1], labels[i, 2] = reason, detail, where[lane, MODE_NOW]
     labels[i, 3], labels[i, 4] = int(m[SIDE_NOW * WIDTH + lane]), where[lane, LEG]
     labels[i, 5], labels[i, 6], labels[i, 7] = where[lane, COUNT], where[lane, TOUCHES], where[lane, LEGS_DONE]

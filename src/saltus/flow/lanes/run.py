@@ -45,7 +45,7 @@ class Ends:
     """How the trajectories ended; see `finish` and `end_leg` of `driver.py` for the columns."""
 
     states: np.ndarray  # (n, 2 coordinates)
-    numbers: np.ndarray  # (n, 5 + own coordinates)
+    numbers: np.ndarray  # (n, 5 + own coordinates + columns of the tangent)
     labels: np.ndarray  # (n, 8)
     samples: np.ndarray  # (n, kept, columns asked for)
 
@@ -79,7 +79,7 @@ class Lanes:
         n, own = len(jobs), self.own
         ends = Ends(
             np.empty((n, jobs.states.shape[1])),
-            np.empty((n, 5 + own)),
+            np.empty((n, 5 + own + self.program.structure.module.COLUMNS)),
             np.empty((n, 8), dtype=np.int64),
             np.empty((n, self.kept, len(self.sampled))),
         )

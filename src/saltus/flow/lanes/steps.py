@@ -136,7 +136,8 @@ def only_root(m, at, order, h, start, sign, g0, g1, g2, x, v, a, chosen):
     d, curve = first_guess(g0, g1, g2, sign * x, sign * v * h, sign * a * (h * h))
     curve = curve / (h * h)
     low, high, tau = splat(0.0), h, h - d * h
-    tau = select(mask(bits(tau > 0.0) & bits(tau <= h)), tau, 0.5 * h)
+    sane = mask(bits(tau > 0.0) & bits(tau <= h))  # the guess may have gone astray, and its curve with it
+    tau, curve = select(sane, tau, 0.5 * h), select(sane, curve, sign * a)
     active = chosen
     for _ in range(60):
         x, v = both_at(m, positions, velocities, order, start, tau)

@@ -99,6 +99,8 @@ def visit(lane, scalar, sizes, at, m, flags, settings, lanes, parameters, tables
         if reason != FULL and reason != PAUSED:
             break
     come_back(lane, sizes, at, m, flags, lanes, where, state)
+    for j in range(sizes[COLUMN_COUNT]):  # how the time of a last event moves, for `finish`
+        m[(at[AFTER_POSITION] + j) * WIDTH + lane] = state[STATE + 2 * where[DOF] + j]
     gauge[lane, CHATTER_NOW] = state[SPEED] if where[MODE] == CHATTER else 0.0
     if reason in (DONE, VISITED):
         captured = where[MODE] == REST and m[CAPTURE * WIDTH + lane] > 0.0
