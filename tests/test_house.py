@@ -2,7 +2,6 @@
 
 import ast
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -59,14 +58,6 @@ def test_the_door_is_light(statement: str) -> None:
     loaded = f"{statement}; import sys; print([m for m in {HEAVY!r} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
-
-
-@pytest.mark.parametrize("page", ["README.md", "docs/models.md"])
-def test_the_python_that_a_page_shows_runs(page: str) -> None:
-    blocks = re.findall(r"```python\n(.*?)```", (SOURCE.parents[1] / page).read_text(), re.DOTALL)
-    assert blocks
-    for block in blocks:
-        exec(compile(block, page, "exec"), {"__name__": "__main__"})
 
 
 @pytest.mark.parametrize("script", sorted((SOURCE.parents[1] / "examples").glob("*.py")), ids=lambda p: p.name)

@@ -3,7 +3,6 @@
 import dataclasses
 import inspect
 import re
-import runpy
 import sys
 import types
 from pathlib import Path
@@ -63,14 +62,6 @@ def test_every_snippet_runs(name, monkeypatch):
     module = types.ModuleType("snippet")
     monkeypatch.setitem(sys.modules, "snippet", module)
     exec(compile(code, name, "exec"), vars(module))
-
-
-@pytest.mark.parametrize("script", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
-def test_every_example_asserts_what_it_says(script):
-    text = script.read_text(encoding="utf-8")
-    assert "\n    assert " in text or "\nassert " in text
-    assert len(text.splitlines()) < 60
-    runpy.run_path(str(script), run_name="__main__")
 
 
 def section(title):
