@@ -107,7 +107,7 @@ def sources(monkeypatch):
         texts.append(text)
         raise LookupError
 
-    monkeypatch.setattr(compilation, "_load", keep)
+    monkeypatch.setattr(compilation, "load_module", keep)
 
     def of(system, limits=()):
         with pytest.raises(LookupError):
