@@ -37,6 +37,7 @@ STOPS = {
     k.NOT_FINITE: "not_finite",
     k.STALLED: "stalled",
     at.OUTSIDE: "outside",
+    at.UNRESOLVED: "unresolved",
 }
 MEANINGS = {
     "horizon": "the time asked for",
@@ -49,6 +50,7 @@ MEANINGS = {
     "not_finite": "the motion leaves the range of numbers",
     "stalled": "the acceleration is singular",
     "outside": "the state at the start lies beyond the contact",
+    "unresolved": "impacts accumulate too slowly to be followed: more than 5 million in a forcing period",
 }
 
 

@@ -379,15 +379,20 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
         if arrived == 0:
             if sizes[RECORD_ROWS] > 0:
                 expand_records(sizes, at, m, flags, lanes, tables, poly)
-            away, captured = flags[PARKED], 0
+            away, captured, endless = flags[PARKED], 0, 0
             if flags[AWAKE] != flags[PARKED]:
                 doubtful, captured = fly(code, sizes, at, m, flags, settings, helpers, poly, gap)
                 away |= doubtful
-            for lane in range(WIDTH if away | captured else 0):
-                if (captured >> lane) & 1:
+                endless = bits(load(m, CROSSINGS) > MOST_IMPACTS) & flags[AWAKE]
+            for lane in range(WIDTH if away | captured | endless else 0):
+                if (endless >> lane) & 1:
+                    finish(lane, UNRESOLVED, 0, code, sizes, at, m, flags, lanes, results)
+                elif (captured >> lane) & 1:
                     finish(lane, CAPTURED, 0, code, sizes, at, m, flags, lanes, results)
                 elif (away >> lane) & 1:
-                    reason, detail = helpers[2](lane, scalar, sizes, at, m, flags, settings, lanes, jobs[3], tables, poly)
+                    reason, detail = helpers[2](
+                        lane, scalar, sizes, at, m, flags, settings, lanes, jobs[3], tables, poly, control
+                    )
                     if reason != PAUSED:
                         finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results)
             arrived = bits(load(m, NOW) >= load(m, TARGET)) & flags[AWAKE]

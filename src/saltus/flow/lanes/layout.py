@@ -42,7 +42,8 @@ IDENT, LEG, LAST_LEG, PIECE_NOW, MODE_NOW, HELD_NOW, SKIP_NOW, FORCED_SIDE, COUN
 PERIOD_LENGTH, END_TIME, CHATTER_NOW, TOP, BOTTOM, SLOWEST = 0, 1, 2, 3, 4, 5
 
 # Why a trajectory ended, after the reasons of `layout.py` (DONE, NOT_UNIQUE, NO_IMPACT, NOT_FINITE, STALLED, LIMITED).
-CAPTURED, SETTLED, OUTSIDE = 9, 10, 11
+CAPTURED, SETTLED, OUTSIDE, UNRESOLVED = 9, 10, 11, 12
 BEYOND = 4  # a mode after those of `flow/layout.py`: on no side of the contact
 
+MOST_IMPACTS = 5e6  # of a forcing period: beyond them an accumulation is not being resolved but endured
 NO_ROOT, TOUCH = -1.0, -2.0  # instead of the time of a lane's root

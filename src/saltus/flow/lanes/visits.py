@@ -77,7 +77,7 @@ def come_back(lane, sizes, at, m, flags, lanes, where, state):
 
 
 @cached_jit(VISIT_LANE)
-def visit(lane, scalar, sizes, at, m, flags, settings, lanes, parameters, tables, poly):
+def visit(lane, scalar, sizes, at, m, flags, settings, lanes, parameters, tables, poly, control):
     """Move a lane by the scalar kernel until it is on an arc again, or its leg or its motion ends.
 
     Returns (PAUSED, 0), or why the motion ends and which margin reached zero.
@@ -96,13 +96,16 @@ def visit(lane, scalar, sizes, at, m, flags, settings, lanes, parameters, tables
     while True:
         reason = advance(where, state, limits, env, model, steps, events)
         detail = note(lane, where, m, lanes, steps, events, sizes, poly)
-        if reason != FULL and reason != PAUSED:
+        if (reason != FULL and reason != PAUSED) or control[0] != 0:
+            break
+        if m[CROSSINGS * WIDTH + lane] > MOST_IMPACTS:
+            reason = UNRESOLVED
             break
     come_back(lane, sizes, at, m, flags, lanes, where, state)
     for j in range(sizes[COLUMN_COUNT]):  # how the time of a last event moves, for `finish`
         m[(at[AFTER_POSITION] + j) * WIDTH + lane] = state[STATE + 2 * where[DOF] + j]
     gauge[lane, CHATTER_NOW] = state[SPEED] if where[MODE] == CHATTER else 0.0
-    if reason in (DONE, VISITED):
+    if reason in (DONE, VISITED, FULL, PAUSED):
         captured = where[MODE] == REST and m[CAPTURE * WIDTH + lane] > 0.0
         return CAPTURED if captured else PAUSED, 0
     return reason, detail
