@@ -45,5 +45,5 @@ PERIOD_LENGTH, END_TIME, CHATTER_NOW, TOP, BOTTOM, SLOWEST = 0, 1, 2, 3, 4, 5
 CAPTURED, SETTLED, OUTSIDE, UNRESOLVED = 9, 10, 11, 12
 BEYOND = 4  # a mode after those of `flow/layout.py`: on no side of the contact
 
-MOST_IMPACTS = 5e6  # of a forcing period: beyond them an accumulation is not being resolved but endured
+MOST_IMPACTS = 1e6  # of a forcing period: beyond them an accumulation is not being resolved but endured
 NO_ROOT, TOUCH = -1.0, -2.0  # instead of the time of a lane's root

@@ -1,0 +1,155 @@
+"""Every registered model runs through the scalar kernel, the lanes and the sensitivities, without being told to any test."""
+
+import dataclasses
+import math
+import re
+
+import numpy as np
+import pytest
+from lane_cases import Curved, Duffing, end_state, motion_state, stop_names
+
+import saltus
+from saltus.systems import Harmonic, Load, System
+from saltus.systems.registry import IMPACTS, MODELS
+
+GUESSES = (0.4, 0.3, 0.9, 1.1)  # for a number without a default that a model may want
+
+
+def build(model):
+    """A model with its defaults, and for numbers without one the first of some guesses that it takes."""
+    needed = [f.name for f in dataclasses.fields(model) if f.default is dataclasses.MISSING]
+    return model(**dict.fromkeys(needed, GUESSES[0]))
+
+
+def system_of(model):
+    """Every channel harmonic, with an impact law that loses something where there are impacts."""
+    channels = {
+        name: Harmonic(amplitude=0.05 + 0.03 * i, mean=0.02 * i - 0.04, phase=0.5 * i) for i, name in enumerate(model.channels)
+    }
+    built = build(model)
+    load = Load(frequency=1.3, **channels)
+    return (
+        System(model=built, load=load, impact=IMPACTS["VelocityReduction"](0.9))
+        if built.sides
+        else System(model=built, load=load)
+    )
+
+
+def states_of(system, n=24):
+    """States on every side of the contact: by the margins that stop the motion, and by the gap."""
+    rng, model = np.random.default_rng(4), system.model
+    own, found = len(model.coordinates), []
+    for _ in range(100_000):
+        position, velocity = 0.5 * rng.normal(size=own), 0.5 * rng.normal(size=own)
+        place = float(position[0]) if own == 1 else tuple(position)
+        speed = float(velocity[0]) if own == 1 else tuple(velocity)
+        gaps = {side: float(model.gap(place, side)) for side in model.sides} if own == 1 else {}
+        inside = [side for side, gap in gaps.items() if gap > 0]
+        if gaps and not inside:
+            continue
+        side = inside[0] if inside else 1
+        acceleration = model.acceleration(0.0, place, speed, side, system.load)
+        margins = model.margins(0.0, place, speed, acceleration, side, system.load)
+        if all(float(margins[name]) > 0.02 for name in model.stops):
+            found.append((position, velocity))
+        if len(found) == n:
+            break
+    positions, velocities = map(np.array, zip(*found, strict=True))
+    rates = velocities[:, 0] if own == 1 else tuple(velocities.T)
+    return {name: positions[:, i] for i, name in enumerate(model.coordinates)}, rates
+
+
+def some_paths(system):
+    """One number of the model, one of a channel, the frequency, and one of the impact law."""
+    numbers = [path for path in system.parameters if not path.endswith(".order")]
+    chosen = [next(p for p in numbers if p.startswith("model.")), next(p for p in numbers if p.endswith(".amplitude"))]
+    return tuple(
+        dict.fromkeys([*chosen, "load.frequency", *(p for p in numbers if p.startswith("impact.") and system.model.sides)])
+    )
+
+
+CASES = {**MODELS, "Duffing": Duffing, "Curved": Curved}
+
+
+@pytest.fixture(scope="module", params=list(CASES))
+def ready(request):
+    system = system_of(CASES[request.param])
+    return system, *states_of(system)
+
+
+def one(states, velocity, i):
+    speed = tuple(float(v[i]) for v in velocity) if isinstance(velocity, tuple) else float(velocity[i])
+    return {"velocity": speed, **{name: float(a[i]) for name, a in states.items()}}
+
+
+def test_it_has_states_on_every_side(ready):
+    system, states, _ = ready
+    (first, *_) = states.values()
+    assert len(first) == 24
+    for side in system.model.sides:
+        assert any(float(system.model.gap(float(x), side)) > 0 for x in first)
+
+
+def test_lanes_are_the_scalar_kernel(ready):
+    system, states, velocity = ready
+    ensemble = saltus.simulate_many(system, **states, velocity=velocity, periods=1.4, tol=1e-14)
+    stops = stop_names(ensemble)
+    for i, state in enumerate(end_state(ensemble, system)):
+        motion = saltus.simulate(system, **one(states, velocity, i), periods=1.4, tol=1e-14, dense=False)
+        assert (stops[i], int(ensemble.crossings[i]), int(ensemble.side[i])) == (motion.stop, len(motion.crossings), motion.side)
+        np.testing.assert_allclose(state, motion_state(motion), rtol=0, atol=3e-12)
+
+
+def test_derivatives_in_lanes_are_those_of_the_scalar_kernel(ready):
+    system, states, velocity = ready
+    paths, compared, periods = some_paths(system), 0, 0.1 if system.model.stops else 1.4
+    ensemble = saltus.simulate_many(system, **states, velocity=velocity, periods=periods, tol=1e-14, sensitivities=paths)
+    for i, derivative in enumerate(ensemble.derivative.values):
+        result = saltus.sensitivities(
+            system, parameters=paths, **one(states, velocity, i), periods=periods, tol=1e-14, dense=False
+        )
+        expected = np.hstack([result.state, result.parameters])
+        np.testing.assert_array_equal(np.isnan(derivative), np.isnan(expected))
+        scale = np.maximum(np.nanmax(np.abs(expected), initial=1e-300, axis=0), 1.0)
+        assert np.nanmax(np.abs(derivative - expected) / scale, initial=0.0) < 1e-9
+        compared += 1
+    assert compared >= 3
+    assert list(ensemble.column.values[-len(paths) :]) == list(paths)
+
+
+@pytest.mark.parametrize("impact", IMPACTS)
+@pytest.mark.parametrize("model", MODELS)
+def test_every_impact_law_runs_in_lanes_where_the_model_takes_it(model, impact):
+    system = system_of(MODELS[model])
+    law = IMPACTS[impact]
+    needed = [f.name for f in dataclasses.fields(law) if f.default is dataclasses.MISSING]
+    states, velocity = states_of(system, 12)
+    try:
+        system = system.with_({"impact": law(**dict.fromkeys(needed, 0.8))})
+        expected = [saltus.simulate(system, **one(states, velocity, i), periods=1.0, tol=1e-14, dense=False) for i in range(12)]
+    except saltus.ParameterError as refused:
+        message = re.escape(str(refused))
+        with pytest.raises(saltus.ParameterError, match=message):
+            saltus.simulate_many(
+                system.with_({"impact": law(**dict.fromkeys(needed, 0.8))}), **states, velocity=velocity, periods=1.0
+            )
+        return
+    except saltus.MotionError:
+        pytest.skip("some of its impacts have no solution; the random cases compare them")
+    ensemble = saltus.simulate_many(system, **states, velocity=velocity, periods=1.0, tol=1e-14)
+    for i, motion in enumerate(expected):
+        assert int(ensemble.crossings[i]) == len(motion.crossings)
+        np.testing.assert_allclose(end_state(ensemble, system)[i], motion_state(motion), rtol=0, atol=3e-12)
+
+
+def test_numbers_that_change_compile_nothing(ready):
+    from saltus.flow.compile import cache_directory
+
+    system, states, velocity = ready
+    saltus.simulate_many(system, **states, velocity=velocity, periods=0.1)
+    before = set(cache_directory().iterdir())
+    for path, value in system.parameters.items():
+        if not path.endswith(".order") and (system.model.sides or not path.startswith("impact.")):
+            saltus.simulate_many(system, **states, velocity=velocity, periods=0.1, parameters={path: value * 0.99})
+    assert set(cache_directory().iterdir()) == before
+    assert math.isfinite(system.load.frequency)

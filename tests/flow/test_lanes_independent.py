@@ -1,0 +1,115 @@
+"""Results do not depend on threads, order, neighbours or chunks, to the last bit; on the width of a register only by rounding."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lane_cases import FAMILIES, end_state
+
+import saltus.flow.lanes.run as lanes_run
+
+OPTIONS = {"sample": ("state", "extrema", "crossings", "speed"), "last": 3, "tol": 1e-12}
+MANY = 2600  # more than two chunks
+
+
+def cases_of(family, n=MANY):
+    return FAMILIES[family](np.random.default_rng([3, *family.encode()]), n)
+
+
+def same_bits(one, other):
+    """Every variable, NaN equal to NaN, zeros with their sign; of the last periods only those that both keep."""
+    kept = min(one.sizes.get("period", 0), other.sizes.get("period", 0))
+    if kept:  # fewer than asked for where no trajectory has as many
+        one, other = one.isel(period=slice(-kept, None)), other.isel(period=slice(-kept, None))
+    assert list(one.data_vars) == list(other.data_vars)
+    for name in one.data_vars:
+        assert one[name].values.tobytes() == other[name].values.tobytes(), name
+
+
+@pytest.fixture(scope="module", params=["paper", "records", "rocking"])
+def reference(request):
+    cases = cases_of(request.param)
+    return cases, cases.in_lanes(threads=1, **OPTIONS)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 7])
+def test_threads_change_nothing(reference, threads):
+    cases, expected = reference
+    same_bits(cases.in_lanes(threads=threads, **OPTIONS), expected)
+
+
+def test_the_order_changes_nothing(reference):
+    cases, expected = reference
+    order = np.random.default_rng(0).permutation(len(cases))
+    same_bits(cases.chosen(order).in_lanes(**OPTIONS), expected.isel(trajectory=order))
+
+
+def test_neighbours_change_nothing(reference):
+    cases, expected = reference
+    for i in range(0, MANY, 97):
+        same_bits(cases.chosen([i]).in_lanes(**OPTIONS), expected.isel(trajectory=[i]))
+    rows = np.arange(5, 8)  # fewer than a register holds
+    same_bits(cases.chosen(rows).in_lanes(**OPTIONS), expected.isel(trajectory=rows))
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 1000, 10**6])
+def test_chunks_change_nothing(reference, chunk, monkeypatch):
+    cases, expected = reference
+    monkeypatch.setattr(lanes_run, "CHUNK", chunk)
+    same_bits(cases.in_lanes(threads=2, **OPTIONS), expected)
+
+
+def test_what_is_sampled_changes_nothing_in_the_rest(reference):
+    cases, expected = reference
+    bare = cases.in_lanes(tol=1e-12, sample=())
+    same_bits(bare, expected[list(bare.data_vars)])
+
+
+def test_tangents_change_nothing_but_rounding():
+    cases = cases_of("paper", 300)
+    plain, with_tangent = cases.in_lanes(tol=1e-14), cases.in_lanes(tol=1e-14, sensitivities=("model.damping",))
+    np.testing.assert_array_equal(plain.stop, with_tangent.stop)
+    close = np.abs(end_state(plain, cases.system) - end_state(with_tangent, cases.system)).max(axis=1) < 1e-11
+    assert close.mean() > 0.97
+
+
+# --- widths ------------------------------------------------------------------------------------------------------------------
+
+WIDE = """
+import sys
+import numpy as np
+from lane_cases import FAMILIES, end_state, stop_names
+from saltus.flow.lanes.vector import WIDTH
+cases = FAMILIES["paper"](np.random.default_rng(8), 400)
+ensemble = cases.in_lanes(tol=1e-14, sample=("state", "extrema"))
+state, extrema = end_state(ensemble, cases.system), np.stack([ensemble.largest_theta, ensemble.smallest_theta])
+np.savez(sys.argv[1], width=WIDTH, state=state, extrema=extrema, stop=stop_names(ensemble), crossings=ensemble.crossings)
+"""
+
+
+def run_with_width(width, folder):
+    """The same ensemble in a process of its own, with a register of `width` doubles."""
+    environment = os.environ | {
+        "SALTUS_LANES": str(width),
+        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")]),
+    }
+    file = folder / f"width{width}.npz"
+    subprocess.run([sys.executable, "-c", WIDE, str(file)], env=environment, check=True, timeout=600)
+    return np.load(file)
+
+
+def test_every_width_of_register_gives_the_same_bits(tmp_path):
+    results = {width: run_with_width(width, tmp_path) for width in (1, 2, 4, 8)}
+    assert {int(r["width"]) for r in results.values()} == {1, 2, 4, 8}
+    one = results[1]
+    for width, other in results.items():
+        for name in ("stop", "crossings"):
+            np.testing.assert_array_equal(one[name], other[name])
+        for name in ("state", "extrema"):
+            equal = (one[name] == other[name]).mean()
+            worst = np.abs(one[name] - other[name]).max()
+            assert one[name].tobytes() == other[name].tobytes(), f"width {width}: {name} {equal:.4f} equal, worst {worst:.2g}"
+    assert len(set(one["stop"].tolist())) >= 2
