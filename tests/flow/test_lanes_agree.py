@@ -1,6 +1,6 @@
 """The lanes agree with the scalar kernel on random cases of every kind of model, load and impact.
 
-SALTUS_CASES=100000 runs so many cases in all (minutes); by default about 14000.
+SALTUS_CASES=100000 runs so many cases in all (minutes); by default about 4000.
 
 What may differ, and why. A motion magnifies its rounding. How much is measured, not assumed: every number of a case is changed
 by 1e-7 of itself, and the end moves `amplification` times as far. Below `CALM` -- away from chaos and grazing -- ends must
@@ -19,7 +19,7 @@ from lane_cases import FAMILIES, amplification, end_state, motion_state, stop_na
 import saltus
 from saltus.flow import EventKind
 
-CASES = int(os.environ.get("SALTUS_CASES", "14000")) // len(FAMILIES)
+CASES = int(os.environ.get("SALTUS_CASES", "4000")) // len(FAMILIES)
 BATCH = 250
 CALM = 100.0
 TOLERANCES = (1e-14, 1e-15, 1e-14, 1e-12, 1e-9)  # batch by batch, in turn
