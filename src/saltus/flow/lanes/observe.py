@@ -77,7 +77,7 @@ def cycle_length(ring, streak, legs, own):
     and none while the states of a part of it are not clearly apart.
     """
     here, found, near = legs % (2 * LONGEST_CYCLE), 0, 0
-    for q in range(1, min(LONGEST_CYCLE, legs) + 1):
+    for q in range(1, min(LONGEST_CYCLE, legs - 1) + 1):
         there, apart = (legs - q) % (2 * LONGEST_CYCLE), 0.0
         for i in range(2 * own):
             apart = max(apart, abs(ring[here, i] - ring[there, i]) / max(1.0, abs(ring[here, i])))

@@ -79,7 +79,7 @@ class Lanes:
         n, own = len(jobs), self.own
         ends = Ends(
             np.empty((n, jobs.states.shape[1])),
-            np.empty((n, 5 + own + self.program.structure.module.COLUMNS)),
+            np.zeros((n, 5 + own + self.program.structure.module.COLUMNS)),
             np.empty((n, 8), dtype=np.int64),
             np.empty((n, self.kept, len(self.sampled))),
         )

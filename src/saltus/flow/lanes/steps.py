@@ -155,7 +155,7 @@ def only_root(m, at, order, h, start, sign, g0, g1, g2, x, v, a, chosen):
             break
     x, v = both_at(m, positions, velocities, order, start, tau)
     rest = x / v
-    return tau - rest, v - sign * curve * rest
+    return tau - rest, v - curve * rest / sign
 
 
 @lean_jit

@@ -16,7 +16,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from saltus.flow.emit import Emitter
-from saltus.flow.graph import Expr
+from saltus.flow.graph import Expr, substitute
 from saltus.flow.lanes.layout import FIRST_PLACE, HIGHEST_ORDER, NEW_SIDE, NEW_TIME, NOW, ORIGIN, SIDE_NOW, STRIDE
 from saltus.flow.lanes.vector import LONG, VECTOR, WIDTH, Vec, slot_pointer
 from saltus.flow.tangent import saltation
@@ -96,7 +96,8 @@ def tape(roots: Sequence[Expr], constants: dict[Expr, int]) -> tuple[Tape, list[
 def source(trace: Trace, emitter: Emitter) -> str:
     """The functions of a structure for lanes; `emitter` has written its scalar ones and knows its constants."""
     rows = len(trace.acceleration)
-    margins = list(trace.margins.values())
+    pulls = {Expr("acceleration", (), i): a for i, a in enumerate(trace.acceleration[: trace.dof])}
+    margins = [substitute(margin, pulls) for margin in trace.margins.values()]
     slots = Slots(
         rows, trace.dof, max(1, len(trace.parameters)), max(1, len(emitter.constants)), len(trace.records), len(margins)
     )
