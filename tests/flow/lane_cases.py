@@ -30,6 +30,7 @@ REFUSED = {
     "range of numbers": "not_finite",
     "shrink": "stalled",
     "lies beyond": "outside",
+    "too slowly": "unresolved",
 }
 
 
@@ -442,7 +443,7 @@ def nudged(cases, rng):
         return a * (1 - NUDGE * rng.uniform(0.5, 1.0))
 
     def kept(path):
-        return path in ("impact.e", "load.frequency", "model.wall") or path.endswith(".order")
+        return path in ("impact.e", "impact.r", "load.frequency", "model.wall") or path.endswith(".order")
 
     columns = {path: a if kept(path) else off(a) for path, a in cases.columns.items()}
     wall = cases.columns.get("model.wall", 0.0)
