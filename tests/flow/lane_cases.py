@@ -199,8 +199,12 @@ def every_channel(rng, n, impact=None):
     if impact is None:
         impact, columns["impact.e"] = VelocityReduction(), factors(rng, n)
     cases = angle_cases(System(model=Metainterface(beta0=1.4), load=load, impact=impact), columns, rng, n, periods(rng))
-    # What starts at contact without speed, or is left without one by an impact, comes back to it without one: unless damped.
-    stopped = (cases.state["theta"] == 0.0) & (cases.velocity == 0.0) | (columns.get("impact.e", 1.0) == 0.0)
+    # What starts at contact without speed, or is left (almost) without one by an impact, comes back to it so: unless damped.
+    stopped = (
+        (cases.state["theta"] == 0.0) & (cases.velocity == 0.0)
+        | (columns.get("impact.e", 1.0) == 0.0)
+        | (impact == InelasticImpact())
+    )
     columns["model.damping"] += np.where(stopped, 0.01, 0.0)
     return cases
 

@@ -191,7 +191,8 @@ def _add_derivatives(
     derivative = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
     slope = np.concatenate([ends.states[:, rows : rows + own], ends.numbers[:, 5 : 5 + own]], axis=1)
     limited = ends.labels[:, 0] == k.LIMITED  # the end moves with the margin
-    derivative[limited] += slope[limited, :, None] * ends.numbers[limited, None, 5 + own :]
+    with np.errstate(invalid="ignore"):  # the instant of a margin met without speed has no derivative
+        derivative[limited] += slope[limited, :, None] * ends.numbers[limited, None, 5 + own :]
     if periods is not None and FREQUENCY in paths:
         moving = np.isin(ends.labels[:, 0], (k.DONE, at.SETTLED)) & (ends.labels[:, 2] == k.ARC)
         length = jobs.numbers[:, 1]
