@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from saltus.flow import chatter, contact, jit, kernel, layout, records, roots, steps
+from saltus.flow import chatter, contact, jit, kernel, layout, records, roots, segments, steps
 from saltus.flow.emit import Emitter
 from saltus.flow.trace import Trace
 
@@ -32,7 +32,8 @@ import math
 
 import numpy as np
 
-from saltus.flow.jit import ADVANCE, CONSTANTS, CONTACT_DAMPING, CONTACT_SERIES, GEOMETRY, RESET, SERIES, TANGENT, cached_jit, jit
+from saltus.flow.jit import ADVANCE, CONSTANTS, CONTACT_DAMPING, CONTACT_SERIES, GEOMETRY, RESET, SEGMENTS, SERIES, TANGENT
+from saltus.flow.jit import cached_jit, jit
 
 '''
 
@@ -101,6 +102,15 @@ def load_kernel() -> Callable[..., int]:
 def kernel_module() -> ModuleType:
     """The module of the scalar kernel."""
     return load_module("kernel", "".join(body(module) for module in (layout, roots, steps, contact, chatter, kernel)))
+
+
+@cache
+def load_segments() -> Callable[..., int]:
+    """The kernel that follows the smooth segments of a periodic orbit, `fly_segments` of `segments.py`."""
+    text = "".join(body(module) for module in (layout, roots, steps, contact, chatter, segments))
+    (result,) = load_module("segments", text).fly_segments.overloads.values()
+    entry: Callable[..., int] = result.entry_point
+    return entry
 
 
 def load_structure(trace: Trace) -> Structure:

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from saltus.flow import tangent
-from saltus.flow.graph import Expr, number
+from saltus.flow.graph import Expr, differentiate, number
 from saltus.flow.layout import (
     AFTER_IMPACTS,
     AT_A_JUMP,
@@ -17,6 +17,7 @@ from saltus.flow.layout import (
     LIMIT,
     NEVER_AGAIN,
     RELEASE,
+    RESET_SLOPES,
     RESTING,
     STATE,
 )
@@ -63,6 +64,7 @@ def _events(trace: Trace) -> list[tuple[int, int, dict[Expr, Expr]]]:
     return [
         *events,
         (CROSSING, 0, after),
+        (RESET_SLOPES, 0, _reset_slopes(trace)),
         (RESTING, AFTER_IMPACTS, at_rest | _shifts(tangent.rest_shift(trace))),
         (RESTING, AT_ONCE, at_rest),
         (RESTING, NEVER_AGAIN, none),
@@ -70,6 +72,17 @@ def _events(trace: Trace) -> list[tuple[int, int, dict[Expr, Expr]]]:
         (RELEASE, AT_A_JUMP, _shifts(still)),
         (RELEASE, AT_NONE, _shifts(unknown)),
     ]
+
+
+def _reset_slopes(trace: Trace) -> dict[Expr, Expr]:
+    """u = x_c, z = R_v z + R_c, and R_t as the shift: v+ = R(v-, t, c) at x(c) as its arguments change, whenever that may be."""
+    assert trace.velocity_after is not None
+    reset, places = trace.velocity_after, dict[Expr, Expr]()
+    slope, drift = differentiate(reset, Expr("velocity", (), 0)), tangent.rate(trace, reset)
+    for j in range(trace.columns):
+        (u,), (z,) = tangent.leaves(trace, j)
+        places |= {u: tangent.contact_shift(trace, j), z: slope * z + tangent.partial(trace, reset, j)}
+    return places | _shifts([drift] * trace.columns)
 
 
 def _shifts(values: list[Expr]) -> dict[Expr, Expr]:

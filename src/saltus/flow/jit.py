@@ -64,3 +64,4 @@ with pointers():
     MODEL = types.Tuple((*_functions[:4], _f1, _functions[4]))
 STEP_BUFFERS, EVENT_BUFFERS = types.Tuple((_i2, _f2, _f3)), types.Tuple((_i2, _f2))
 ADVANCE = _i(_i1, _f1, _f1, ENV, MODEL, STEP_BUFFERS, EVENT_BUFFERS)
+SEGMENTS = _i(_i1, _f1, ENV, MODEL, _f2, _i2, _f2, _f2, _f3, _f2)

@@ -1,0 +1,350 @@
+"""A branch of periodic orbits along one parameter, followed through folds and grazings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.orbits.grazing import other_side
+from saltus.orbits.newton import solve
+from saltus.orbits.orbit import TOUCH, PeriodicOrbit
+from saltus.orbits.path import Point, start
+from saltus.orbits.problem import Problem
+from saltus.orbits.special import SpecialPoint, UserFunction, asymmetry, grazing, image, located, tests_between
+from saltus.orbits.symmetry import half, keeps_symmetry, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+ANGLE = 0.12  # rad between the tangents of neighbouring points that is aimed at,
+SHARPEST = 0.5  # and the most that is accepted
+STEP = 0.1  # the longest step: a thirtieth of the parameter's range, or a tenth of a radian and of a unit of speed
+FIRST_STEP = 1e-3
+LEAST_STEP = 1e-11
+MOST_POINTS = 20_000
+MOST_IMPACTS = 400  # of one period
+SMALLEST = 1e-7  # amplitude below which an orbit has shrunk to rest
+FAR = 0.3  # share of a step by which its end may differ from its tangent's
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A branch: its points in order, the special ones among them, and why it ends on both sides."""
+
+    path: str
+    points: tuple[Point, ...]
+    special: tuple[SpecialPoint, ...]
+    ends: tuple[str, str]
+    origin: str = "start"  # what it was begun from: a start, or the special point of another branch
+
+    @property
+    def orbits(self) -> list[PeriodicOrbit]:
+        """The orbits, in order."""
+        return [point.orbit for point in self.points]
+
+    @cached_property
+    def parameters(self) -> np.ndarray:
+        """The parameter along it, (n,)."""
+        return np.array([point.parameter for point in self.points])
+
+    @cached_property
+    def amplitudes(self) -> np.ndarray:
+        """max abs(theta) along it, (n,)."""
+        return np.array([point.orbit.amplitude for point in self.points])
+
+    @cached_property
+    def stable(self) -> np.ndarray:
+        """Whether each orbit is stable, (n,)."""
+        return np.array([point.orbit.stable for point in self.points])
+
+    @property
+    def closed(self) -> bool:
+        """Whether it is a loop."""
+        return self.ends == (CLOSED, CLOSED)
+
+    def at(self, value: float) -> list[PeriodicOrbit]:
+        """All orbits of the branch at a value of the parameter, solved there."""
+        found = []
+        for a, b in zip(self.points, self.points[1:], strict=False):
+            if a.curve.problem is not b.curve.problem or (a.parameter - value) * (b.parameter - value) > 0 or b.parameter == value:
+                continue
+            share = (value - a.parameter) / (b.parameter - a.parameter)
+            point = a.curve.solve_at(a.place + share * (b.place - a.place), a.tangent)
+            found += [] if point is None else [point.orbit]
+        if self.points and self.points[-1].parameter == value:
+            found.append(self.points[-1].orbit)
+        return found
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The branch as a dataset, see `dataset.py`."""
+        from saltus.orbits.dataset import branch_dataset
+
+        return branch_dataset(self)
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{p.kind} {p.parameter:.6g}" for p in self.special)
+        span = f"{self.path} from {self.parameters.min():.6g} to {self.parameters.max():.6g}" if len(self.points) else self.path
+        return f"Branch({span}, {len(self.points)} points, special: {kinds or 'none'}; ends: {self.ends[0]} | {self.ends[1]})"
+
+
+CLOSED = "closes"
+
+
+@dataclass
+class _Walk:
+    """One direction of a branch while it is being followed."""
+
+    bounds: tuple[float, float]
+    functions: dict[str, UserFunction]
+    longest: float
+    progress: Callable[[float], object] | None
+    points: list[Point] = field(default_factory=list)
+    special: list[SpecialPoint] = field(default_factory=list)
+    reason: str = ""
+
+    def follow(self, first: Point, born: bool = False) -> None:
+        """Follow the branch from a point until it ends; `born` at a special point, whose kind is not to be found again."""
+        self.points.append(first)
+        step, at_birth = min(FIRST_STEP, self.longest), born
+        while not self.reason:
+            point = self.points[-1]
+            ahead, step = self._step(point, step)
+            if ahead is None:
+                break
+            grown = self._take(point, ahead, at_birth)
+            at_birth = False
+            if grown is not None:  # through a grazing, or cut short: begin again with care
+                step = min(FIRST_STEP, 0.1 * step) if grown else step
+            if len(self.points) > MOST_POINTS:
+                self.reason = f"more than {MOST_POINTS} points"
+
+    def _step(self, point: Point, step: float) -> tuple[Point | None, float]:
+        """The next point, and the length of the step after it."""
+        while step > LEAST_STEP:
+            ahead = point.curve.solve(point.place + step * point.tangent, point.tangent)
+            if ahead is not None and point.curve.norm(ahead.place - point.place - step * point.tangent) < FAR * step:
+                cosine = float(ahead.tangent @ (point.curve.weights**2 * point.tangent))
+                angle = math.acos(min(1.0, max(-1.0, cosine)))
+                if angle < SHARPEST:
+                    factor = min(2.0, max(0.5, ANGLE / max(angle, 1e-3)))
+                    return ahead, min(self.longest, step * (factor if ahead.solution.iterations <= 5 else min(factor, 0.7)))
+            step *= 0.4
+        self.reason = "the steps shrink to nothing: the branch has a singularity that is none of the known kinds"
+        return None, step
+
+    def _take(self, point: Point, ahead: Point, born: bool) -> bool | None:
+        """Accept a step, up to the first of a grazing, a bound, the orbit's own image and the closing of the loop.
+
+        Returns None for an ordinary step, True after a grazing.
+        """
+        graze = located("GR", _grazing, point, ahead) if grazing(ahead) < 0.0 else None
+        if grazing(ahead) < 0.0 and graze is None:
+            self.reason = "a grazing that could not be located"
+            return None
+        if graze is not None:
+            ahead = graze.point
+        turned = self._own_image(point, ahead) if not born else None
+        if turned is not None:
+            ahead, graze = turned.point, None
+        beyond = self._beyond(point, ahead)
+        if beyond is not None:
+            ahead, graze, turned = beyond, None, None
+        if len(self.points) > 3 and self._closes(point, ahead):
+            self._note(point, self.points[0])
+            self.points.append(self.points[0])
+            self.reason = CLOSED
+            return None
+        if not born:
+            self._note(point, ahead)
+        self.points.append(ahead)
+        if turned is not None:
+            self.special.append(turned)
+            self.reason = f"meets its own image at a {turned.kind}"
+        elif beyond is not None:
+            self.reason = f"bound {ahead.parameter:g}"
+        elif ahead.orbit.amplitude < SMALLEST:
+            self.reason = "shrinks to rest"
+        elif graze is not None:
+            self.special.append(graze)
+            return self._switch(graze)
+        if self.progress is not None:
+            self.progress(ahead.parameter)
+        return None
+
+    def _switch(self, graze: SpecialPoint) -> bool:
+        """Go on with the signature on the other side of a grazing."""
+        following = other_side(graze.point)
+        if isinstance(following, str):
+            self.reason = following
+        elif following.curve.problem.signature.crossings > MOST_IMPACTS:
+            self.reason = f"more than {MOST_IMPACTS} impacts a period: the orbits accumulate towards rest"
+        else:
+            self.points.append(following)
+        return True
+
+    def _note(self, a: Point, b: Point) -> None:
+        """Locate the special points of a step, in order."""
+        found = [special for kind, test in tests_between(a, b, self.functions) if (special := located(kind, test, a, b)) is not None]
+        folds = [s.parameter for s in found if s.kind == "LP"]
+        found = [s for s in found if not (s.kind == "BPC" and not s.orbit.symmetric and any(abs(s.parameter - p) < 1e-8 for p in folds))]
+        self.special += sorted(found, key=lambda s: a.curve.norm(s.point.place - a.place))
+
+    def _own_image(self, a: Point, b: Point) -> SpecialPoint | None:
+        """Where an orbit becomes its own image, at the branch point that its family comes from."""
+        before, after = asymmetry(a), asymmetry(b)
+        if before is None or after is None or before @ after > 0.0 or np.abs(before).max() < 1e-6:
+            return None
+        kind = "BPC" if a.curve.problem.signature.periods % 2 else "PD"
+        return located(kind, image(before), a, b)
+
+    def _beyond(self, a: Point, b: Point) -> Point | None:
+        """The point on the bound of the parameter that the step goes over."""
+        low, high = self.bounds
+        if low <= b.parameter <= high:
+            return None
+        bound = low if b.parameter < low else high
+        share = (bound - a.parameter) / (b.parameter - a.parameter)
+        guess = a.place + share * (b.place - a.place)
+        guess[-1] = bound
+        return a.curve.solve_at(guess, b.place - a.place) or b
+
+    def _closes(self, a: Point, b: Point) -> bool:
+        """Whether the step goes by the first point of the branch."""
+        shift = separation(self.points[0].curve.problem, self.points[0].solution.unknowns, b)
+        length = b.curve.norm(b.place - a.place)
+        if shift is None:
+            return False
+        first = np.append(shift, self.points[0].parameter)
+        along, across = first - a.place, b.place - a.place
+        share = float(along @ (b.curve.weights**2 * across)) / length**2
+        return 0.0 < share <= 1.0 and b.curve.norm(along - share * across) < 0.2 * length
+
+
+def _grazing(point: Point) -> float:
+    return grazing(point)
+
+
+def separation(problem: Problem, unknowns: np.ndarray, other: Point) -> np.ndarray | None:
+    """The unknowns of an orbit, renumbered and shifted by whole forcing periods to lie nearest to those of another point.
+
+    None where the signatures differ.
+    """
+    target, signature = other.curve.problem.signature, problem.signature
+    n = len(signature.sides)
+    if (n, signature.periods, signature.symmetric) != (len(target.sides), target.periods, target.symmetric):
+        return None
+    if n == 0:
+        return unknowns if signature.side == target.side else None
+    pairs, best, least = unknowns.reshape(n, 2), None, math.inf
+    goal = other.solution.unknowns.reshape(n, 2)
+    for turn in range(n * (2 if signature.symmetric else 1)):
+        rolled = np.roll(pairs, -turn, axis=0)
+        flips = (turn + np.arange(n)) // n  # how often each has gone round the (half) period
+        sides = np.roll(signature.sides, -turn) * ((-1) ** flips if signature.symmetric else 1)
+        if tuple(sides) != tuple(target.sides):
+            continue
+        rolled = rolled + np.stack([flips * problem.closing, np.zeros(n)], axis=1)
+        rolled[:, 0] += 2.0 * math.pi * round((goal[0, 0] - rolled[0, 0]) / (2.0 * math.pi))
+        distance = float(np.abs(rolled - goal).max())
+        if distance < least:
+            best, least = rolled.ravel(), distance
+    return best
+
+
+def continue_orbit(
+    orbit: PeriodicOrbit,
+    path: str,
+    bounds: tuple[float, float],
+    *,
+    functions: dict[str, UserFunction] | None = None,
+    step: float = STEP,
+    progress: Callable[[float], object] | None = None,
+) -> Branch:
+    """The branch of an orbit along a parameter, both ways, until it closes, reaches a bound, shrinks to rest or cannot go on.
+
+    Args:
+        orbit: where to begin, as from `find_orbit`.
+        path: dotted path of the parameter, such as "load.frequency".
+        bounds: the least and the largest value of the parameter.
+        functions: further functions of an orbit whose zeros are special points, by name. Those of the model's margins are
+            found anyway.
+        step: the longest step, in the norm of `path.py`.
+        progress: called with the parameter of each new point.
+
+    Raises:
+        ParameterError: an unknown parameter, bounds that exclude the orbit.
+    """
+    low, high = check_bounds(bounds)
+    value = orbit.system.get(path) if path in orbit.system.parameters else None
+    if value is None:
+        orbit.system.get(path)  # refuses what leads nowhere
+        raise ParameterError(f"{path} is not a number, so an orbit cannot be continued along it")
+    if not low <= value <= high:
+        raise ParameterError(f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range")
+    begin, symmetric = along(orbit, path)
+    scale = (high - low) / 3.0
+    walks = []
+    for upwards in (False, True):
+        walk = _Walk((low, high), functions or {}, step, progress)
+        first = start(begin, scale, symmetric, upwards)
+        if (first.parameter <= low and not upwards) or (first.parameter >= high and upwards):
+            walk.points, walk.reason = [first], f"bound {first.parameter:g}"
+        else:
+            walk.follow(first)
+        walks.append(walk)
+        if walk.reason == CLOSED:
+            return Branch(path, tuple(walk.points), tuple(walk.special), (CLOSED, CLOSED))
+    back, ahead = walks
+    points = [point.turned() for point in reversed(back.points[1:])] + ahead.points
+    return Branch(path, tuple(points), (*reversed(back.special), *ahead.special), (back.reason, ahead.reason))
+
+
+def follow_from(
+    first: Point,
+    path: str,
+    bounds: tuple[float, float],
+    origin: str,
+    functions: dict[str, UserFunction] | None = None,
+    step: float = STEP,
+) -> Branch:
+    """The branch that begins at a special point of another one, in the direction of its tangent."""
+    walk = _Walk(bounds, functions or {}, step, None)
+    walk.follow(first, born=True)
+    return Branch(path, tuple(walk.points), tuple(walk.special), (origin, walk.reason), origin)
+
+
+def check_bounds(bounds: Any) -> tuple[float, float]:
+    """Two finite numbers, the smaller first."""
+    try:
+        low, high = (float(x) for x in bounds)
+    except (TypeError, ValueError):
+        raise ParameterError(f"bounds must be two numbers (lowest, highest), got {bounds!r}") from None
+    if not -math.inf < low < high < math.inf:
+        raise ParameterError(f"bounds must be two numbers, the smaller one first, got {bounds!r}")
+    return low, high
+
+
+def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
+    """An orbit as a solution of the problem along a parameter, halved where it and the system are and stay symmetric."""
+    system, signature = orbit.system, orbit.signature
+    symmetric = keeps_symmetry(system, path)
+    problem = Problem(system, signature, (path,))
+    found = solve(problem, orbit.solution.unknowns, problem.values)
+    if found is None:
+        raise ParameterError(f"the orbit does not solve its own equations to be continued along {path}; find it again")
+    if signature.symmetric and not symmetric:
+        problem, found = whole(problem, found)
+    elif symmetric and not signature.symmetric:
+        problem, found = half(problem, found) or (problem, found)
+    return PeriodicOrbit(problem, found), symmetric
+
+
+def inadmissible(branch: Branch) -> Iterator[Point]:
+    """Points that are no motions of the system: there must be none."""
+    return (point for point in branch.points if not point.orbit.admissible or point.orbit.slowest < -TOUCH)

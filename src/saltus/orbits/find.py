@@ -1,0 +1,197 @@
+"""Finding a periodic orbit from a state: let the motion settle, read its signature, solve the equations."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import MotionError, ParameterError
+from saltus.flow import EventKind, Motion, simulate
+from saltus.orbits.newton import solve
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.problem import Problem
+from saltus.orbits.signature import Signature
+from saltus.orbits.symmetry import half, is_symmetric, keeps_symmetry
+from saltus.systems import System
+from saltus.systems.checks import check_number
+
+LONGEST = 12  # forcing periods of an orbit that is looked for if none are named
+NEAR = 1e-6  # between states a period apart that have settled: Newton's method does the rest
+ROUNDS = 5  # of settling, each longer than the one before
+
+
+def find_orbit(
+    system: System,
+    *,
+    velocity: Any = 0.0,
+    period: int | None = None,
+    settle: int | None = None,
+    longest: int = LONGEST,
+    parameters: tuple[str, ...] = (),
+    **coordinates: float,
+) -> PeriodicOrbit:
+    """The periodic orbit that a motion settles on, or, with settle=0, the one that lies near it, stable or not.
+
+    Args:
+        system: what moves, under a load with a frequency.
+        velocity, coordinates: the state at phase 0, by the model's names: theta=0.3.
+        period: how many forcing periods the orbit takes; by default the fewest, up to `longest`, after which the settled motion returns.
+        settle: forcing periods to let pass first; by default as many as it takes, up to 4960.
+        longest: the longest period looked for.
+        parameters: dotted paths along which the orbit will be continued; `continue_orbit` sees to them itself.
+
+    Raises:
+        ParameterError: an argument without meaning.
+        MotionError: the motion comes to rest, does not settle, or Newton's method does not converge; with what to do.
+    """
+    if not isinstance(system, System):
+        raise ParameterError(f"find_orbit takes a System(model=..., load=..., impact=...), got {system!r}")
+    if period is not None:
+        check_whole("period", period, 1)
+    check_whole("longest", longest, 1)
+    if settle is not None:
+        check_whole("settle", settle, 0)
+    base = Problem(system, Signature((), 1), parameters)  # refuses what has no orbits
+    state = {**coordinates, "velocity": velocity}
+    if settle is not None:
+        state = _after(system, state, settle)
+        return _polish(base, state, _period_of(system, state, period, longest), None)
+    passed = 0
+    for attempt in range(ROUNDS):
+        state = _after(system, state, wait := 160 * 2**attempt)
+        passed += wait
+        q = _returning(system, state, period, longest)
+        if q is not None:
+            return _polish(base, state, q, passed)
+    raise MotionError(
+        f"the motion has not settled on a periodic orbit of up to {period or longest} forcing periods after {passed}: it is chaotic, "
+        "slow to settle or longer; try another start, longest=..., or settle=0 with period=... for an unstable orbit near the start"
+    )
+
+
+def check_whole(name: str, value: Any, least: int) -> None:
+    """Refuse what is not a whole number from `least` on."""
+    check_number(name, value, at_least=least)
+    if value != int(value):
+        raise ParameterError(f"{name} must be a whole number, got {value!r}")
+
+
+def _after(system: System, state: dict[str, Any], periods: int) -> dict[str, Any]:
+    """The state so many forcing periods later."""
+    motion = simulate(system, **state, periods=periods, dense=False)
+    _refuse_rest(motion, state)
+    return _state_of(system, motion)
+
+
+def _refuse_rest(motion: Motion, state: dict[str, Any]) -> None:
+    if motion.side == 0 or not motion.phase_known:
+        start = ", ".join(f"{name}={value!r}" for name, value in state.items())
+        raise MotionError(
+            f"the motion from {start} comes to rest at contact, the undeformed state, which is no orbit to follow; start farther "
+            "from it, for instance with a larger coordinate or velocity"
+        )
+    if motion.limit is not None:
+        raise MotionError(f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0: no orbit there")
+
+
+def _state_of(system: System, motion: Motion) -> dict[str, Any]:
+    return {**dict(zip(system.model.coordinates, np.atleast_1d(motion.position), strict=True)), "velocity": motion.velocity}
+
+
+def _vector(system: System, state: dict[str, Any]) -> np.ndarray:
+    return np.concatenate([[state[name] for name in system.model.coordinates], np.atleast_1d(state["velocity"])])
+
+
+def _strobes(system: System, state: dict[str, Any], count: int) -> list[np.ndarray]:
+    """The states after 0, 1, ... forcing periods."""
+    strobes = [_vector(system, state)]
+    for _ in range(count):
+        state = _after(system, state, 1)
+        strobes.append(_vector(system, state))
+    return strobes
+
+
+def _returning(system: System, state: dict[str, Any], period: int | None, longest: int) -> int | None:
+    """The fewest forcing periods after which a settled motion returns, or None."""
+    strobes = _strobes(system, state, period or longest)
+    for q in (period,) if period else range(1, longest + 1):
+        if np.abs(strobes[q] - strobes[0]).max() < NEAR:
+            return q
+    return None
+
+
+def _period_of(system: System, state: dict[str, Any], period: int | None, longest: int) -> int:
+    """The number of forcing periods after which a motion comes nearest to where it was, if it is not given."""
+    if period is not None:
+        return period
+    strobes = _strobes(system, state, longest)
+    return 1 + int(np.argmin([np.abs(strobes[q] - strobes[0]).max() for q in range(1, longest + 1)]))
+
+
+def _polish(base: Problem, state: dict[str, Any], periods: int, passed: int | None) -> PeriodicOrbit:
+    """Solve for the orbit near a motion over one of its periods."""
+    orbit = orbit_near(base, state, periods)
+    if orbit is not None and orbit.admissible:
+        return orbit
+    when = "from the start" if passed is None else f"after {passed} forcing periods"
+    raise MotionError(
+        f"Newton's method finds no orbit of period {periods} near the motion {when}; "
+        "try another start, another period=..., or let it settle first (settle=...)"
+    )
+
+
+def orbit_near(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
+    """The orbit with the signature of a motion over `periods` forcing periods from a state at phase 0, by Newton's method."""
+    system = base.system
+    motion = simulate(system, **state, periods=periods)
+    if motion.side == 0 or len(motion.events.of(EventKind.REST)) or not motion.phase_known:
+        return None
+    problem, unknowns = guess(base, motion, _vector(system, state), periods)
+    found = solve(problem, unknowns, problem.values, iterations=25)
+    if found is None:
+        return None
+    return PeriodicOrbit(*simplest(problem, found))
+
+
+def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tuple[Problem, np.ndarray]:
+    """The problem with a motion's signature, and its unknowns along the motion."""
+    crossings = motion.crossings
+    if not len(crossings):
+        return base.with_signature(Signature((), periods, False, motion.side)), state
+    rate = np.abs(crossings.velocity_before)
+    sides = tuple(int(s) for s in crossings.side)
+    unknowns = np.stack([crossings.time * base.frequency(base.values), rate], axis=1).ravel()
+    if len(base.system.model.sides) == 2 and len(sides) % 2:  # an impact near the section was counted once too often, or not at all
+        sides, unknowns = sides[:-1], unknowns[:-2]
+    return base.with_signature(Signature(sides, periods)), unknowns
+
+
+def simplest(problem: Problem, solution: Any) -> tuple[Problem, Any]:
+    """An orbit by its least period and, where it is its own mirror image, by half of it."""
+    shorter = divide(problem, solution)
+    problem, solution = shorter or (problem, solution)
+    symmetric = keeps_symmetry(problem.system, problem.paths[0]) if problem.paths else is_symmetric(problem.system)
+    return (half(problem, solution) if symmetric else None) or (problem, solution)
+
+
+def divide(problem: Problem, solution: Any) -> tuple[Problem, Any] | None:
+    """An orbit that repeats after a divisor of its period, as an orbit of that; None where it does not."""
+    signature, n = problem.signature, len(problem.signature.sides)
+    for q in range(1, signature.periods):
+        if signature.periods % q or (n * q) % signature.periods:
+            continue
+        part = n * q // signature.periods
+        if signature.sides and (part == 0 or signature.sides[:part] != signature.sides[part : 2 * part]):
+            continue
+        shorter = problem.with_signature(Signature(signature.sides[:part], q, False, signature.side))
+        found = solve(shorter, solution.unknowns[: shorter.size], solution.values)
+        if found is not None and np.abs(found.unknowns - solution.unknowns[: shorter.size]).max() < 1e-7:
+            return shorter, found
+    return None
+
+
+def is_near(a: float, b: float) -> bool:
+    """Whether two numbers agree as well as orbits are solved."""
+    return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9)

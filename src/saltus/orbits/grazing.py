@@ -1,0 +1,108 @@
+"""Through a grazing: the signature on its other side, and the direction in which its orbits are real."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.flow import segments as at
+from saltus.orbits.newton import Solution
+from saltus.orbits.path import Curve, Point, along_kernel
+from saltus.orbits.problem import Problem
+from saltus.orbits.signature import Signature
+
+PROBES = 10.0 ** -np.arange(2, 8.0)  # along the new branch, until one direction is seen to be admissible
+TOGETHER = 1e-4  # phase between the two impacts of a pair that vanishes, and their speeds
+
+
+def other_side(point: Point) -> Point | str:
+    """The point of the new branch at a grazing, with the direction in which it goes on; or why there is none.
+
+    A gap that touches zero between impacts gains a pair of impacts without speed there, or a single one at a wall that turns
+    the motion round; impacts that have lost their speed are left out.
+    """
+    changed = _inserted(point) if point.orbit.clearance < abs(point.orbit.slowest) else _removed(point)
+    if isinstance(changed, str):
+        return changed
+    problem, unknowns = changed
+    values = point.solution.values
+    equations = problem.evaluate(unknowns, values, look=True)
+    if equations is None:
+        return "the motion cannot be followed on the other side of the grazing"
+    curve = Curve(problem, point.curve.scale, point.curve.symmetric)
+    start = along_kernel(curve, Solution(unknowns, values, equations, 0))
+    return _admissible_direction(start) or "neither direction after the grazing leads to orbits of the system"
+
+
+def _admissible_direction(start: Point) -> Point | None:
+    for probe in PROBES:
+        for point in (start, start.turned()):
+            ahead = point.curve.solve(point.place + probe * point.tangent, point.tangent)
+            if ahead is not None and ahead.orbit.slowest > 0.0 and ahead.orbit.clearance > 0.0:
+                return point
+    return None
+
+
+def _turns_round(problem: Problem, side: int) -> bool:
+    """Whether an impact stays on its side, as at a wall."""
+    model, load, impact = problem.system.model, problem.system.load, problem.system.impact
+    return bool(model.reset(0.0, 1.0, side, load, impact)[0] == side)
+
+
+def _inserted(point: Point) -> tuple[Problem, np.ndarray] | str:
+    problem, signature = point.curve.problem, point.curve.problem.signature
+    looks = point.solution.equations.looks
+    segment = int(np.argmin(looks[:, at.HUMP]))
+    phase = looks[segment, at.HUMP_TIME] * problem.frequency(point.solution.values)
+    side = signature.along()[segment]
+    sides = (side,) if _turns_round(problem, side) else (side, -side)
+    touches = np.array([phase, 0.0] * len(sides))
+    if not signature.sides:
+        return problem.with_signature(Signature(sides, signature.periods)), touches
+    place = segment + 1
+    longer = Signature((*signature.sides[:place], *sides, *signature.sides[place:]), signature.periods, signature.symmetric)
+    unknowns = point.solution.unknowns
+    return problem.with_signature(longer), np.concatenate([unknowns[: 2 * place], touches, unknowns[2 * place :]])
+
+
+def _removed(point: Point) -> tuple[Problem, np.ndarray] | str:
+    problem, signature = point.curve.problem, point.curve.problem.signature
+    n = len(signature.sides)
+    phases, speeds = point.solution.unknowns[::2], point.solution.unknowns[1::2]
+    slow = int(np.argmin(speeds))
+    if _turns_round(problem, signature.sides[slow]):
+        gone = [slow]
+    else:
+        gone = _vanishing_pair(phases, speeds, slow, problem.closing)
+        if not gone:
+            return "an impact loses its speed while both sides push outward: the motion is not unique there"
+    kept = [i for i in range(n) if i not in gone]
+    if not kept:
+        return _without_impacts(point, slow)
+    shorter = Signature(tuple(signature.sides[i] for i in kept), signature.periods, signature.symmetric)
+    return problem.with_signature(shorter), point.solution.unknowns.reshape(n, 2)[kept].ravel()
+
+
+def _vanishing_pair(phases: np.ndarray, speeds: np.ndarray, slow: int, closing: float) -> list[int]:
+    """The impact without speed and the neighbour that vanishes with it."""
+    n = len(phases)
+    if n < 2:
+        return []
+    later = phases[(slow + 1) % n] + (closing if slow + 1 == n else 0.0) - phases[slow]
+    earlier = phases[slow] - phases[slow - 1] + (closing if slow == 0 else 0.0)
+    neighbour, distance = ((slow + 1) % n, later) if abs(later) < abs(earlier) else ((slow - 1) % n, earlier)
+    return [slow, neighbour] if abs(distance) < TOGETHER and speeds[neighbour] < TOGETHER else []
+
+
+def _without_impacts(point: Point, slow: int) -> tuple[Problem, np.ndarray] | str:
+    """The orbit that touches contact once a period, as one without impacts: its state at phase 0."""
+    problem, signature = point.curve.problem, point.curve.problem.signature
+    if signature.symmetric:
+        return "the orbit shrinks to rest"
+    touch = point.solution.unknowns[2 * slow]
+    lengths = np.diff(np.append(point.solution.unknowns[::2], point.solution.unknowns[0] + problem.closing))
+    side = signature.along()[int(np.argmax(lengths))]
+    whole = 2.0 * np.pi * np.ceil(touch / (2.0 * np.pi))
+    other = problem.with_signature(Signature((), signature.periods, False, side))
+    contact = float(problem.at(point.solution.values).model.contact)
+    state = other.carried(np.array([contact, 0.0]), touch, whole, point.solution.values)
+    return "the motion cannot be followed from the grazing" if state is None else (other, state)

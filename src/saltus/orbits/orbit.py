@@ -1,0 +1,213 @@
+"""A periodic orbit: what it is, how stable, how large, and its own check."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from saltus.flow import Motion, simulate
+from saltus.flow import segments as at
+from saltus.flow.validity import Validity
+from saltus.orbits.newton import Solution
+from saltus.orbits.problem import Problem
+from saltus.orbits.signature import Signature
+from saltus.systems import System
+
+TOUCH = 1e-9  # gap and speed below which a touch is a grazing, to within which grazings are located
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicOrbit:
+    """A periodic orbit of the exact system, solved to rounding.
+
+    Phases and speeds are those of one period of the orbit, q forcing periods, in the order of the impacts.
+    """
+
+    problem: Problem
+    solution: Solution
+
+    @cached_property
+    def system(self) -> System:
+        """The system that it is an orbit of."""
+        return self.problem.at(self.solution.values)
+
+    @property
+    def signature(self) -> Signature:
+        """Sides before the impacts, forcing periods, symmetry."""
+        return self.problem.signature
+
+    @property
+    def periods(self) -> int:
+        """q: after so many forcing periods it repeats."""
+        return self.signature.periods
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether it is its own mirror image after half a period."""
+        return self.signature.symmetric
+
+    @property
+    def frequency(self) -> float:
+        """Omega of the load."""
+        return self.problem.frequency(self.solution.values)
+
+    @property
+    def duration(self) -> float:
+        """q 2 pi / Omega."""
+        return 2.0 * math.pi * self.periods / self.frequency
+
+    @cached_property
+    def _phases(self) -> np.ndarray:
+        phases = self.solution.unknowns[::2] if self.signature.sides else np.empty(0)
+        return np.concatenate([phases, phases + self.problem.closing]) if self.symmetric else phases
+
+    @cached_property
+    def crossings(self) -> np.ndarray:
+        """The times of the impacts, from phase 0 of the load's period in which the first one lies, (n,)."""
+        times: np.ndarray = (self._phases - 2.0 * math.pi * self._shift) / self.frequency
+        return times
+
+    @property
+    def _shift(self) -> float:
+        return math.floor(self._phases[0] / (2.0 * math.pi)) if self._phases.size else 0.0
+
+    @property
+    def speeds(self) -> np.ndarray:
+        """The speeds at which the gap closes, just before the impacts, (n,)."""
+        speeds = self.solution.unknowns[1::2] if self.signature.sides else np.empty(0)
+        return np.tile(speeds, 2) if self.symmetric else speeds
+
+    @property
+    def sides(self) -> np.ndarray:
+        """The sides before the impacts, (n,)."""
+        sides = np.array(self.signature.sides, dtype=int)
+        return np.concatenate([sides, -sides]) if self.symmetric else sides
+
+    @property
+    def residual(self) -> float:
+        """The largest residual of its equations."""
+        return self.solution.residual
+
+    @cached_property
+    def _looks(self) -> np.ndarray:
+        return self.solution.equations.looks
+
+    @cached_property
+    def highest(self) -> float:
+        """The largest value of the first coordinate."""
+        top, bottom = self._looks[:, at.TOP].max(), self._looks[:, at.BOTTOM].min()
+        return float(max(top, -bottom) if self.symmetric else top)
+
+    @cached_property
+    def lowest(self) -> float:
+        """The least value of the first coordinate."""
+        return -self.highest if self.symmetric else float(self._looks[:, at.BOTTOM].min())
+
+    @property
+    def amplitude(self) -> float:
+        """max abs(theta)."""
+        return max(abs(self.highest), abs(self.lowest))
+
+    @cached_property
+    def clearance(self) -> float:
+        """How far the gap stays from 0 at its lowest minimum between impacts; inf where it has none; below 0: no orbit."""
+        return float(self._looks[:, at.HUMP].min())
+
+    @property
+    def slowest(self) -> float:
+        """The least speed of an impact; inf where there is none; below 0: no orbit."""
+        return float(self.speeds.min(initial=math.inf))
+
+    @property
+    def admissible(self) -> bool:
+        """Whether it is a motion of the system: every impact has a speed, and the gap is open between them."""
+        return self.clearance > -TOUCH and self.slowest > -TOUCH
+
+    @cached_property
+    def margins(self) -> dict[str, float]:
+        """The least value of each of the model's margins; below 0 the mechanism could not move so (errata 20, 21)."""
+        least = self._looks[:, at.LEAST_MARGIN :].min(axis=0)
+        return dict(zip(self.problem.margins, map(float, least), strict=False))
+
+    @cached_property
+    def multipliers(self) -> np.ndarray:
+        """The Floquet multipliers, by falling modulus, complex (2 degrees of freedom,)."""
+        chain = self.solution.equations.monodromy()
+        if not np.isfinite(chain).all():
+            return np.full(len(chain), complex(np.inf))
+        values = np.linalg.eigvals(chain).astype(complex)
+        values = values**2 if self.symmetric else values
+        return values[np.argsort(-np.abs(values))]
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers lie inside the unit circle."""
+        return bool((np.abs(self.multipliers) < 1.0).all())
+
+    def start(self) -> dict[str, Any]:
+        """The arguments of `simulate` that start the motion: just before its first impact, or at phase 0."""
+        if not self.signature.sides:
+            n = self.problem.own
+            state = self.solution.unknowns
+            velocity = float(state[n]) if n == 1 else tuple(map(float, state[n:]))
+            return {**dict(zip(self.system.model.coordinates, map(float, state[:n]), strict=True)), "velocity": velocity}
+        model, load, impact = self.system.model, self.system.load, self.system.impact
+        side, time = int(self.sides[0]), float(self.crossings[0])
+        inward = -np.sign(float(model.gap(model.contact + 1.0, side)) - float(model.gap(model.contact, side)))
+        _, after = model.reset(time, float(inward * self.speeds[0]), side, load, impact)
+        return {model.coordinates[0]: float(model.contact), "velocity": float(after), "time": time}
+
+    def motion(self, periods: float | None = None, tol: float = 1e-13) -> Motion:
+        """The exact motion from its state, over one period of the orbit if not said otherwise."""
+        return simulate(self.system, **self.start(), periods=self.periods if periods is None else periods, tol=tol)
+
+    @cached_property
+    def defect(self) -> float:
+        """The distance between its state and the one a period later, by direct simulation; inf if the impacts differ in number."""
+        motion = self.motion()
+        start = self.start()
+        begin = np.array([start[name] for name in self.system.model.coordinates])
+        if self.signature.sides:  # the motion ends at an impact: before or after it
+            ends = [np.abs(np.append(np.atleast_1d(motion.position) - begin, np.abs(motion.velocity) - np.abs(v))).max()
+                    for v in (start["velocity"], self.speeds[0])]  # fmt: skip
+            return min(ends) if abs(len(motion.crossings) - self.signature.crossings) <= 1 else math.inf
+        velocity = np.atleast_1d(motion.velocity) - np.atleast_1d(start["velocity"])
+        return float(np.abs(np.concatenate([np.atleast_1d(motion.position) - begin, velocity])).max())
+
+    @cached_property
+    def state(self) -> tuple[Any, Any]:
+        """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
+        if not self.signature.sides:
+            n = self.problem.own
+            return (float(self.solution.unknowns[0]), float(self.solution.unknowns[1])) if n == 1 else (
+                self.solution.unknowns[:n], self.solution.unknowns[n:])  # fmt: skip
+        motion = simulate(self.system, **self.start(), duration=self._to_phase_zero(), tol=1e-13, dense=False)
+        return float(np.atleast_1d(motion.position)[0]), float(np.atleast_1d(motion.velocity)[0])
+
+    def _to_phase_zero(self) -> float:
+        return 2.0 * math.pi / self.frequency - float(self.crossings[0])
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or name in ("problem", "solution"):
+            raise AttributeError(name)
+        if name == "velocity" or name in self.problem.system.model.coordinates:
+            position, velocity = self.state
+            values = np.atleast_1d(position)
+            return velocity if name == "velocity" else float(values[self.problem.system.model.coordinates.index(name)])
+        raise AttributeError(f"a PeriodicOrbit has no {name!r}")
+
+    @cached_property
+    def validity(self) -> Validity:
+        """Which limits of the mechanism it passes, and the share of time with a wrong reaction (errata 20, 21)."""
+        return self.motion().validity
+
+    def __repr__(self) -> str:
+        kind = "symmetric " if self.symmetric else ""
+        return (
+            f"PeriodicOrbit({kind}period {self.periods}, {self.signature.crossings} impacts, amplitude={self.amplitude:.9g}, "
+            f"{'stable' if self.stable else 'unstable'}, largest multiplier {self.multipliers[0]:.6g}, residual={self.residual:.1g})"
+        )

@@ -1,0 +1,97 @@
+"""A curve of solutions in (unknowns, parameter): its norm, its tangent, and points on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from saltus.orbits.newton import Solution, solve, solve_along
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The solutions of one problem along its first parameter, measured by a norm that depends neither on the number of impacts
+    nor on the parameter's unit."""
+
+    problem: Problem
+    scale: float  # of the parameter
+    symmetric: bool = False  # whether the system has the mirror symmetry all along it
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """Of the unknowns and the parameter in the norm."""
+        n = self.problem.size
+        return np.append(np.full(n, (2.0 / n) ** 0.5), 1.0 / self.scale)
+
+    def norm(self, step: np.ndarray) -> float:
+        """The length of a step."""
+        return float(np.linalg.norm(self.weights * step))
+
+    def solve(self, guess: np.ndarray, normal: np.ndarray) -> Point | None:
+        """The point of the curve near a guess, in the hyperplane through it normal to a direction."""
+        found = solve_along(self.problem, guess[:-1], guess[-1:], normal * self.weights**2, guess, iterations=7)
+        return None if found is None else self.point(found, normal)
+
+    def solve_at(self, guess: np.ndarray, normal: np.ndarray) -> Point | None:
+        """The point of the curve near a guess at the parameter of the guess."""
+        found = solve(self.problem, guess[:-1], guess[-1:])
+        return None if found is None else self.point(found, normal)
+
+    def point(self, solution: Solution, along: np.ndarray) -> Point | None:
+        """A solution as a point, with the tangent that goes `along` a direction; None where the tangent is not unique."""
+        equations = solution.equations
+        matrix = np.vstack([np.column_stack([equations.jacobian(), equations.parameters[:, 0]]), along * self.weights**2])
+        try:
+            tangent = np.linalg.solve(matrix, np.append(np.zeros(self.problem.size), 1.0))
+        except np.linalg.LinAlgError:
+            return None
+        length = self.norm(tangent)
+        return Point(self, solution, tangent / length) if 0.0 < length < np.inf else None
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of a curve, and the direction in which the curve is followed there."""
+
+    curve: Curve
+    solution: Solution
+    tangent: np.ndarray  # of length 1
+
+    @cached_property
+    def place(self) -> np.ndarray:
+        """The unknowns and the parameter."""
+        return np.append(self.solution.unknowns, self.solution.values[0])
+
+    @property
+    def parameter(self) -> float:
+        """The parameter."""
+        return float(self.solution.values[0])
+
+    @cached_property
+    def orbit(self) -> PeriodicOrbit:
+        """The orbit."""
+        return PeriodicOrbit(self.curve.problem, self.solution)
+
+    def turned(self) -> Point:
+        """The same point, followed the other way."""
+        return Point(self.curve, self.solution, -self.tangent)
+
+
+def start(orbit: PeriodicOrbit, scale: float, symmetric: bool, upwards: bool) -> Point:
+    """A known orbit as the first point of its curve, to be followed towards larger or smaller parameters."""
+    curve = Curve(orbit.problem, scale, symmetric)
+    direction = np.zeros(orbit.problem.size + 1)
+    direction[-1] = scale if upwards else -scale
+    return curve.point(orbit.solution, direction) or along_kernel(curve, orbit.solution)
+
+
+def along_kernel(curve: Curve, solution: Solution) -> Point:
+    """A solution as a point, its tangent from the kernel of the derivatives: where the parameter stands still, at a fold."""
+    equations = solution.equations
+    matrix = np.column_stack([equations.jacobian(), equations.parameters[:, 0]]) / curve.weights
+    tangent = np.linalg.svd(matrix)[2][-1] / curve.weights
+    return Point(curve, solution, tangent / curve.norm(tangent))

@@ -1,0 +1,232 @@
+"""The boundary-value problem of a periodic orbit with a given signature, and its derivatives (see docs/method.md).
+
+Unknowns of an orbit with impacts are the phase phi_i = Omega t_i of each and the speed v_i at which its gap closes. Segment i is
+the smooth motion on its side from impact i, with the velocity that the reset gives, to impact i+1, whatever the sign of the
+gap w between them; the last one ends with the first impact, a period later. For each
+
+    w(t_{i+1}) / (t_{i+1} - t_i) = 0,        -w'(t_{i+1}) - v_{i+1} = 0,
+
+regular at v_i = 0 as well, where the signature changes. An orbit without impacts has the state at phase 0 as its unknowns and
+the state a period later as its equation. A symmetric orbit is closed after half a period by its mirror image.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.flow import layout as k
+from saltus.flow import segments as at
+from saltus.flow.compile import load_segments
+from saltus.flow.simulation import program, taylor_order
+from saltus.flow.tangent import FREQUENCY
+from saltus.flow.trace import record_table
+from saltus.orbits.signature import Signature
+from saltus.systems import System
+from saltus.systems.parameters import numbers
+
+ORBIT_TOLERANCE = 1e-14  # of the segments' steps: the orbits are then exact to rounding
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The problem at one point: the residual and its derivatives, in blocks of the segments, and what lies between the ends.
+
+    Row block i of the Jacobian is `here[i]` in the unknowns of segment i and `there[i]` in those of the next one.
+    """
+
+    residual: np.ndarray  # (n d,)
+    here: np.ndarray  # (n, d, d)
+    there: np.ndarray  # (n, d, d)
+    parameters: np.ndarray  # (n d, parameters)
+    ends: np.ndarray
+    looks: np.ndarray  # (n, 4 + margins), see `segments.py`; empty if not asked for
+
+    def jacobian(self, closing: float = 1.0) -> np.ndarray:
+        """The derivatives to the unknowns; with `closing` -1 of the problem whose perturbations change their sign each time."""
+        n, d, _ = self.here.shape
+        matrix = np.zeros((n, d, n, d))
+        rows = np.arange(n)
+        matrix[rows, :, rows, :] = self.here
+        matrix[rows[:-1], :, rows[:-1] + 1, :] += self.there[:-1]
+        matrix[n - 1, :, 0, :] += closing * self.there[-1]
+        return matrix.reshape(n * d, n * d)
+
+    def monodromy(self) -> np.ndarray:
+        """The chain of the segments' maps, from the first unknowns to those a (half) period later; inf at a grazing."""
+        chain = np.eye(self.here.shape[1])
+        with np.errstate(all="ignore"):
+            for here, there in zip(self.here, self.there, strict=True):
+                try:
+                    chain = -np.linalg.solve(there, here @ chain)
+                except np.linalg.LinAlgError:
+                    return np.full_like(chain, np.inf)
+        return chain
+
+
+class Problem:
+    """The equations of one signature of a system, as functions of the unknowns and of the parameters at `paths`."""
+
+    def __init__(self, system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> None:
+        if system.load.frequency is None:
+            raise ParameterError("a load without a frequency has no forcing period, so no periodic orbits to find; give one")
+        self.system, self.signature, self.paths, self.tol = system, signature, paths, tol
+        self._run = _ready(system, paths)
+        if self._run.trace.records:
+            raise ParameterError("a load with a Record is not periodic, so it has no periodic orbits; use Harmonic signals")
+        names = [path for path, _ in numbers(system)]
+        self._values = np.array([value for _, value in numbers(system)])
+        self._places = [names.index(path) for path in paths]
+        self._frequency = names.index(FREQUENCY)
+        self._where = np.zeros(k.WHERE, dtype=np.int64)
+        self._where[k.ORDER] = taylor_order(tol)
+        self._where[[k.DOF, k.STOPS, k.ROWS, k.SIDES, k.STEEP, k.OWN, k.COLUMNS]] = self._run.structure.sizes
+        self._settings, self._records = np.array([0.0, 0.0, tol]), record_table(system, [])
+
+    @property
+    def values(self) -> np.ndarray:
+        """The parameters of the system itself."""
+        return self._values[self._places]
+
+    @property
+    def own(self) -> int:
+        """Degrees of freedom."""
+        return int(self._where[k.OWN])
+
+    @property
+    def size(self) -> int:
+        """How many unknowns there are."""
+        return 2 * (len(self.signature.sides) or self.own)
+
+    @property
+    def margins(self) -> tuple[str, ...]:
+        """The model's margins, in the order of `looks`."""
+        return self._run.limits
+
+    @cached_property
+    def closing(self) -> float:
+        """The phase that the equations cover."""
+        return 2.0 * math.pi * self.signature.span
+
+    def frequency(self, values: np.ndarray) -> float:
+        """The forcing frequency at the given parameters."""
+        return float(values[self.paths.index(FREQUENCY)] if FREQUENCY in self.paths else self._values[self._frequency])
+
+    def at(self, values: np.ndarray) -> System:
+        """The system with the given parameters.
+
+        Raises:
+            ParameterError: where it refuses them.
+        """
+        return self.system.with_({path: float(value) for path, value in zip(self.paths, values, strict=True)})
+
+    def with_signature(self, signature: Signature) -> Problem:
+        """The problem of another signature."""
+        return Problem(self.system, signature, self.paths, self.tol)
+
+    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, look: bool = False) -> Equations | None:
+        """The equations at a point, or None where the motion cannot be followed."""
+        parameters = self._values.copy()
+        parameters[self._places] = values
+        frequency = parameters[self._frequency]
+        if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(parameters).all()):
+            return None
+        env, model = self._run.structure.prepare(parameters, self._records)
+        n, own = len(self.signature.sides) or 1, self.own
+        ends, columns = np.zeros((n, at.KINDS + 6 * own)), np.zeros((n, 4 * own, self._where[k.COLUMNS]))
+        looks = np.zeros((n if look else 0, at.LEAST_MARGIN + max(1, self._where[k.STOPS])))
+        spans, sides, states = self._segments(unknowns, frequency)
+        done = load_segments()(self._where, self._settings, env, model, spans, sides, states, ends, columns, looks)
+        if done < n:
+            return None
+        if not self.signature.sides:
+            return self._shooting(unknowns, frequency, ends, columns, looks)
+        return self._crossing(unknowns, frequency, np.sign(model[4][1:]), spans, ends, columns, looks)
+
+    def carried(self, state: np.ndarray, begin: float, end: float, values: np.ndarray) -> np.ndarray | None:
+        """The state at phase `end` of the smooth motion without impacts from a state at phase `begin`."""
+        parameters = self._values.copy()
+        parameters[self._places] = values
+        env, model = self._run.structure.prepare(parameters, self._records)
+        frequency, own = parameters[self._frequency], self.own
+        ends, columns = np.zeros((1, at.KINDS + 6 * own)), np.zeros((1, 4 * own, self._where[k.COLUMNS]))
+        spans, sides = np.array([[begin / frequency, end / frequency, 0.0]]), np.array([[0, self.signature.side]])
+        looks = np.zeros((0, at.LEAST_MARGIN + 1))
+        done = load_segments()(
+            self._where, self._settings, env, model, spans, sides, state.reshape(1, -1), ends, columns, looks
+        )
+        return ends[0, at.KINDS : at.KINDS + 2 * own] if done else None
+
+    def _segments(self, unknowns: np.ndarray, frequency: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What `fly_segments` is given: spans, sides, states at the start."""
+        sides, along = self.signature.sides, self.signature.along()
+        if not sides:
+            spans = np.array([[0.0, self.closing / frequency, 0.0]])
+            return spans, np.array([[0, along[0]]]), unknowns.reshape(1, -1).copy()
+        phases, speeds = unknowns[::2], unknowns[1::2]
+        ends = np.append(phases[1:], phases[0] + self.closing)
+        spans = np.stack([phases / frequency, ends / frequency, speeds], axis=1)
+        return spans, np.stack([sides, along], axis=1).astype(np.int64), np.zeros((len(sides), 2))
+
+    def _shooting(
+        self, unknowns: np.ndarray, frequency: float, ends: np.ndarray, columns: np.ndarray, looks: np.ndarray
+    ) -> Equations:
+        own, sign = self.own, -1.0 if self.signature.symmetric else 1.0
+        state = ends[0, at.KINDS : at.KINDS + 2 * own]
+        rates = ends[0, at.KINDS + own : at.KINDS + 3 * own]
+        parameters = sign * columns[0, : 2 * own, 2 * own :]
+        if FREQUENCY in self.paths:
+            parameters[:, self.paths.index(FREQUENCY)] -= sign * rates * self.closing / frequency**2
+        here, there = sign * columns[:, : 2 * own, : 2 * own], -np.eye(2 * own)[None]
+        return Equations(sign * state - unknowns, here, there, parameters, ends, looks)
+
+    def _crossing(
+        self,
+        unknowns: np.ndarray,
+        frequency: float,
+        rates: np.ndarray,
+        spans: np.ndarray,
+        ends: np.ndarray,
+        columns: np.ndarray,
+        looks: np.ndarray,
+    ) -> Equations:
+        n = len(spans)
+        sign = np.where(np.array(self.signature.along()) > 0, rates[0], rates[1])
+        begin, end = spans[:, at.SEGMENT_START], spans[:, at.SEGMENT_END]
+        quotient, velocity, acceleration = ends[:, at.QUOTIENT], ends[:, at.KINDS + 1], ends[:, at.KINDS + 2]
+        residual = np.stack([sign * quotient, -sign * velocity - np.roll(unknowns[1::2], -1)], axis=1)
+        u, z, u_start, z_start = columns.transpose(1, 0, 2)  # each (n, 2 + parameters)
+        duration = end - begin
+        short = np.abs(duration) < at.SHORT
+        d = np.where(short, 1.0, duration)[:, None]
+        first = (u - u_start) / d
+        first[:, 1] = (u[:, 1] + quotient) / d[:, 0]
+        at_end = (velocity - quotient) / d[:, 0]
+        pull = 0.5 * ends[:, at.KINDS + 5]
+        first[short] = z_start[short]
+        first[short, 1] = (ends[:, at.RESET_DRIFT] - pull)[short]
+        at_end[short] = pull[short]
+        by_start = np.stack([sign * first[:, 1], -sign * z[:, 1]], axis=1) / frequency
+        by_end = np.stack([sign * at_end, -sign * acceleration], axis=1) / frequency
+        by_speed = np.stack([sign * first[:, 0], -sign * z[:, 0]], axis=1)
+        here = np.stack([by_start, by_speed], axis=2)
+        there = np.stack([by_end, np.tile([0.0, -1.0], (n, 1))], axis=2)
+        parameters = np.stack([sign[:, None] * first[:, 2:], -sign[:, None] * z[:, 2:]], axis=1)
+        if FREQUENCY in self.paths:
+            parameters[:, :, self.paths.index(FREQUENCY)] -= by_start * begin[:, None] + by_end * end[:, None]
+        return Equations(residual.ravel(), here, there, parameters.reshape(2 * n, -1), ends, looks)
+
+
+def _ready(system: System, paths: tuple[str, ...]) -> Any:
+    """The compiled structure with the tangent to the parameters and all of the model's margins."""
+    model = system.model
+    side = (*model.sides, 1)[0]
+    still: Any = 0.0 if len(model.coordinates) == 1 else (0.0,) * len(model.coordinates)
+    margins = tuple(model.margins(0.0, still, still, still, side, system.load))
+    return program(system, margins, paths)
+

@@ -1,0 +1,36 @@
+"""The signature of a periodic orbit: which impacts it has, in which order, over how many forcing periods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """What distinguishes families of periodic orbits.
+
+    `sides` is the side before each impact. A symmetric orbit is its own mirror image half a period later; then only the
+    impacts of the first half are listed, and the equations are those of the half.
+    """
+
+    sides: tuple[int, ...]  # empty for an orbit without impacts
+    periods: int  # forcing periods, q
+    symmetric: bool = False
+    side: int = 1  # of an orbit without impacts
+
+    @property
+    def crossings(self) -> int:
+        """Impacts in one period of the orbit."""
+        return len(self.sides) * (2 if self.symmetric else 1)
+
+    @property
+    def span(self) -> float:
+        """Forcing periods that the equations cover: q, or q / 2."""
+        return self.periods / 2 if self.symmetric else float(self.periods)
+
+    def along(self) -> tuple[int, ...]:
+        """The side of each segment: segment i follows impact i and ends with the next one."""
+        if not self.sides:
+            return (self.side,)
+        closing = -self.sides[0] if self.symmetric else self.sides[0]
+        return (*self.sides[1:], closing)

@@ -1,0 +1,90 @@
+"""The mirror symmetry of a forced system, and orbits that are their own mirror images half a period later."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.orbits.newton import Solution, solve
+from saltus.orbits.problem import Problem
+from saltus.orbits.signature import Signature
+from saltus.systems import Load, System
+
+SAMPLES = np.linspace(0.05, 0.95, 19)  # of a period, at which loads are compared; a harmonic of order 9 needs 19
+EQUAL = 1e-12
+SAME = 1e-7  # between the halves of an orbit: both are solved to 1e-12, but near a grazing Newton leaves more
+
+
+def is_symmetric(system: System) -> bool:
+    """Whether -theta(t + T/2) moves as theta(t) does: a mirrored load that is the load half a period later (errata 18)."""
+    mirrored = system.mirrored()
+    period = system.load.period
+    if mirrored is None or period is None:
+        return False
+    times = SAMPLES * period
+    return all(_equal(system.load, mirrored.load, name, times, 0.5 * period) for name in system.load.channels)
+
+
+def _equal(load: Load, mirrored: Load, name: str, times: np.ndarray, shift: float) -> bool:
+    """Whether a channel of the mirrored load at `times` is that of the load `shift` later; grounds by their accelerations."""
+    one, other = getattr(mirrored, name), getattr(load, name)
+    if name.startswith("ground_"):
+        left, right = one.acceleration(times), other.acceleration(times + shift)
+    else:
+        left, right = one(times), other(times + shift)
+    return bool(np.allclose(left, right, rtol=EQUAL, atol=EQUAL))
+
+
+def keeps_symmetry(system: System, path: str) -> bool:
+    """Whether a system is symmetric and stays so as the parameter at `path` changes."""
+    if not is_symmetric(system):
+        return False
+    value = float(system.get(path))
+    return any(is_symmetric(system.with_({path: value * (1 + s) + s})) for s in (1e-3, -1e-3))
+
+
+def half(problem: Problem, solution: Solution) -> tuple[Problem, Solution] | None:
+    """An orbit that is its own mirror image, as a solution of the half problem; None where it is not."""
+    signature = problem.signature
+    if signature.symmetric or signature.periods % 2 == 0:
+        return None
+    if not signature.sides:
+        return _half_shooting(problem, solution)
+    n = len(signature.sides) // 2
+    if n % 2 == 0 or len(signature.sides) % 2:
+        return None
+    phases, speeds = solution.unknowns[::2], solution.unknowns[1::2]
+    halfway = np.pi * signature.periods
+    if np.abs(phases[n:] - phases[:n] - halfway).max() > SAME or np.abs(speeds[n:] - speeds[:n]).max() > SAME:
+        return None
+    return _solved(problem.with_signature(Signature(signature.sides[:n], signature.periods, True)), solution.unknowns[: 2 * n], solution)
+
+
+def _half_shooting(problem: Problem, solution: Solution) -> tuple[Problem, Solution] | None:
+    if problem.system.model.sides:
+        return None
+    other = problem.with_signature(Signature((), problem.signature.periods, True, problem.signature.side))
+    found = _solved(other, solution.unknowns, solution)
+    return found if found and np.abs(found[1].unknowns - solution.unknowns).max() < SAME else None
+
+
+def _solved(problem: Problem, unknowns: np.ndarray, solution: Solution) -> tuple[Problem, Solution] | None:
+    found = solve(problem, unknowns, solution.values)
+    return None if found is None else (problem, found)
+
+
+def whole(problem: Problem, solution: Solution) -> tuple[Problem, Solution]:
+    """A symmetric orbit as a solution of the problem of its whole period."""
+    signature = problem.signature
+    if not signature.symmetric:
+        return problem, solution
+    other = problem.with_signature(
+        Signature((*signature.sides, *(-s for s in signature.sides)), signature.periods, False, signature.side)
+    )
+    unknowns = solution.unknowns
+    if signature.sides:
+        later = unknowns.copy()
+        later[::2] += problem.closing
+        unknowns = np.concatenate([unknowns, later])
+    found = solve(other, unknowns, solution.values)
+    assert found is not None, "a symmetric orbit solves the equations of its whole period"
+    return other, found
