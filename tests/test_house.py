@@ -17,10 +17,12 @@ MAY_IMPORT = {
     "systems": set(),
     "theory": {"systems"},
     "flow": {"systems"},
+    "orbits": {"systems", "flow"},
+    "studies": {"systems", "flow", "orbits"},
     "plots": set(),
     "config": {"systems", "flow"},
-    "paper": {"systems", "theory", "flow", "plots", "files"},
-    "cli": {"systems", "theory", "flow", "plots", "config", "paper", "files"},
+    "paper": {"systems", "theory", "flow", "orbits", "studies", "plots", "files"},
+    "cli": {"systems", "theory", "flow", "orbits", "studies", "plots", "config", "paper", "files"},
 }
 HEAVY = ("scipy", "numba", "xarray", "matplotlib", "pydantic", "h5netcdf", "saltus.flow", "saltus.paper")
 

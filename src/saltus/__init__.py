@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from saltus.config import load_study
     from saltus.errors import MotionError, ParameterError, SaltusError, TraceError
     from saltus.flow import EventKind, Motion, Sensitivities, Stop, capture_speed, sensitivities, simulate, simulate_many
+    from saltus.orbits import Branch, PeriodicOrbit, SpecialPoint, continue_orbit, find_orbit
     from saltus.systems import (
         EnergyRestitution,
         Harmonic,
@@ -44,6 +45,7 @@ _HOMES = {
         "simulate",
         "simulate_many",
     ),
+    "saltus.orbits": ("Branch", "PeriodicOrbit", "SpecialPoint", "continue_orbit", "find_orbit"),
     "saltus.systems": (
         "EnergyRestitution",
         "Harmonic",
@@ -63,9 +65,10 @@ _HOMES = {
     ),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
-_ROOMS = ("flow", "systems", "theory")
+_ROOMS = ("flow", "orbits", "systems", "theory")
 
 __all__ = [
+    "Branch",
     "EnergyRestitution",
     "EventKind",
     "Harmonic",
@@ -76,11 +79,13 @@ __all__ = [
     "Motion",
     "MotionError",
     "ParameterError",
+    "PeriodicOrbit",
     "PhysicalCell",
     "Record",
     "RockingBlock",
     "SaltusError",
     "Sensitivities",
+    "SpecialPoint",
     "Stop",
     "System",
     "TraceError",
@@ -89,8 +94,11 @@ __all__ = [
     "VelocityReduction",
     "WallOscillator",
     "capture_speed",
+    "continue_orbit",
+    "find_orbit",
     "flow",
     "load_study",
+    "orbits",
     "register",
     "sensitivities",
     "simulate",

@@ -72,7 +72,11 @@ class Branch:
         """All orbits of the branch at a value of the parameter, solved there."""
         found = []
         for a, b in zip(self.points, self.points[1:], strict=False):
-            if a.curve.problem is not b.curve.problem or (a.parameter - value) * (b.parameter - value) > 0 or b.parameter == value:
+            if (
+                a.curve.problem is not b.curve.problem
+                or (a.parameter - value) * (b.parameter - value) > 0
+                or b.parameter == value
+            ):
                 continue
             share = (value - a.parameter) / (b.parameter - a.parameter)
             point = a.curve.solve_at(a.place + share * (b.place - a.place), a.tangent)
@@ -190,9 +194,15 @@ class _Walk:
 
     def _note(self, a: Point, b: Point) -> None:
         """Locate the special points of a step, in order."""
-        found = [special for kind, test in tests_between(a, b, self.functions) if (special := located(kind, test, a, b)) is not None]
+        found = [
+            special for kind, test in tests_between(a, b, self.functions) if (special := located(kind, test, a, b)) is not None
+        ]
         folds = [s.parameter for s in found if s.kind == "LP"]
-        found = [s for s in found if not (s.kind == "BPC" and not s.orbit.symmetric and any(abs(s.parameter - p) < 1e-8 for p in folds))]
+        found = [
+            s
+            for s in found
+            if not (s.kind == "BPC" and not s.orbit.symmetric and any(abs(s.parameter - p) < 1e-8 for p in folds))
+        ]
         self.special += sorted(found, key=lambda s: a.curve.norm(s.point.place - a.place))
 
     def _own_image(self, a: Point, b: Point) -> SpecialPoint | None:

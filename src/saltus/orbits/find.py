@@ -163,7 +163,9 @@ def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tup
     rate = np.abs(crossings.velocity_before)
     sides = tuple(int(s) for s in crossings.side)
     unknowns = np.stack([crossings.time * base.frequency(base.values), rate], axis=1).ravel()
-    if len(base.system.model.sides) == 2 and len(sides) % 2:  # an impact near the section was counted once too often, or not at all
+    if (
+        len(base.system.model.sides) == 2 and len(sides) % 2
+    ):  # an impact near the section was counted once too often, or not at all
         sides, unknowns = sides[:-1], unknowns[:-2]
     return base.with_signature(Signature(sides, periods)), unknowns
 

@@ -157,9 +157,7 @@ class Problem:
         ends, columns = np.zeros((1, at.KINDS + 6 * own)), np.zeros((1, 4 * own, self._where[k.COLUMNS]))
         spans, sides = np.array([[begin / frequency, end / frequency, 0.0]]), np.array([[0, self.signature.side]])
         looks = np.zeros((0, at.LEAST_MARGIN + 1))
-        done = load_segments()(
-            self._where, self._settings, env, model, spans, sides, state.reshape(1, -1), ends, columns, looks
-        )
+        done = load_segments()(self._where, self._settings, env, model, spans, sides, state.reshape(1, -1), ends, columns, looks)
         return ends[0, at.KINDS : at.KINDS + 2 * own] if done else None
 
     def _segments(self, unknowns: np.ndarray, frequency: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -229,4 +227,3 @@ def _ready(system: System, paths: tuple[str, ...]) -> Any:
     still: Any = 0.0 if len(model.coordinates) == 1 else (0.0,) * len(model.coordinates)
     margins = tuple(model.margins(0.0, still, still, still, side, system.load))
     return program(system, margins, paths)
-

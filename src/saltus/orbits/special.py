@@ -162,7 +162,12 @@ def located(kind: str, test: Test, a: Point, b: Point) -> SpecialPoint | None:
 
 def tests_between(a: Point, b: Point, functions: dict[str, UserFunction]) -> Iterator[tuple[str, Test]]:
     """The test functions that change their sign from a to b."""
-    candidates: list[tuple[str, Any]] = [("LP", fold), ("BPC" if a.orbit.symmetric else "PD", flip), ("BPC", crossing), ("NS", torus)]
+    candidates: list[tuple[str, Any]] = [
+        ("LP", fold),
+        ("BPC" if a.orbit.symmetric else "PD", flip),
+        ("BPC", crossing),
+        ("NS", torus),
+    ]
     for name in a.curve.problem.margins:
         candidates.append((name, lambda point, name=name: point.orbit.margins[name]))
     for name, function in functions.items():

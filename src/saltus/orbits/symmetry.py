@@ -56,7 +56,9 @@ def half(problem: Problem, solution: Solution) -> tuple[Problem, Solution] | Non
     halfway = np.pi * signature.periods
     if np.abs(phases[n:] - phases[:n] - halfway).max() > SAME or np.abs(speeds[n:] - speeds[:n]).max() > SAME:
         return None
-    return _solved(problem.with_signature(Signature(signature.sides[:n], signature.periods, True)), solution.unknowns[: 2 * n], solution)
+    return _solved(
+        problem.with_signature(Signature(signature.sides[:n], signature.periods, True)), solution.unknowns[: 2 * n], solution
+    )
 
 
 def _half_shooting(problem: Problem, solution: Solution) -> tuple[Problem, Solution] | None:

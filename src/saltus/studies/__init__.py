@@ -1,0 +1,1 @@
+"""What one asks: response spectra, bifurcation diagrams."""
