@@ -32,8 +32,8 @@ import math
 
 import numpy as np
 
-from saltus.flow.jit import ADVANCE, CONSTANTS, CONTACT_DAMPING, CONTACT_SERIES, GEOMETRY, RESET, SEGMENTS, SERIES, TANGENT
-from saltus.flow.jit import cached_jit, jit
+from saltus.flow.jit import ADVANCE, CONSTANTS, CONTACT_DAMPING, CONTACT_SERIES, GEOMETRY, IMPACT_EQUATIONS, RESET, SEGMENTS
+from saltus.flow.jit import SERIES, TANGENT, cached_jit, jit
 
 '''
 
@@ -105,12 +105,12 @@ def kernel_module() -> ModuleType:
 
 
 @cache
-def load_segments() -> Callable[..., int]:
-    """The kernel that follows the smooth segments of a periodic orbit, `fly_segments` of `segments.py`."""
+def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
+    """What periodic orbits are solved with: `fly_segments` and `impact_equations` of `segments.py`."""
     text = "".join(body(module) for module in (layout, roots, steps, contact, chatter, segments))
-    (result,) = load_module("segments", text).fly_segments.overloads.values()
-    entry: Callable[..., int] = result.entry_point
-    return entry
+    module = load_module("segments", text)
+    (fly,), (equations,) = module.fly_segments.overloads.values(), module.impact_equations.overloads.values()
+    return fly.entry_point, equations.entry_point
 
 
 def load_structure(trace: Trace) -> Structure:

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from saltus.flow.contact import rate_of
-from saltus.flow.jit import SEGMENTS, jit
+from saltus.flow.jit import IMPACT_EQUATIONS, SEGMENTS, jit
 from saltus.flow.jit import not_here as cached_jit
 from saltus.flow.layout import *
 from saltus.flow.roots import DEPTH, NARROW, horner, newton, scale_gap, split, to_bernstein, variations
@@ -213,3 +213,30 @@ def fly_segments(where, settings, env, model, spans, sides, states, ends, column
             return s
     return spans.shape[0]
 
+
+@cached_jit(IMPACT_EQUATIONS)
+def impact_equations(spans, signs, speeds, frequency, place, ends, columns, residual, here, there, parameters):
+    """The equations of impacts, w / duration = 0 and -w' - v_next = 0 for each segment, and their derivatives.
+
+    `here` is to the phase and the speed of the impact before the segment, `there` of the one after it; `place` is the
+    parameter's that is the frequency, or -1. `signs` are those of the gap's rate on the segments, `speeds` of the next impacts.
+    """
+    for i in range(spans.shape[0]):
+        begin, end, sign = spans[i, SEGMENT_START], spans[i, SEGMENT_END], signs[i]
+        quotient, velocity, acceleration = ends[i, QUOTIENT], ends[i, KINDS + 1], ends[i, KINDS + 2]
+        duration, pull, column = end - begin, 0.5 * ends[i, KINDS + 5], columns[i]
+        short = abs(duration) < SHORT
+        residual[i, 0], residual[i, 1] = sign * quotient, -sign * velocity - speeds[i]
+        by_speed = column[2 + 1, 0] if short else column[0, 0] / duration
+        by_start = ends[i, RESET_DRIFT] - pull if short else (column[0, 1] + quotient) / duration
+        by_end = pull if short else (velocity - quotient) / duration
+        here[i, 0, 0], here[i, 1, 0] = sign * by_start / frequency, -sign * column[1, 1] / frequency
+        here[i, 0, 1], here[i, 1, 1] = sign * by_speed, -sign * column[1, 0]
+        there[i, 0, 0], there[i, 1, 0] = sign * by_end / frequency, -sign * acceleration / frequency
+        there[i, 0, 1], there[i, 1, 1] = 0.0, -1.0
+        for j in range(2, column.shape[1]):
+            by_value = column[3, j] if short else (column[0, j] - column[2, j]) / duration
+            parameters[i, 0, j - 2], parameters[i, 1, j - 2] = sign * by_value, -sign * column[1, j]
+        if place >= 0:  # phases are kept as the frequency changes, not times
+            for row in range(2):
+                parameters[i, row, place] -= here[i, row, 0] * begin + there[i, row, 0] * end

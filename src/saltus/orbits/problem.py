@@ -141,7 +141,7 @@ class Problem:
         ends, columns = np.zeros((n, at.KINDS + 6 * own)), np.zeros((n, 4 * own, self._where[k.COLUMNS]))
         looks = np.zeros((n if look else 0, at.LEAST_MARGIN + max(1, self._where[k.STOPS])))
         spans, sides, states = self._segments(unknowns, frequency)
-        done = load_segments()(self._where, self._settings, env, model, spans, sides, states, ends, columns, looks)
+        done = load_segments()[0](self._where, self._settings, env, model, spans, sides, states, ends, columns, looks)
         if done < n:
             return None
         if not self.signature.sides:
@@ -157,7 +157,7 @@ class Problem:
         ends, columns = np.zeros((1, at.KINDS + 6 * own)), np.zeros((1, 4 * own, self._where[k.COLUMNS]))
         spans, sides = np.array([[begin / frequency, end / frequency, 0.0]]), np.array([[0, self.signature.side]])
         looks = np.zeros((0, at.LEAST_MARGIN + 1))
-        done = load_segments()(self._where, self._settings, env, model, spans, sides, state.reshape(1, -1), ends, columns, looks)
+        done = load_segments()[0](self._where, self._settings, env, model, spans, sides, state.reshape(1, -1), ends, columns, looks)
         return ends[0, at.KINDS : at.KINDS + 2 * own] if done else None
 
     def _segments(self, unknowns: np.ndarray, frequency: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -193,31 +193,14 @@ class Problem:
         columns: np.ndarray,
         looks: np.ndarray,
     ) -> Equations:
-        n = len(spans)
+        n, count = len(spans), len(self.paths)
         sign = np.where(np.array(self.signature.along()) > 0, rates[0], rates[1])
-        begin, end = spans[:, at.SEGMENT_START], spans[:, at.SEGMENT_END]
-        quotient, velocity, acceleration = ends[:, at.QUOTIENT], ends[:, at.KINDS + 1], ends[:, at.KINDS + 2]
-        residual = np.stack([sign * quotient, -sign * velocity - np.roll(unknowns[1::2], -1)], axis=1)
-        u, z, u_start, z_start = columns.transpose(1, 0, 2)  # each (n, 2 + parameters)
-        duration = end - begin
-        short = np.abs(duration) < at.SHORT
-        d = np.where(short, 1.0, duration)[:, None]
-        first = (u - u_start) / d
-        first[:, 1] = (u[:, 1] + quotient) / d[:, 0]
-        at_end = (velocity - quotient) / d[:, 0]
-        pull = 0.5 * ends[:, at.KINDS + 5]
-        first[short] = z_start[short]
-        first[short, 1] = (ends[:, at.RESET_DRIFT] - pull)[short]
-        at_end[short] = pull[short]
-        by_start = np.stack([sign * first[:, 1], -sign * z[:, 1]], axis=1) / frequency
-        by_end = np.stack([sign * at_end, -sign * acceleration], axis=1) / frequency
-        by_speed = np.stack([sign * first[:, 0], -sign * z[:, 0]], axis=1)
-        here = np.stack([by_start, by_speed], axis=2)
-        there = np.stack([by_end, np.tile([0.0, -1.0], (n, 1))], axis=2)
-        parameters = np.stack([sign[:, None] * first[:, 2:], -sign[:, None] * z[:, 2:]], axis=1)
-        if FREQUENCY in self.paths:
-            parameters[:, :, self.paths.index(FREQUENCY)] -= by_start * begin[:, None] + by_end * end[:, None]
-        return Equations(residual.ravel(), here, there, parameters.reshape(2 * n, -1), ends, looks)
+        residual, here, there = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
+        parameters = np.empty((n, 2, count))
+        place = self.paths.index(FREQUENCY) if FREQUENCY in self.paths else -1
+        following = np.append(unknowns[3::2], unknowns[1])
+        load_segments()[1](spans, sign, following, frequency, place, ends, columns, residual, here, there, parameters)
+        return Equations(residual.ravel(), here, there, parameters.reshape(2 * n, count), ends, looks)
 
 
 def _ready(system: System, paths: tuple[str, ...]) -> Any:
