@@ -1,8 +1,9 @@
-"""What is known: closed forms of the metainterface and of the rocking block, each beside the equation of the paper it states.
+"""What is known: closed forms of the metainterface and its relatives, each beside the equation of the paper it states.
 
 Under constant loads: energies, equilibria and divergence, small vibrations and their decay, the piecewise-linear motion impact
 by impact, and the two peaks of conservative motion. Beyond them: the quasi-static borders, the onset at high frequency, the
-restitution of inelastic contact, the rocking block's periods, and the upright pendulum. Nothing here integrates an equation
+restitution of inelastic contact, the rocking block's periods, the upright pendulum, and the periodic orbits of the impact
+oscillator with their folds, period doublings and grazings. Nothing here integrates an equation
 of motion; what lies outside a formula's range is refused with a ParameterError.
 """
 
@@ -51,6 +52,7 @@ from saltus.theory.small_vibrations import (
     upright_period,
     vibrations,
 )
+from saltus.theory.wall_orbits import WallOrbit, WallOrbits, wall_orbits
 
 __all__ = [
     "Contact",
@@ -61,6 +63,8 @@ __all__ = [
     "Peaks",
     "Stability",
     "Vibration",
+    "WallOrbit",
+    "WallOrbits",
     "critical_horizontal",
     "decayed_amplitude",
     "decayed_period",
@@ -104,4 +108,5 @@ __all__ = [
     "upright_period",
     "velocity_factor",
     "vibrations",
+    "wall_orbits",
 ]
