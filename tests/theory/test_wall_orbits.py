@@ -186,7 +186,7 @@ def test_speeds_are_the_inverse_of_the_amplitude(case):
 
 
 def test_another_grazing_ends_the_admissible_orbits():
-    """Two forcing periods an impact: where the maximum between impacts reaches the wall, the exact flow's first impact is there."""
+    """Two forcing periods an impact: once the maximum between impacts reaches the wall, the exact flow has its impact there."""
     family = wall_orbits(oscillator(frequency=0.7, wall=0.5, e=0.6), 2)
     speeds = np.linspace(0.05, 1.5, 30)
     clear = np.array([family.orbit(v).clearance for v in speeds])
