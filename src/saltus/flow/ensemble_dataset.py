@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.errors import ParameterError
 from saltus.flow import layout as k
 from saltus.flow.lanes import layout as at
 from saltus.flow.tangent import FREQUENCY
@@ -15,6 +15,7 @@ from saltus.flow.tangent import FREQUENCY
 if TYPE_CHECKING:
     import xarray
 
+    from saltus.flow.ensemble_inputs import Inputs
     from saltus.flow.lanes.run import Ends, Jobs
     from saltus.systems import System
 
@@ -54,100 +55,143 @@ MEANINGS = {
 }
 
 
-# Names that the dataset needs for itself, besides the coordinates and velocities of the model.
-TAKEN = (
-    *("period", "state", "column", "time", "side", "stop", "limit", "cycle", "crossings", "grazings", "periods"),
-    *("chatter_speed", "derivative", "least_speed", "period_crossings"),
+# What a dataset has besides the coordinates and velocities of the model and what is called after those.
+FIXED = (
+    *("time", "side", "stop", "limit", "cycle", "crossings", "grazings", "periods", "chatter_speed", "derivative"),
+    *("least_speed", "overall_least_speed", "period_crossings", "start_time"),
 )
+DIMENSIONS = ("period", "state", "column")
 
 
-def check_dims(dims: tuple[str, ...], system: System) -> None:
-    """Refuse a dimension that has the name of a result."""
-    for dim in dims:
-        if dim in (*TAKEN, *system.model.coordinates) or (dim.endswith("velocity") and not dim.startswith("initial_")):
-            raise ParameterError(f"a dimension cannot be called {dim!r}, as a result is; call it initial_{dim}, or as you like")
+def rate_name(name: str, names: tuple[str, ...]) -> str:
+    """The name of a coordinate's velocity."""
+    return "velocity" if len(names) == 1 else f"{name}_velocity"
 
 
-def to_dataset(
-    system: System,
-    jobs: Jobs,
-    ends: Ends,
-    dims: tuple[str, ...],
-    shape: tuple[int, ...],
-    coords: dict[Any, Any],
-    inputs: dict[str, Any],
-    limits: tuple[str, ...],
-    paths: tuple[str, ...] | None,
-    sample: tuple[str, ...],
-    periods: float | None,
-    tol: float,
-    until: tuple[str, ...],
-) -> xarray.Dataset:
+def start_name(name: str) -> str:
+    """The name in a dataset of a coordinate, a velocity or the time at the start."""
+    return f"start_{name}"
+
+
+def result_names(names: tuple[str, ...]) -> set[str]:
+    """Every name that a dataset may need for itself, of a model with these coordinates."""
+    states = [*names, *(rate_name(name, names) for name in names)]
+    extrema = [f"{which}_{names[0]}" for which in ("largest", "smallest")]
+    further = [*(f"{kind}_{name}" for kind in ("sampled", "start") for name in states), *(f"overall_{name}" for name in extrema)]
+    return {*FIXED, *DIMENSIONS, *states, *extrema, *further}
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be computed: how exactly, how long, and what is kept of it."""
+
+    tol: float
+    periods: float | None  # None where a duration is asked for
+    limits: tuple[str, ...]  # margins to stop at
+    sample: tuple[str, ...]
+    until: tuple[str, ...]
+    paths: tuple[str, ...] | None  # of the parameters to differentiate to; None without derivatives
+
+
+def to_dataset(system: System, inputs: Inputs, wanted: Wanted, jobs: Jobs, ends: Ends) -> xarray.Dataset:
     """The ends of all trajectories and what was sampled of them."""
     import xarray
 
     from saltus import __version__
 
-    names = system.model.coordinates
-    own, rows = len(names), jobs.states.shape[1] // 2
-    known = {name: given if hasattr(given, "dims") else (name, given) for name, given in coords.items()}
-    variables: dict[str, Any] = {}
-
-    def add(name: str, values: np.ndarray, unit: str, text: str, *extra: str, **more: Any) -> None:
-        reshaped = values.reshape((*shape, *values.shape[1:]))
-        variables[name] = ((*dims, *extra), reshaped, {"units": unit, "long_name": text} | more)
-
-    rates = ["velocity" if own == 1 else f"{name}_velocity" for name in names]
-    for i, (name, rate) in enumerate(zip(names, rates, strict=True)):
-        unit = "rad" if name.startswith("theta") else "1"
-        add(name, ends.states[:, i], unit, f"{name} at the end")
-        add(rate, ends.states[:, rows + i], unit, f"d {name} / d tau at the end")
-    lengths = jobs.numbers[:, 1]
-    add("time", ends.labels[:, 4] * lengths + ends.numbers[:, 0], "1", "dimensionless time tau at the end")
-    held = (ends.labels[:, 2] == k.REST) | (ends.labels[:, 2] == k.CHATTER)
-    add("side", np.where(held, 0, ends.labels[:, 3]).astype(np.int8), "1", "side at the end, 0 at rest")
-    add("crossings", ends.labels[:, 5], "1", "impacts")
-    add("grazings", ends.labels[:, 6], "1", "touches of the contact without an impact")
-    add("periods", ends.labels[:, 7], "1", "forcing periods that were ended")
-    _add_stops(add, ends, limits, until)
-    add("chatter_speed", ends.numbers[:, 1], "1", "speed of the gap after impacts too small to be followed, else 0")
-    _add_samples(add, ends, names, rates, sample)
-    if paths is not None:
-        _add_derivatives(add, jobs, ends, names, rates, paths, periods)
+    writer = _Writer(system.model.coordinates, inputs)
+    _add_ends(writer, jobs, ends)
+    _add_stops(writer, ends, wanted)
+    _add_samples(writer, ends, wanted.sample)
+    if wanted.paths is not None:
+        _add_derivatives(writer, jobs, ends, wanted.paths, wanted.periods)
     attributes: dict[str, Any] = {
         "title": "ensemble computed by saltus",
         "saltus_version": __version__,
         "system": system.to_json(),
-        "tol": tol,
+        "tol": wanted.tol,
         "Conventions": "CF-1.8",
     }
-    for name, values in inputs.items():
-        where = f"initial_{name}" if name in (*names, *rates, "time") else name
-        if where in dims:  # it is a coordinate
-            continue
-        if np.ndim(values):
-            add(where, values, "1", f"{name} at the start" if where != name else f"parameter {name}")
-        else:
-            attributes[where] = float(values)
-    if paths is not None:
-        known |= {"state": ("state", [*names, *rates]), "column": ("column", [*names, *rates, *paths])}
-    return xarray.Dataset(variables, known, attributes)
+    attributes |= _add_inputs(writer, inputs)
+    return xarray.Dataset(writer.variables, writer.coords, attributes)
 
 
-def _add_stops(add: Any, ends: Ends, limits: tuple[str, ...], until: tuple[str, ...]) -> None:
+class _Writer:
+    """Collects variables over the dimensions of an ensemble."""
+
+    def __init__(self, names: tuple[str, ...], inputs: Inputs) -> None:
+        self.names, self.rates = names, tuple(rate_name(name, names) for name in names)
+        self.dims, self.shape, self.coords = inputs.dims, inputs.shape, dict(inputs.coords)
+        self.variables: dict[str, Any] = {}
+
+    def add(self, name: str, values: np.ndarray, unit: str, text: str, *extra: str, **more: Any) -> None:
+        """Add a variable that has a row for each trajectory, over further dimensions `extra`."""
+        reshaped = values.reshape((*self.shape, *values.shape[1:]))
+        self.variables[name] = ((*self.dims, *extra), reshaped, {"units": unit, "long_name": text} | more)
+
+
+def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends) -> None:
+    """The states at the end, and what happened until then."""
+    rows = jobs.states.shape[1] // 2
+    for i, (name, rate) in enumerate(zip(writer.names, writer.rates, strict=True)):
+        unit = _unit(name)
+        writer.add(name, ends.states[:, i], unit, f"{name} at the end")
+        writer.add(rate, ends.states[:, rows + i], unit, f"d {name} / d tau at the end")
+    lengths, legs = jobs.numbers[:, 1], ends.labels[:, 4] - jobs.labels[:, 0]  # legs that were ended
+    writer.add("time", ends.labels[:, 4] * lengths + ends.numbers[:, 0], "1", "dimensionless time tau at the end")
+    held = (ends.labels[:, 2] == k.REST) | (ends.labels[:, 2] == k.CHATTER)
+    writer.add("side", np.where(held, 0, ends.labels[:, 3]).astype(np.int8), "1", "side at the end, 0 at rest")
+    writer.add("crossings", ends.labels[:, 5], "1", "impacts")
+    writer.add("grazings", ends.labels[:, 6], "1", "touches of the contact without an impact")
+    if (lengths > 0).all():
+        done = legs + (ends.numbers[:, 0] - jobs.numbers[:, 0]) / lengths
+        writer.add("periods", done, "1", "forcing periods from the start to the end")
+    text = "speed of the gap after impacts too small to be followed, else 0"
+    writer.add("chatter_speed", ends.numbers[:, 1], "1", text)
+
+
+def _add_inputs(writer: _Writer, inputs: Inputs) -> dict[str, float]:
+    """The arguments: arrays as variables, unless a coordinate is the same; returns those that are one number."""
+    single = {}
+    for name, values in inputs.values.items():
+        parameter = name in inputs.paths
+        where = name if parameter else start_name(name)
+        if not np.ndim(values):
+            single[where] = float(values)
+        elif not _is_coordinate(name if parameter else f"initial_{name}", values, inputs):
+            writer.add(
+                where, values, "1" if parameter else _unit(name), f"parameter {name}" if parameter else f"{name} at the start"
+            )
+    return single
+
+
+def _is_coordinate(name: str, values: np.ndarray, inputs: Inputs) -> bool:
+    """Whether the coordinate of this name holds these values."""
+    if name not in inputs.coords:
+        return False
+    whole = inputs.coords[name].variable.set_dims(dict(zip(inputs.dims, inputs.shape, strict=True)))
+    return bool(np.array_equal(whole.values.reshape(-1), values))
+
+
+def _unit(name: str) -> str:
+    return "rad" if name.startswith("theta") else "1"
+
+
+def _add_stops(writer: _Writer, ends: Ends, wanted: Wanted) -> None:
+    """Why each trajectory ended."""
     reasons = ends.labels[:, 0].copy()
     reasons[(reasons == k.DONE) & (ends.labels[:, 2] == k.REST)] = -1
     codes = np.full(reasons.shape, -1, dtype=np.int8)
     for code, reason in enumerate(STOPS):
         codes[reasons == reason] = code
     comment = "; ".join(f"{name}: {MEANINGS[name]}" for name in STOPS.values())
-    add("stop", codes, "1", "why it ended", **_flags(tuple(STOPS.values())), comment=comment)
-    if limits:
+    writer.add("stop", codes, "1", "why it ended", **_flags(tuple(STOPS.values())), comment=comment)
+    if wanted.limits:
         which = np.where(reasons == k.LIMITED, ends.labels[:, 1], -1).astype(np.int8)
-        add("limit", which, "1", "the margin that ended it, -1 for none", **_flags(limits))
-    if "settled" in until:
+        writer.add("limit", which, "1", "the margin that ended it, -1 for none", **_flags(wanted.limits))
+    if "settled" in wanted.until:
         cycle = np.where(reasons == at.SETTLED, ends.labels[:, 1], 0)
-        add("cycle", cycle, "1", "forcing periods after which it repeats itself, 0 where it has not settled")
+        writer.add("cycle", cycle, "1", "forcing periods after which it repeats itself, 0 where it has not settled")
 
 
 def _flags(names: tuple[str, ...]) -> dict[str, Any]:
@@ -155,49 +199,54 @@ def _flags(names: tuple[str, ...]) -> dict[str, Any]:
     return {"flag_values": np.arange(len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
 
 
-def _add_samples(add: Any, ends: Ends, names: Any, rates: list[str], sample: tuple[str, ...]) -> None:
-    """What was kept of the last forcing periods, in the order of time, nan where there were fewer."""
-    kept = ends.samples.shape[1]
-    done = ends.labels[:, 7]
+def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
+    """What was kept of the last forcing periods, in the order of time, nan where there were fewer; and of the whole motion."""
+    kept, done = ends.samples.shape[1], ends.labels[:, 7]
     order = (done[:, None] + np.arange(kept)) % kept  # the ring's oldest first
     missing = np.arange(kept)[None, :] < (kept - done)[:, None]
     samples = np.take_along_axis(ends.samples, order[:, :, None], axis=1)
     samples[missing] = np.nan
-    column, first = 0, names[0]
+    first, column = writer.names[0], 0
+    slowest = "the least speed before an impact, inf without impacts"
     texts = {
-        "state": [(f"sampled_{name}", f"{name} at the end of the forcing period") for name in (*names, *rates)],
-        "extrema": [
-            (f"largest_{first}", f"the largest {first} in the forcing period"),
-            (f"smallest_{first}", f"the smallest {first}"),
-        ],
-        "speed": [("least_speed", "the least speed before an impact in the forcing period, inf without impacts")],
+        "state": [(f"sampled_{name}", f"{name} at the end of the forcing period") for name in (*writer.names, *writer.rates)],
+        "extrema": [(f"{which}_{first}", f"the {which} {first} in the forcing period") for which in ("largest", "smallest")],
+        "speed": [("least_speed", f"{slowest}, in the forcing period")],
         "crossings": [("period_crossings", "impacts in the forcing period")],
     }
     for name in KEPT:
         if name in sample:
             for variable, text in texts[name]:
-                add(variable, np.ascontiguousarray(samples[:, :, column]), "1", text, "period")
+                writer.add(variable, np.ascontiguousarray(samples[:, :, column]), "1", text, "period")
                 column += 1
+    if "extrema" in sample:
+        for i, which in enumerate(("largest", "smallest")):
+            text = f"the {which} {first} from the start to the end"
+            writer.add(f"overall_{which}_{first}", ends.numbers[:, 2 + i], _unit(first), text)
+    if "speed" in sample:
+        writer.add("overall_least_speed", ends.numbers[:, 4], "1", f"{slowest}, from the start to the end")
 
 
-def _add_derivatives(
-    add: Any, jobs: Jobs, ends: Ends, names: Any, rates: list[str], paths: tuple[str, ...], periods: float | None
-) -> None:
-    """The derivatives of the end state to the initial one and to parameters, (..., state, column)."""
-    own, rows = len(names), jobs.states.shape[1] // 2
-    columns = [*names, *rates, *paths]
+def _add_derivatives(writer: _Writer, jobs: Jobs, ends: Ends, paths: tuple[str, ...], periods: float | None) -> None:
+    """The derivatives of the end state to the initial one and to parameters, (..., state, column).
+
+    The time at the start is fixed. The time at the end is, too, but for two: where whole periods were asked for and the motion
+    ends after n of them, start + n 2 pi / W moves with the frequency W; and where a margin ends it, with the margin.
+    """
+    states = [*writer.names, *writer.rates]
+    own, rows, columns = len(writer.names), jobs.states.shape[1] // 2, [*states, *paths]
     q = ends.states[:, own:rows].reshape(-1, len(columns), own)
     v = ends.states[:, rows + own :].reshape(-1, len(columns), own)
     derivative = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
     slope = np.concatenate([ends.states[:, rows : rows + own], ends.numbers[:, 5 : 5 + own]], axis=1)
-    limited = ends.labels[:, 0] == k.LIMITED  # the end moves with the margin
+    limited = ends.labels[:, 0] == k.LIMITED
     with np.errstate(invalid="ignore"):  # the instant of a margin met without speed has no derivative
         derivative[limited] += slope[limited, :, None] * ends.numbers[limited, None, 5 + own :]
     if periods is not None and FREQUENCY in paths:
         moving = np.isin(ends.labels[:, 0], (k.DONE, at.SETTLED)) & (ends.labels[:, 2] == k.ARC)
         length = jobs.numbers[:, 1]
-        start = jobs.labels[:, 0] * length + jobs.numbers[:, 0]
-        span = ends.labels[:, 4] * length + ends.numbers[:, 0] - start
-        shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # d(end)/dW = -span / W
+        span = (ends.labels[:, 4] - jobs.labels[:, 0]) * length + (ends.numbers[:, 0] - jobs.numbers[:, 0])
+        shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # of the end, -span / W
         derivative[:, :, columns.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)
-    add("derivative", derivative, "1", "derivative of the state at the end", "state", "column")
+    writer.coords |= {"state": ("state", states), "column": ("column", columns)}
+    writer.add("derivative", derivative, "1", "derivative of the state at the end", "state", "column")

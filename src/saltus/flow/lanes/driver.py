@@ -45,6 +45,7 @@ def fill(lane, i, code, sizes, at, m, flags, lanes, jobs, tables):
     where[lane, HELD_NOW] = where[lane, SKIP_NOW] = where[lane, COUNT] = where[lane, TOUCHES] = where[lane, LEGS_DONE] = 0
     gauge[lane, PERIOD_LENGTH], gauge[lane, END_TIME], gauge[lane, CHATTER_NOW] = numbers[i, 1], numbers[i, 2], 0.0
     gauge[lane, TOP], gauge[lane, BOTTOM], gauge[lane, SLOWEST] = -np.inf, np.inf, np.inf
+    gauge[lane, LEG_START] = numbers[i, 0]
     streak[lane, :] = 0
     env = (parameters[i], constants[lane], tables[0], tables[1])
     code[3](parameters[i], constants[lane])
@@ -92,12 +93,19 @@ def begin_mode(sides, position, velocity, geometry):
 
 
 @inline_jit
+def leg_end(lane, lanes):
+    """The local time at which a leg ends: a forcing period after it began, or with the motion."""
+    where, gauge = lanes[0], lanes[1]
+    if where[lane, LEG] == where[lane, LAST_LEG]:
+        return gauge[lane, END_TIME]
+    return gauge[lane, LEG_START] + gauge[lane, PERIOD_LENGTH]
+
+
+@inline_jit
 def begin_leg(lane, m, lanes, tables):
     """Set where a lane's next stop is: the end of its forcing period, of its motion, or a breakpoint of the records."""
-    where, gauge, breaks = lanes[0], lanes[1], tables[0]
-    leg, length = where[lane, LEG], gauge[lane, PERIOD_LENGTH]
-    origin = leg * length
-    target = gauge[lane, END_TIME] if leg == where[lane, LAST_LEG] else length
+    where, breaks = lanes[0], tables[0]
+    origin, target = where[lane, LEG] * lanes[1][lane, PERIOD_LENGTH], leg_end(lane, lanes)
     piece = where[lane, PIECE_NOW]
     while piece < breaks.size and breaks[piece] - origin <= m[NOW * WIDTH + lane]:
         piece += 1
@@ -116,26 +124,35 @@ def begin_records(lane, at, m):
 
 
 @inline_jit
-def end_leg(lane, sizes, at, m, lanes, results):
-    """Keep the state at the end of a forcing period and what happened in it; the cycle it has settled on, or 0."""
-    where, gauge, _, _, ring, streak = lanes
-    i, own, samples = where[lane, IDENT], sizes[MODEL_ROWS], results[3]
-    legs = where[lane, LEGS_DONE]
-    row = samples[i, legs % sizes[LAST_KEPT]]
+def keep_sample(lane, sizes, at, m, lanes, results):
+    """Keep the state and what happened since the leg began, in the ring of the last samples."""
+    where, own = lanes[0], sizes[MODEL_ROWS]
+    row = results[3][where[lane, IDENT], where[lane, LEGS_DONE] % sizes[LAST_KEPT]]
     for d in range(own):
         row[d], row[own + d] = m[(at[POSITION] + d) * WIDTH + lane], m[(at[VELOCITY] + d) * WIDTH + lane]
     for j in range(4):
         row[2 * own + j] = m[(HIGHEST + j) * WIDTH + lane]
     total_up(lane, at, m, lanes)
-    where[lane, LEGS_DONE] = legs + 1
+    where[lane, LEGS_DONE] += 1
+
+
+@inline_jit
+def end_leg(lane, sizes, at, m, lanes, results):
+    """Keep a leg that is over; the length of the cycle that the trajectory has settled on, or 0."""
+    where, gauge, _, _, ring, streak = lanes
+    keep_sample(lane, sizes, at, m, lanes, results)
     if sizes[SETTLE] == 0:
         return 0
-    here = (legs + 1) % (2 * LONGEST_CYCLE)
-    for d in range(2 * own):
-        ring[lane, here, d] = row[d]
+    legs, own = where[lane, LEGS_DONE], sizes[MODEL_ROWS]
+    here = legs % (2 * LONGEST_CYCLE)
+    for d in range(own):
+        ring[lane, here, d], ring[lane, here, own + d] = (
+            m[(at[POSITION] + d) * WIDTH + lane],
+            m[(at[VELOCITY] + d) * WIDTH + lane],
+        )
     if where[lane, MODE_NOW] == CHATTER:
         ring[lane, here, own] = gauge[lane, CHATTER_NOW]
-    return cycle_length(ring[lane], streak[lane], legs + 1, own)
+    return cycle_length(ring[lane], streak[lane], legs, own)
 
 
 @inline_jit
@@ -155,11 +172,10 @@ def total_up(lane, at, m, lanes):
 def arrive(lane, sizes, at, m, lanes, tables, results):
     """At the end of a leg or at a breakpoint: go on. Returns DONE, SETTLED, or PAUSED, and the length of the cycle."""
     where, gauge = lanes[0], lanes[1]
-    leg, now = where[lane, LEG], m[NOW * WIDTH + lane]
-    last = leg == where[lane, LAST_LEG]
-    t_end = gauge[lane, END_TIME] if last else gauge[lane, PERIOD_LENGTH]
+    leg, now, start = where[lane, LEG], m[NOW * WIDTH + lane], gauge[lane, LEG_START]
+    last, t_end = leg == where[lane, LAST_LEG], leg_end(lane, lanes)
     if now >= t_end:
-        if last and t_end <= 0.0 and where[lane, LEGS_DONE] > 0:  # the end of whole periods: there is nothing to record
+        if last and t_end <= start and where[lane, LEGS_DONE] > 0:  # the end of whole periods: there is nothing to record
             return DONE, 0
         cycle = end_leg(lane, sizes, at, m, lanes, results)
         if last:
@@ -167,7 +183,7 @@ def arrive(lane, sizes, at, m, lanes, tables, results):
         if cycle > 0:
             return SETTLED, cycle
         where[lane, LEG] = leg + 1
-        m[NOW * WIDTH + lane] = now - t_end
+        m[NOW * WIDTH + lane] = start + (now - t_end)
     begin_leg(lane, m, lanes, tables)
     return PAUSED, 0
 
@@ -178,6 +194,9 @@ def finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results):
     where, gauge = lanes[0], lanes[1]
     state, numbers, labels, _ = results
     i, half = where[lane, IDENT], state.shape[1] // 2
+    part = m[NOW * WIDTH + lane] > gauge[lane, LEG_START] or m[CROSSINGS * WIDTH + lane] > 0.0 or where[lane, LEGS_DONE] == 0
+    if part and reason != DONE and reason != SETTLED and reason != OUTSIDE:  # it ends within a leg
+        keep_sample(lane, sizes, at, m, lanes, results)
     total_up(lane, at, m, lanes)
     for row in range(half):
         state[i, row], state[i, half + row] = m[(at[POSITION] + row) * WIDTH + lane], m[(at[VELOCITY] + row) * WIDTH + lane]
@@ -355,7 +374,7 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
     own = sizes[MODEL_ROWS]
     lanes = (
         np.zeros((WIDTH, 11), dtype=np.int64),
-        np.zeros((WIDTH, 6)),
+        np.zeros((WIDTH, 7)),
         np.zeros((WIDTH, constants_count)),
         np.zeros((WIDTH, 3)),
         np.zeros((WIDTH, 2 * LONGEST_CYCLE, 2 * own)),

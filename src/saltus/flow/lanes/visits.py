@@ -38,7 +38,7 @@ def depart(lane, sizes, at, m, flags, settings, lanes):
         state[STATE + row] = m[(at[POSITION] + row) * WIDTH + lane]
         state[STATE + rows + row] = m[(at[VELOCITY] + row) * WIDTH + lane]
     limits[LENGTH], limits[TOLERANCE] = gauge[PERIOD_LENGTH], settings[TOLERANCE]
-    limits[END] = gauge[END_TIME] if own[LEG] == own[LAST_LEG] else gauge[PERIOD_LENGTH]
+    limits[END] = gauge[END_TIME] if own[LEG] == own[LAST_LEG] else gauge[LEG_START] + gauge[PERIOD_LENGTH]
     return where, state, limits
 
 
