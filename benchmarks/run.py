@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from auto import beside_auto
 from machine import about
 from peers import MODULES, PROTOTYPE, Peer, firsts, load_peers
 from plot import draw
@@ -85,6 +86,8 @@ def main() -> None:
     write_text(RESULTS / "benchmarks.json", json.dumps(results, indent=1) + "\n")
     write_atomically(RESULTS / "benchmarks.png", lambda part: draw(results, part))
     print(write_text(RESULTS / "benchmarks.md", report(results)).read_text())
+    if set(chosen.only) == set(MODULES):  # AUTO is a peer too, in files of its own
+        beside_auto(head, chosen.quick)
 
 
 if __name__ == "__main__":  # worker processes import this file

@@ -1,6 +1,8 @@
-"""The comparison of the benchmarks at equal achieved error, on power laws whose answers are known."""
+"""The benchmarks: the comparison at equal achieved error, on power laws with known answers, and what AUTO-07p is told and says."""
 
+import ctypes
 import math
+import subprocess
 import sys
 from pathlib import Path
 
@@ -12,6 +14,8 @@ from hypothesis import strategies as st
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 equal, measure, reference, report = (__import__(name) for name in ("equal", "measure", "reference", "report"))
+from auto import case, diagram, program, section, verdicts  # noqa: E402
+from peers.peer import AbsentError  # noqa: E402
 
 ERRORS = np.array([1e-4, 1e-6, 1e-9, 1e-13])
 
@@ -80,3 +84,131 @@ def test_the_reference_ends_are_those_of_saltus() -> None:
     motions = [saltus.simulate(system, theta=x, velocity=v, periods=reference.PERIODS) for x, v in zip(*starts, strict=True)]
     assert reference.errors([m.theta for m in motions], [m.velocity for m in motions]).max() < 1e-12
     assert [len(m.crossings) for m in motions] == known["impacts"].tolist()
+
+
+# --- AUTO-07p
+
+# A run of AUTO at H = 0.5 and B = 1000 on the 20 x 4 mesh, of which only the first points and the labelled ones are kept
+RECORDED = Path(__file__).with_name("auto_fort7.txt")
+
+
+@pytest.fixture
+def objects() -> list[str]:
+    try:
+        return program.libraries()
+    except AbsentError as reason:
+        pytest.skip(str(reason))
+
+
+def test_a_recorded_diagram_of_auto_is_read_whole() -> None:
+    points = diagram.parse(RECORDED.read_text())
+    known = case.KNOWN[0.5]
+    assert points[0] == diagram.Point(3.0, 7.1019429784e-02, 4.7042285432e-14, True, "EP")
+    assert [p.kind for p in points] == ["EP", "", "", "LP", "LP", "LP", "BP", "BP", "LP", "BP", "PD", "LP", "LP", "EP"]
+    assert points[4].stable is False  # between two folds
+    assert all(error < 2e-4 for error in verdicts.fold_errors(points, known))  # of a mesh of 20
+    row = verdicts.row(program.Run(points, 1.0), known)
+    assert row["end"] == "turns round, back at 3"
+    assert row["grazing"] == {"arrives": False, "turns": [], "beyond": False}
+    assert row["impossible"] == 1  # the PD, on a symmetric orbit
+
+
+def test_a_diagram_cut_off_loses_its_last_line_and_another_text_is_refused() -> None:
+    text = RECORDED.read_text()
+    assert len(diagram.parse(text.rstrip()[:-30])) == len(diagram.parse(text)) - 1
+    with pytest.raises(ValueError, match="not a bifurcation diagram"):
+        diagram.parse("segmentation fault")
+    with pytest.raises(ValueError, match=r"no column PAR\(9\)"):
+        diagram.parse(text.replace("PAR(9)", "PAR(7)"))
+
+
+def test_an_exponent_without_its_letter_is_read() -> None:
+    assert [diagram._number(x) for x in ("-1.7976+308", "1.5-104", "2.0E-016", "-3.5")] == [-1.7976e308, 1.5e-104, 2e-16, -3.5]
+
+
+def _orbits(*points: tuple[float, str, float]) -> list[diagram.Point]:
+    return [diagram.Point(omega, 1.0, mean, True, kind) for omega, kind, mean in points]
+
+
+def test_only_labels_that_no_orbit_can_deserve_count_as_impossible() -> None:
+    on_symmetric, on_asymmetric = 1e-5, 0.05
+    branch = _orbits((1.0, "PD", on_symmetric), (0.9, "PD", on_asymmetric), (0.8, "TR", on_asymmetric), (0.7, "BP", on_symmetric))
+    assert verdicts.impossible(branch) == 2
+
+
+@settings(deadline=None, max_examples=50)
+@given(shift=st.floats(-1e-3, 1e-3), others=st.lists(st.floats(1.2, 2.9), max_size=5))
+def test_a_fold_is_held_against_the_nearest_known_one(shift: float, others: list[float]) -> None:
+    known = case.KNOWN[0.5]
+    branch = _orbits(*((omega, "LP", 0.0) for omega in [*others, known.folds[1] + shift]))
+    first, second = verdicts.fold_errors(branch, known)
+    assert first is None  # nothing within a hundredth of the lower one
+    assert second == pytest.approx(abs(shift), abs=1e-15)
+
+
+def test_a_passage_of_the_grazing_is_told_from_turning_at_it() -> None:
+    known = case.KNOWN[0.5]
+    smooth = _orbits((0.3, "", 0.0), (0.2850, "", 0.0), (0.27, "", 0.0))
+    assert verdicts.at_grazing(smooth, known) == {"arrives": True, "turns": [], "beyond": True}
+    lost = _orbits((0.3, "", 0.0), (0.28465, "LP", 0.0), (0.2846, "MX", 0.0))
+    assert verdicts.at_grazing(lost, known) == {"arrives": True, "turns": [[0.28465, 1.0]], "beyond": False}
+    assert "one 2e-05 away, does not pass" in section._grazing(verdicts.at_grazing(lost, known), known)
+    assert verdicts.at_grazing(smooth, case.KNOWN[1.0]) is None
+
+
+def test_a_machine_without_auto_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    from auto.beside import beside_auto
+
+    monkeypatch.delenv("AUTO_DIR", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    beside_auto({}, quick=True, folder=tmp_path)
+    assert "apt-get install auto-07p gfortran" in (tmp_path / "auto.md").read_text()
+    assert not (tmp_path / "auto.png").exists()
+
+
+@pytest.mark.parametrize("amplitude", [0.5, 1.0])
+def test_auto_starts_from_an_orbit_of_period_1(amplitude: float) -> None:
+    orbit = case.first_orbit(amplitude)
+    assert orbit.shape == (case.SAMPLES + 1, 5)
+    assert np.abs(orbit[-1, 1:] - orbit[0, 1:]).max() < 1e-12
+    half = case.SAMPLES // 2
+    assert np.abs(orbit[half, 1:] + orbit[0, 1:]).max() < 1e-10  # and a symmetric one
+
+
+def test_the_equations_given_to_auto_are_those_of_the_smoothed_model(objects: list[str], tmp_path: Path) -> None:
+    import saltus
+
+    library = tmp_path / "equations.so"
+    command = ["gfortran", "-shared", "-fPIC", "-std=legacy", "-fopenmp", str(program.EQUATIONS), "-o", str(library), *objects]
+    subprocess.run(command, check=True, cwd=tmp_path, capture_output=True)
+    func = ctypes.CDLL(str(library)).func_
+    omega, amplitude, sharpness, time = 0.7, 0.9, 50.0, 0.4
+    par = np.array([omega, amplitude, sharpness, reference.VERTICAL, reference.DAMPING, reference.BETA0])
+
+    def field(u: np.ndarray, wanted: int = 0) -> tuple[np.ndarray, np.ndarray]:
+        slope, jacobian, to_omega = np.zeros(4), np.zeros((4, 4), order="F"), np.zeros((4, 36), order="F")
+        whole, icp = [ctypes.byref(ctypes.c_int(x)) for x in (4, wanted)], (ctypes.c_int * 2)(1, 11)
+        arrays = [array.ctypes.data_as(ctypes.c_void_p) for array in (u, par, slope, jacobian, to_omega)]
+        func(whole[0], arrays[0], icp, arrays[1], whole[1], *arrays[2:])
+        return slope, jacobian
+
+    model = saltus.Metainterface(beta0=reference.BETA0, damping=reference.DAMPING, smoothing=sharpness)
+    load = saltus.Load(frequency=omega, horizontal=saltus.Harmonic(amplitude=amplitude), vertical=reference.VERTICAL)
+    for theta, velocity in ((0.01, 0.3), (-0.02, 1.0), (1.3, -0.4), (0.0, 0.5)):
+        u = np.array([theta, velocity, math.sin(omega * time), math.cos(omega * time)])
+        slope, jacobian = field(u, 1)
+        exact = model.acceleration(time, theta, velocity, 1.0, load)
+        assert slope == pytest.approx([velocity, exact, omega * u[3], -omega * u[2]], abs=1e-14)
+        steps = np.eye(4) * 1e-6
+        differences = np.column_stack([(field(u + h)[0] - field(u - h)[0]) / 2e-6 for h in steps])
+        assert jacobian == pytest.approx(differences, abs=1e-6)
+
+
+def test_the_folds_of_auto_come_to_the_exact_ones(objects: list[str]) -> None:
+    with program.linked() as executable:
+        text = program.constants(1.0, 200.0, program.Mesh(50), lowest=0.75)
+        run = program.run(executable, case.first_orbit(1.0), text)
+    assert run.fails == ""
+    assert 0.7 < run.branch[-1].omega <= 0.75
+    assert max(verdicts.fold_errors(run.branch, case.KNOWN[1.0])) < 1e-4
+    assert verdicts.impossible(run.branch) == 0
