@@ -1,4 +1,4 @@
-"""The benchmarks: the comparison at equal achieved error, on power laws with known answers, and what AUTO-07p is told and says."""
+"""The benchmarks: comparing at equal achieved error, on power laws with known answers, and what AUTO-07p is told and says."""
 
 import ctypes
 import math
