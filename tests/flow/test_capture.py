@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from flow_references import BETA80, driven
+from xarray import DataArray
 
 from saltus.errors import ParameterError
 from saltus.flow import EventKind, simulate
@@ -269,11 +270,30 @@ def test_many_parameter_sets_at_once_are_each_as_alone(monkeypatch):
     assert capture_speed(BASE, cases) == pytest.approx(together, rel=1e-12)
 
 
-def test_parameters_broadcast_and_wrong_ones_are_named():
-    speeds = capture_speed(BASE, {"model.damping": np.array([[0.05], [0.1]]), "load.horizontal.amplitude": np.zeros(3)})
+def test_parameters_broadcast_by_shape_or_by_name():
+    damping, amplitude = np.array([0.05, 0.1]), np.array([0.0, 0.01, 0.02])
+    speeds = capture_speed(BASE, {"model.damping": damping[:, None], "load.horizontal.amplitude": amplitude})
     assert speeds.shape == (2, 3)
     assert capture_speed(BASE).shape == ()
-    with pytest.raises(ParameterError, match=r"no parameter 'model.dampin'; did you mean 'model.damping'"):
-        capture_speed(BASE, {"model.dampin": 0.1})
-    with pytest.raises(ParameterError, match=r"load.horizontal.order must be whole"):
-        capture_speed(BASE, {"load.horizontal.order": np.array([1.0, 1.5])})
+    named = {"model.damping": DataArray(damping, dims="C"), "load.horizontal.amplitude": DataArray(amplitude, dims="H")}
+    np.testing.assert_array_equal(capture_speed(BASE, named).transpose("C", "H"), speeds)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"model.dampin": 0.1}, r"no parameter 'model.dampin'; did you mean 'model.damping'"),
+        ({"load.horizontal.order": np.array([1.0, 1.5])}, r"load.horizontal.order must be whole"),
+        ({"model.beta0": 80.0}, r"got 80.0 \(degrees\?\)"),
+        ({"impact.e": np.array([0.5, np.nan])}, "impact.e must be finite"),
+        ({"impact.e": "high"}, "impact.e must be a number"),
+        ({"impact.e": np.ones(2), "model.damping": np.ones(3)}, r"impact.e \(2,\), model.damping \(3,\)"),
+        (0, "parameters must be arrays by dotted path"),
+        ([0.1], "parameters must be arrays by dotted path"),
+    ],
+)
+def test_wrong_parameters_are_refused_in_a_sentence(parameters, message):
+    with pytest.raises(ParameterError, match=message):
+        capture_speed(BASE, parameters)
+    with pytest.raises(ParameterError, match="takes a System"):
+        capture_speed(BASE.model)

@@ -1,5 +1,7 @@
 """What simulate_many takes and what it refuses: shapes, named dimensions, no trajectories, columns; a sentence for a mistake."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 import xarray
@@ -120,6 +122,54 @@ def test_a_dimension_named_as_a_result_is_refused(dimension):
         run(theta=theta, sensitivities=())
 
 
+ENDLESS = {"periods": 10**12}  # so that what is refused is refused before it runs
+
+
+@pytest.mark.parametrize("name", ["theta", "time", "stop", "start_theta", "overall_largest_theta", "sampled_velocity", "state"])
+@pytest.mark.parametrize("along", [True, False])
+def test_a_coordinate_named_as_a_result_is_refused_before_anything_runs(name, along):
+    theta = xarray.DataArray(ANGLES, dims="a").assign_coords({name: ("a", ANGLES) if along else 0.3})
+    with pytest.raises(ParameterError, match=f"coordinate cannot be called '{name}'"):
+        run(theta=theta, **ENDLESS)
+
+
+def test_a_result_goes_on_from_where_it_ended():
+    theta = xarray.DataArray(ANGLES, dims="initial_theta")
+    velocity = xarray.DataArray(ANGLES[:3], dims="initial_velocity")
+    first = run(theta=theta, velocity=velocity, time=0.7, periods=1.25, tol=1e-14)
+    then = run(theta=first.theta, velocity=first.velocity, time=first.time, periods=2, tol=1e-14)
+    whole = run(theta=theta, velocity=velocity, time=0.7, periods=3.25, tol=1e-14)
+    np.testing.assert_allclose(then.theta, whole.theta, atol=1e-11)
+    np.testing.assert_allclose(then.time, whole.time, rtol=1e-14)
+    np.testing.assert_array_equal(then.initial_theta, ANGLES)  # the labels that the dimensions came with
+    for name in ("theta", "velocity", "time"):
+        xarray.testing.assert_equal(then[f"start_{name}"].drop_attrs(), first[name].drop_attrs().rename(f"start_{name}"))
+    assert "start_theta" not in first  # its coordinate says it
+    again = run(theta=then.theta, velocity=then.velocity.sel(initial_velocity=ANGLES[0]), time=then.time.mean())
+    np.testing.assert_array_equal(again.start_theta, then.theta)
+    assert again.start_velocity.dims == ("initial_theta", "initial_velocity")
+
+
+def test_coordinates_on_which_arguments_do_not_agree_are_left_out():
+    theta = xarray.DataArray(ANGLES, dims="a").assign_coords(run=1, place=2)
+    ensemble = run(theta=theta, velocity=xarray.DataArray(ANGLES, dims="a").assign_coords(run=3, place=2))
+    assert set(ensemble.coords) == {"place"}
+
+
+def test_a_coordinate_does_not_say_other_parameters_than_there_were():
+    path = "load.horizontal.amplitude"
+    sweep = run(theta=0.3, parameters={path: xarray.DataArray([0.1, 0.2], dims=path)})
+    with pytest.raises(ParameterError, match="other values than the system's"):
+        run(theta=sweep.theta, **ENDLESS)
+    with pytest.raises(ParameterError, match="other values than parameters give"):
+        run(theta=sweep.theta, parameters={path: sweep[path].drop_vars(path) + 0.1}, **ENDLESS)
+    with pytest.raises(ParameterError, match="other values than parameters give"):
+        run(theta=sweep.theta, parameters={path: 0.2}, **ENDLESS)
+    np.testing.assert_array_equal(run(theta=sweep.theta, parameters={path: sweep[path]})[path], [0.1, 0.2])
+    one_of_them = run(SYSTEM.with_({path: 0.2}), theta=sweep.theta.sel({path: 0.2}))
+    assert float(one_of_them.start_theta if "start_theta" in one_of_them else one_of_them.attrs["start_theta"]) == sweep.theta[1]
+
+
 def test_a_result_can_be_written_and_read(tmp_path):
     theta = xarray.DataArray(ANGLES, dims="start", coords={"start": np.arange(5)})
     ensemble = run(theta=theta, sample=("state", "extrema", "crossings", "speed"), last="all", periods=3, sensitivities=())
@@ -148,6 +198,28 @@ def test_a_frequency_column_changes_the_forcing_period_even_of_constant_loads():
     for i, value in enumerate(frequency):
         motion = one(0.3, system=STEADY.with_({"load.frequency": value}), periods=2.25)
         assert float(ensemble.theta[i]) == pytest.approx(motion.theta, abs=1e-11)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ordered(Duffing):
+    """A Duffing oscillator of which no number may be 0.5, and whose damping is less than its cubic term."""
+
+    def __post_init__(self):
+        if 0.5 in (self.damping, self.cubic) or self.damping >= self.cubic:
+            raise ParameterError(f"damping and cubic must not be 0.5, and damping must be less, got {self!r}")
+
+
+def test_every_row_of_columns_is_checked_and_as_a_whole():
+    system = System(model=Ordered(damping=0.1, cubic=1.0), load=Load(frequency=1.0, force=Harmonic(0.1)))
+
+    def columns(damping, cubic):
+        return {"model.damping": np.asarray(damping), "model.cubic": np.asarray(cubic)}
+
+    taken = saltus.simulate_many(system, x=0.1, periods=0.1, parameters=columns([2.0, 0.4, 3.0], [3.0, 0.7, 4.0]))
+    assert taken.sizes["trajectory"] == 3  # alone, the first damping would not do
+    for bad in (columns([0.1, 0.5, 0.9], [1.0, 1.0, 1.0]), columns([0.1, 0.7, 0.1], [1.0, 0.6, 0.2]), columns(0.3, [0.4, 0.2])):
+        with pytest.raises(ParameterError, match="must be less"):
+            saltus.simulate_many(system, x=0.1, parameters=bad, **ENDLESS)
 
 
 def test_every_parameter_may_be_a_column():
@@ -182,6 +254,8 @@ BAD = {
     "path that is a number": {"parameters": {3: ANGLES}},
     "list of paths": {"parameters": ["load.vertical"]},
     "text for paths": {"parameters": "load.vertical"},
+    "a number for paths": {"parameters": 0},
+    "nothing for paths": {"parameters": ()},
     "value refused at the end": {"parameters": {"model.beta0": np.linspace(1.0, 4.0, 5)}},
     "value refused inside": {"parameters": {"model.beta0": np.array([1.0, 2.0, 80.0, 2.0, 1.0])}},
     "impact factor": {"parameters": {"impact.e": np.linspace(0.0, 1.1, 5)}},

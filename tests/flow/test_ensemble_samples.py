@@ -1,5 +1,6 @@
 """What an ensemble keeps of each forcing period, against the dense output of the scalar motion, and when it ends one early."""
 
+import itertools
 import math
 
 import numpy as np
@@ -14,9 +15,11 @@ PERIODS = 5.0
 
 
 def long_cases(family, n, periods=PERIODS):
-    """Starts at time 0, over whole forcing periods, of motions that do not end before."""
-    cases = FAMILIES[family](np.random.default_rng([6, *family.encode()]), n)
-    return Cases(cases.system, cases.columns, cases.state, cases.velocity, np.zeros(n), {"periods": periods})
+    """Starts at time 0 and at any other, over whole forcing periods."""
+    rng = np.random.default_rng([6, *family.encode()])
+    cases = FAMILIES[family](rng, n)
+    times = np.where(rng.random(n) < 0.5, 0.0, rng.uniform(-20.0, 20.0, n))
+    return Cases(cases.system, cases.columns, cases.state, cases.velocity, times, {"periods": periods})
 
 
 def extrema(motion, begin, end):
@@ -37,35 +40,68 @@ def extrema(motion, begin, end):
 
 @pytest.mark.parametrize("family", ["paper", "every_channel", "wall", "duffing", "rocking"])
 def test_samples_are_those_of_the_dense_output(family):
+    """Of every forcing period from the start, and of the part of one in which a margin ends the motion."""
     cases = long_cases(family, 40)
     ensemble = cases.in_lanes(tol=1e-14, sample=KINDS, last="all")
-    name, calm = cases.system.model.coordinates[0], 0
+    name, calm, cut = cases.system.model.coordinates[0], 0, 0
     assert ensemble.sizes["period"] == PERIODS
     for i in range(len(cases)):
         motion = cases.alone(i, tol=1e-14, dense=True)
-        if isinstance(motion, str) or motion.stop == "limit":
+        if isinstance(motion, str) or motion.time == motion.start:
             continue
-        length = motion.time / PERIODS
-        position, velocity = motion.at(length * np.arange(1, PERIODS + 1))
         here = ensemble.isel(trajectory=i)
-        size = max(1.0, np.abs(here[f"sampled_{name}"].values).max())
-        apart = np.abs([here[f"sampled_{name}"].values - position, here.sampled_velocity.values - velocity]).max()
-        if apart > 1e-12 * size:
+        length = motion.system.load.period
+        edges = motion.start + length * np.arange(math.ceil((motion.time - motion.start) / length - 1e-9) + 1)
+        edges[-1] = motion.time
+        samples = here.isel(period=slice(-(len(edges) - 1), None))
+        position, velocity = motion.at(edges[1:])
+        size = max(1.0, np.abs(position).max())
+        apart = np.abs([samples[f"sampled_{name}"].values - position, samples.sampled_velocity.values - velocity]).max()
+        if apart > 1e-11 * size:
             continue  # a motion that magnifies its rounding: what it samples is compared where it does not
-        calm += 1
-        crossings = motion.crossings
-        for leg in range(int(PERIODS)):
-            top, bottom = extrema(motion, leg * length, (leg + 1) * length)
-            assert float(here[f"largest_{name}"][leg]) == pytest.approx(top, abs=2e-12 * size)
-            assert float(here[f"smallest_{name}"][leg]) == pytest.approx(bottom, abs=2e-12 * size)
-            inside = (crossings.time > leg * length) & (crossings.time <= (leg + 1) * length)
-            near_the_end = np.abs(crossings.time / length - np.round(crossings.time / length)).min(initial=1.0) < 1e-9
-            if not near_the_end:
-                assert int(here.period_crossings[leg]) == inside.sum()
-                least = np.abs(crossings.velocity_before[inside]).min(initial=np.inf)
-                assert float(here.least_speed[leg]) == pytest.approx(least, rel=1e-9, abs=1e-12)
-        assert here.period_crossings.sum() == here.crossings
+        calm, cut = calm + 1, cut + (motion.stop == "limit")
+        assert np.isnan(here[f"sampled_{name}"].values[: -(len(edges) - 1)]).all()
+        check_records(samples, motion, edges, name, 2e-11 * size)
+        assert samples.period_crossings.sum() == here.crossings
     assert calm >= 12
+    assert cut >= (5 if family == "rocking" else 0)
+
+
+def check_records(samples, motion, edges, name, close):
+    """Extrema, impacts and the least speed between the edges, which the last ones end."""
+    times, speeds = motion.crossings.time, np.abs(motion.crossings.velocity_before)
+    near_an_edge = np.abs(times[:, None] - edges[None, :-1]).min(initial=1.0) < 1e-9
+    for leg, (begin, end) in enumerate(itertools.pairwise(edges)):
+        top, bottom = extrema(motion, begin, end)
+        assert float(samples[f"largest_{name}"][leg]) == pytest.approx(top, abs=close)
+        assert float(samples[f"smallest_{name}"][leg]) == pytest.approx(bottom, abs=close)
+        inside = (times > begin) & (times <= end)
+        if not near_an_edge:
+            assert int(samples.period_crossings[leg]) == inside.sum()
+            assert float(samples.least_speed[leg]) == pytest.approx(speeds[inside].min(initial=np.inf), rel=1e-8, abs=1e-11)
+
+
+def test_the_whole_motion_has_the_extremes_of_its_periods():
+    cases = long_cases("rocking", 200)
+    everything = cases.in_lanes(sample=KINDS, last="all")
+    few = cases.in_lanes(sample=("extrema", "speed"), last=1)
+    started = stop_names(everything) != "outside"
+    for name, best in (("largest_theta", "max"), ("smallest_theta", "min"), ("least_speed", "min")):
+        expected = getattr(everything[name], best)("period").values
+        np.testing.assert_array_equal(everything[f"overall_{name}"].values[started], expected[started])
+        np.testing.assert_array_equal(few[f"overall_{name}"], everything[f"overall_{name}"])
+
+
+def test_the_period_in_which_a_motion_is_captured_is_kept():
+    cases = attracted(150, 0.8)
+    ensemble = cases.in_lanes(until="rest", sample=KINDS, last="all")
+    captured = ensemble.isel(trajectory=np.flatnonzero(stop_names(ensemble) == "captured"))
+    assert captured.sizes["trajectory"] >= 8
+    np.testing.assert_array_equal(captured.sampled_theta[:, -1], captured.theta)
+    np.testing.assert_array_equal(captured.sampled_velocity[:, -1], captured.velocity)
+    np.testing.assert_array_equal(captured.period_crossings.sum("period"), captured.crossings)
+    np.testing.assert_array_equal(captured.sampled_theta.notnull().sum("period"), np.ceil(captured.periods))
+    assert (captured.periods % 1 > 0).any()
 
 
 def test_the_last_periods_are_the_tail_of_all_of_them():
@@ -91,23 +127,35 @@ def test_periods_that_a_motion_did_not_reach_are_nan_and_come_first():
     for row in ensemble.isel(trajectory=np.flatnonzero(early)).transpose("trajectory", ...).sampled_theta.values:
         missing = np.isnan(row)
         assert (np.diff(missing.astype(int)) <= 0).all()  # nan first, then numbers
-    missing = np.isnan(ensemble.sampled_theta.values).sum(axis=1)
-    np.testing.assert_array_equal(missing, 6 - ensemble.periods)
+    started = stop_names(ensemble) != "outside"
+    there = np.isfinite(ensemble.sampled_theta.values).sum(axis=1)
+    np.testing.assert_array_equal(there[started], np.maximum(np.ceil(ensemble.periods.values - 1e-9), 1)[started])
+    np.testing.assert_array_equal(ensemble.sampled_theta[started, -1], ensemble.theta[started])
 
 
-def test_whole_periods_from_any_whole_period_are_as_many_samples():
-    for start in (-3, -1, 0, 1, 20):
+@pytest.mark.parametrize("span", [{"periods": 2}, {"duration": 2.0}, {"duration": 2.0 - 1e-15}, {"duration": 2.0 + 1e-15}])
+def test_whole_periods_from_any_time_are_as_many_samples(span):
+    for start in (-3.0, -1.0 + 1e-16, 0.0, 1.0 - 1e-16, 20.0, 0.3, 1e6 + 0.1):
         ensemble = saltus.simulate_many(
             System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=2 * math.pi, horizontal=Harmonic(0.3))),
             theta=np.array([0.3, 0.1]),
-            periods=2,
-            time=float(start),
+            time=start,
+            **span,
             sample=KINDS,
             last="all",
         )
         assert ensemble.sizes["period"] == 2
-        np.testing.assert_array_equal(ensemble.periods, 2)
+        np.testing.assert_allclose(ensemble.periods, 2, rtol=1e-9)
         assert not np.isnan(ensemble.sampled_theta).any()
+
+
+def test_periods_are_counted_in_parts():
+    system = attracted(1).system
+    for periods in (0, 0.4, 1, 2.5, 3):
+        ensemble = saltus.simulate_many(system, theta=0.3, time=np.array([0.0, 1.7, -4.0]), periods=periods, last="all")
+        np.testing.assert_allclose(ensemble.periods, periods, rtol=1e-14)
+        assert ensemble.sizes["period"] == max(1, math.ceil(periods))
+        np.testing.assert_array_equal(ensemble.sampled_theta[:, -1], ensemble.theta)
 
 
 def test_a_resting_system_has_extrema_zero_and_no_speed():

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, near
+from saltus.errors import ParameterError
 from saltus.flow.adiabatic import budget, first_guess, largest_start, normal_form
 from saltus.flow.barrier import WIDEST, climb
+from saltus.flow.ensemble_inputs import broadcast, check_parameters, numeric, parameter_table
 from saltus.flow.graph import Expr, differentiate, number, substitute
 from saltus.flow.intervals import SLACK, Interval, enclose
 from saltus.flow.opening import SPEED, Leaves, Opening, reads
@@ -24,7 +25,7 @@ ONE = 1e-14  # a product of impact factors this close to 1 is 1: no law states i
 BOXES = (0.7, 0.2)  # of the bounds of the corrected invariant: shares of the speed that those at the contact suggest
 
 
-def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -> np.ndarray:
+def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -> Any:
     """The speed of the gap just after an impact below which a motion is provably captured at the contact.
 
     From any impact, at any time and to any side, that leaves abs(gap_rate * velocity) below the returned speed, the motion
@@ -54,36 +55,40 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
         parameters: arrays or numbers by dotted path, which broadcast; all others are the system's.
 
     Returns:
-        the speeds, of the shape to which the parameters broadcast.
+        the speeds, an array of the shape to which the parameters broadcast; a DataArray where they are DataArrays.
 
     Raises:
-        ParameterError: a path that is not a number of the system; an order of a harmonic that is not whole.
+        ParameterError: what is no system; a path that is not a number of it; values that are none or that it refuses; shapes
+            that do not fit.
     """
+    if not isinstance(system, System):
+        raise ParameterError(f"capture_speed takes a System(model=..., load=..., impact=...), got {system!r}")
+    arrays = {path: numeric(path, given) for path, given in parameter_table(system, parameters).items()}
+    dims, shape, coords, columns = broadcast(arrays)
+    check_parameters(system, columns)
+    speeds = proved_speeds(system, columns).reshape(shape)
+    if all(not hasattr(a, "dims") or not a.ndim for a in arrays.values()):
+        return speeds
+    from xarray import DataArray
+
+    return DataArray(speeds, dims=dims, coords=coords, name="capture_speed")
+
+
+def proved_speeds(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
+    """`capture_speed` for flat columns of numbers that the system takes; (n,), or (1,) for numbers alone."""
     traced = trace(system)
-    shape, columns = _columns(system, parameters or {})
+    arrays = (given.get(path, np.asarray(value)) for path, value in system.parameters.items())
+    columns = np.broadcast_arrays(*map(np.atleast_1d, arrays))
     result = np.zeros(columns[0].size)
     if not traced.sides:
-        return result.reshape(shape)
+        return result
     records = _record_ranges(system, traced)
     law = _Law(traced)
     for start in range(0, result.size, BATCH):
         part = slice(start, start + BATCH)
         leaves = Leaves([Interval(c[None, part]) for c in columns], records)
         result[part] = law.capture(leaves, result[part].size)
-    return result.reshape(shape)
-
-
-def _columns(system: System, parameters: Mapping[str, Any]) -> tuple[tuple[int, ...], list[np.ndarray]]:
-    """Every number of the system as a column, in the order of the trace."""
-    known = system.parameters
-    for path, value in parameters.items():
-        if path not in known:
-            raise ParameterError(f"no parameter {path!r}; {near(path, known)}")
-        if path.startswith("load.") and path.endswith(".order") and np.any(np.asarray(value) != np.round(value)):
-            raise ParameterError(f"{path} must be whole numbers, got {value!r}")
-    arrays = {path: np.asarray(parameters.get(path, value), dtype=float) for path, value in known.items()}
-    shape = np.broadcast_shapes(*(a.shape for a in arrays.values()))
-    return shape, [np.broadcast_to(a, shape).ravel() for a in arrays.values()]
+    return result
 
 
 def _record_ranges(system: System, traced: Trace) -> list[Interval]:

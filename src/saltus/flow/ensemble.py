@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError, near
-from saltus.flow.clock import clock
+from saltus.flow.clock import Clock, clock
 from saltus.flow.emit import Emitter
 from saltus.flow.ensemble_dataset import KEPT, Wanted, to_dataset
 from saltus.flow.ensemble_inputs import Inputs, read_inputs
@@ -114,7 +114,7 @@ def _capture(system: System, columns: dict[str, np.ndarray], limits: tuple[str, 
     Raises:
         ParameterError: a margin to stop at besides the model's own, which a captured motion may still reach.
     """
-    from saltus.flow.capture import capture_speed
+    from saltus.flow.capture import proved_speeds
 
     asked = [name for name in limits if name not in system.model.stops]
     if asked:
@@ -123,10 +123,10 @@ def _capture(system: System, columns: dict[str, np.ndarray], limits: tuple[str, 
         return 0.0
     varied = {path: values for path, values in columns.items() if values.ndim}
     if not varied:
-        return capture_speed(system, columns)
+        return proved_speeds(system, columns)
     sets, place = np.unique(np.stack(list(varied.values()), axis=1), axis=0, return_inverse=True)
     distinct = dict(zip(varied, sets.T, strict=True))
-    return capture_speed(system, columns | distinct)[place.reshape(-1)]
+    return proved_speeds(system, columns | distinct)[place.reshape(-1)]
 
 
 def _names(argument: str, given: Any, known: tuple[str, ...] | None) -> tuple[str, ...]:
@@ -196,13 +196,21 @@ def _jobs(system: System, run: Program, inputs: Inputs, periods: float | None, d
     time, frequency = inputs.values["time"], inputs.values.get("load.frequency", system.load.frequency)
     length = None if frequency is None else 2.0 * math.pi / np.asarray(frequency, dtype=float)
     at = clock(time, length, periods, duration)
-    # Forcing periods are counted from the start, with its phase; one of a time lost in rounding belongs to the last.
-    rest = at.end - at.local
-    back = (at.last > at.first) & (rest < SLIVER * at.length) & (rest != 0.0)
-    jobs.numbers[:, 0], jobs.numbers[:, 1], jobs.numbers[:, 2] = at.local, at.length, at.end + back * at.length
-    jobs.labels[:, 0], jobs.labels[:, 1], jobs.labels[:, 2] = at.first, at.last - back, side
+    last, end = _from_the_start(at)
+    jobs.numbers[:, 0], jobs.numbers[:, 1], jobs.numbers[:, 2] = at.local, at.length, end
+    jobs.labels[:, 0], jobs.labels[:, 1], jobs.labels[:, 2] = at.first, last, side
     jobs.labels[:, 3] = np.searchsorted(run.env[2], time, side="right")
     return jobs
+
+
+def _from_the_start(at: Clock) -> tuple[Any, Any]:
+    """The last forcing period and the local time at the end, if periods are counted from the start, with its phase.
+
+    What is longer than whole periods by no more than rounding ends in the last of these.
+    """
+    part = np.divide(at.end - at.local, at.length, out=np.zeros(np.shape(at.end)), where=np.greater(at.length, 0))
+    back = np.where(part == 0.0, 0, np.minimum(1 - np.ceil(part - SLIVER), at.last - at.first))
+    return at.last - back, at.end + back * at.length
 
 
 def _first_states(inputs: Inputs, own: int, columns: int) -> np.ndarray:

@@ -45,9 +45,9 @@ def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coord
             that the system refuses, dimensions and coordinates with the name of a result.
     """
     given = parameter_table(system, parameters)
-    arrays = {name: _numeric(name, value) for name, value in (_starts(system, velocity, time, coordinates) | given).items()}
-    dims, shape, coords, together = _broadcast(arrays)
-    check_parameters(system, _broadcast({path: arrays[path] for path in given})[3])
+    arrays = {name: numeric(name, value) for name, value in (_starts(system, velocity, time, coordinates) | given).items()}
+    dims, shape, coords, together = broadcast(arrays)
+    check_parameters(system, broadcast({path: arrays[path] for path in given})[3])
     _check_names(system, dims, coords, arrays, given)
     return Inputs(dims, shape, coords, together, tuple(given))
 
@@ -110,7 +110,7 @@ def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, 
     return starts | {"time": time}
 
 
-def _numeric(name: str, given: Any) -> Any:
+def numeric(name: str, given: Any) -> Any:
     """A DataArray or an array of finite numbers."""
     import xarray
 
@@ -125,7 +125,7 @@ def _numeric(name: str, given: Any) -> Any:
     return array
 
 
-def _broadcast(arrays: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int, ...], dict[str, Any], dict[str, np.ndarray]]:
+def broadcast(arrays: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int, ...], dict[str, Any], dict[str, np.ndarray]]:
     """The dimensions of arrays together, the shape, the coordinates, and each array flat or as one number."""
     import xarray
 
@@ -138,7 +138,7 @@ def _broadcast(arrays: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int, ...]
         together = _aligned(named)
         dims, shape = next((tuple(str(d) for d in a.dims), a.shape) for a in together.values())
         flat = {name: a.values.reshape(-1) for name, a in together.items()} | plain
-        return dims, shape, _coords(named), {name: flat[name] for name in arrays}
+        return dims, shape, _coords(named, dims), {name: flat[name] for name in arrays}
     try:
         shape = np.broadcast_shapes(*(a.shape for a in plain.values()))
     except ValueError:
@@ -162,15 +162,24 @@ def _aligned(named: dict[str, Any]) -> dict[str, Any]:
     return dict(zip(named, together, strict=True))
 
 
-def _coords(named: dict[str, Any]) -> dict[str, Any]:
-    """The coordinates of DataArrays; an array along a dimension of its own name is the dimension's coordinate."""
+def _coords(named: dict[str, Any], dims: tuple[str, ...]) -> dict[str, Any]:
+    """The coordinates of DataArrays; an array along a dimension of its own name is the dimension's coordinate.
+
+    As in xarray's arithmetic, those on which two arrays do not agree are left out.
+    """
     coords: dict[str, Any] = {}
+    unlike = set()
     for array in named.values():
-        coords |= {str(name): values for name, values in array.coords.items()}
+        for name, values in array.coords.items():
+            if name in dims and name not in array.dims:
+                continue  # one value of what is a dimension here
+            if name in coords and not coords[name].variable.equals(values.variable):
+                unlike.add(name)
+            coords[str(name)] = values
     for name, array in named.items():
         if array.dims in ((name,), (f"initial_{name}",)):
             coords.setdefault(str(array.dims[0]), array.copy().assign_coords({array.dims[0]: array.values}))
-    return coords
+    return {name: values.reset_coords(drop=True) for name, values in coords.items() if name not in unlike}
 
 
 def _check_names(
