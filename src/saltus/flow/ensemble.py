@@ -56,24 +56,28 @@ def simulate_many(
         system: what moves.
         velocity: the velocities at the start; a tuple of arrays where there are several coordinates.
         parameters: arrays by dotted path, such as {"load.horizontal.amplitude": np.linspace(0, 1, 101)}.
-        periods, duration: how long, in forcing periods or in dimensionless time; one of them.
+        periods, duration: how long, in forcing periods or in dimensionless time; one of them, one number for all.
         tol: the error that one step may make, relative to the state, in [1e-15, 1e-6].
         time: the dimensionless time at the start.
         side: +1 or -1, the side to leave by where the motion from rest at contact is not unique.
         stop_at: margins of the model that end a trajectory; its own `stops` always do.
         sample: what is kept of each of the `last` forcing periods: "state" (at its end, stroboscopically), "extrema" of the first
-            coordinate in it, "crossings" (the number of impacts), "speed" (the least abs(v-) of its impacts).
+            coordinate in it, "crossings" (the number of impacts), "speed" (the least abs(v-) of its impacts). They are counted
+            from the start, and the one in which the trajectory ends is kept, however short. Of "extrema" and "speed" the whole
+            motion's are returned too.
         last: of how many forcing periods, counted back from the end; "all" keeps every one.
         until: ends a trajectory early: "rest", when it is proved to be captured at rest for all later loads (`capture_speed`);
             "settled", when it repeats itself every q <= 16 forcing periods.
-        sensitivities: dotted paths of parameters: adds the derivatives of the end state to the initial one and to them.
+        sensitivities: dotted paths of parameters: adds the derivatives of the end state to the initial one and to them. The time
+            at the start is fixed, and at the end too, but that n periods asked for end at time + n 2 pi / W, which moves with
+            "load.frequency" W, also where a trajectory has settled; and that a margin's end moves with it.
         threads: how many cores to use; by default all.
         progress: called with the fraction done, ten times a second.
         coordinates: the state at the start by the model's names: theta=..., or x=... for a wall oscillator.
 
     Returns:
-        A Dataset with the state at the end, `time`, `side`, `stop` (why it ended), `crossings`, `grazings`, `periods` done, and
-        what `sample` asks for, all over the dimensions of the arguments; see `ensemble_dataset.py`.
+        A Dataset with the state at the end, `time`, `side`, `stop` (why it ended), `crossings`, `grazings`, `periods` done (2.5
+        for two and a half), and what `sample` asks for, all over the dimensions of the arguments; see `ensemble_dataset.py`.
 
     Raises:
         ParameterError: an argument without meaning. A trajectory that cannot go on raises nothing: `stop` says so.

@@ -21,8 +21,9 @@ from saltus.systems import System
 class Sensitivities:
     """The derivatives of a motion of n degrees of freedom; a state is (coordinates, velocities), 2 n numbers.
 
-    They hold for the motion that `simulate` returns for the same arguments: at the end of a `duration`, at the end of so many
-    `periods` even as the load's frequency changes them, or where a margin ends it. A derivative is one-sided where the motion
+    They hold for the motion that `simulate` returns for the same arguments: from the same `time` on, whatever the load's phase
+    then is; at the end of a `duration`, at the end of so many `periods` even as the load's frequency changes them, or where a
+    margin ends it. A derivative is one-sided where the motion
     starts at contact, is released by a jump of the load, ends on an event, or grazes the contact (see `grazings`).
 
     `event_times` has a row for each of `motion.events` and a column for each initial coordinate, initial velocity and
