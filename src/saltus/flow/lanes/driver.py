@@ -243,13 +243,7 @@ def propose(code, sizes, at, m, flags, settings, helpers, poly, gap):
     sound = bits(natural > settings[SHORTEST_STEP]) & bits(size < FAST)
     point = load(m, POINT)
     start = load(m, at[POSITION]) - point  # counted from the contact: near it the gap keeps its digits
-    x, v, a, bend, tail = sweep(m, at, order, start, h)
-    half = order // 2
-    far = settings[FAR] * size * half
-    scale = h
-    for _ in range(half):
-        scale = scale * h
-    sound &= bits(tail * scale < far)
+    x, v, a, bend = sweep(m, at, order, start, h)
     if sizes[STOP_ROWS] > 0:
         sound &= margins_certain(m, at, sizes, h)
     hit, tau, at_root = 0, h, v

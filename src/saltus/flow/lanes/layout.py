@@ -23,7 +23,7 @@ STRIDE = HIGHEST_ORDER + 1  # slots of one series
 MODEL_ROWS, COLUMN_COUNT, STOP_ROWS, SIDED, BENDS, RECORD_ROWS = 0, 1, 2, 3, 4, 5
 LANE_ORDER, SCALAR_ORDER, WORKSPACE, LAST_KEPT, WATCH, SETTLE = 6, 7, 8, 9, 10, 11
 
-SHORTEST_STEP, FAR, SLOWEST_IMPACT = 3, 4, 5  # in `settings`, after those of `layout.py`
+SHORTEST_STEP, SLOWEST_IMPACT = 3, 4  # in `settings`, after those of `layout.py`
 
 # For each lane: in `lane`, and in `gauge`.
 IDENT, LEG, LAST_LEG, PIECE_NOW, MODE_NOW, HELD_NOW, SKIP_NOW, FORCED_SIDE, COUNT, TOUCHES, LEGS_DONE = (

@@ -22,7 +22,6 @@ from saltus.flow.simulation import Program, taylor_order
 
 CHUNK = 1024  # trajectories that one call of the driver runs: some milliseconds a forcing period
 PATIENCE = 0.1  # seconds between looks at Ctrl-C and at the progress
-TAIL = 0.65  # as `GAP` of `flow/layout.py`: how much slower than its last terms a series may shrink
 
 
 @dataclass(frozen=True)
@@ -141,11 +140,9 @@ class Lanes:
         sizes[[at.SIDED, at.BENDS, at.RECORD_ROWS]] = module.SIDES, module.STEEP, self.slots.records
         sizes[[at.LANE_ORDER, at.SCALAR_ORDER, at.WORKSPACE]] = order, taylor_order(self.tol), module.ROWS
         sizes[[at.LAST_KEPT, at.WATCH, at.SETTLE]] = self.kept, self.watch, self.settle
-        settings = np.zeros(6)
+        settings = np.zeros(5)
         settings[k.TOLERANCE], settings[at.SHORTEST_STEP] = self.tol, k.SHORTEST
         settings[at.SLOWEST_IMPACT] = max(k.SLOW * math.sqrt(self.tol), k.CHATTER_SPEED)
-        half = order // 2
-        settings[at.FAR] = math.exp(TAIL * half) * self.tol ** (half / order)
         places = np.array(list(self.slots.places.values()), dtype=np.int64)
         return code, (load_advance(), scalar), load_helpers(), sizes, places, settings
 

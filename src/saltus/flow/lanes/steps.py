@@ -5,6 +5,10 @@ This text is compiled together with the lanes (see `driver.py`).
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from saltus.flow.jit import inline_jit, lean_jit
 from saltus.flow.lanes.layout import *
 from saltus.flow.lanes.vector import *
@@ -13,63 +17,84 @@ from saltus.flow.layout import *
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 ZERO_TERM = 1e-300
-LANE_SAFETY = 1.0  # of a step: its error is then about tol
-LOG_ROUGHER = 6.64  # log2 of `ROUGHER` of `flow/layout.py`
+LANE_SAFETY = SAFETY  # of a step: its error is then a tenth of tol
+LOG_GAP = GAP * math.log2(math.e)
 NEARLY = 1e-5  # of the time, and of the slope: a step of Halley's method below it leaves an error of its cube
 
 
 @inline_jit
 def natural_step(m, at, sizes, log_tol):
-    """The step of `steps.step_size` from the last two coefficients of the velocities, and the size of the state."""
-    order, size, last, before = sizes[LANE_ORDER], splat(SMALLEST), splat(ZERO_TERM), splat(ZERO_TERM)
-    for row in range(sizes[MODEL_ROWS]):
-        series = at[VELOCITIES] + row * STRIDE
+    """The step that every row's series allows, those of the tangent's columns included, and the size of the state."""
+    rows, size = sizes[MODEL_ROWS], splat(SMALLEST)
+    for row in range(rows):
         size = maximum(size, maximum(absolute(load(m, at[POSITION] + row)), absolute(load(m, at[VELOCITY] + row))))
-        last = maximum(last, absolute(load(m, series + order)))
-        before = maximum(before, absolute(load(m, series + order - 1)))
-    wanted = log_tol + rough_log2(size)
-    step = minimum((wanted - rough_log2(last)) * (1.0 / order), (wanted - rough_log2(before)) * (1.0 / (order - 1)))
-    for column in range(sizes[COLUMN_COUNT]):
-        step = minimum(step, column_step(m, at, sizes, (column + 1) * sizes[MODEL_ROWS], log_tol + LOG_ROUGHER))
-    return LANE_SAFETY * rough_exp2(maximum(minimum(step, splat(500.0)), splat(-500.0))), size
+    step = row_step(m, at[VELOCITIES], sizes[LANE_ORDER], size, log_tol)
+    for row in range(1, rows):
+        step = minimum(step, row_step(m, at[VELOCITIES] + row * STRIDE, sizes[LANE_ORDER], size, log_tol))
+    for first in range(rows, rows * (1 + sizes[COLUMN_COUNT]), rows):
+        step = minimum(step, column_step(m, at, sizes, first, log_tol + math.log2(ROUGHER)))
+    return LANE_SAFETY * step, size
 
 
 @lean_jit
 def column_step(m, at, sizes, first, log_tol):
-    """log2 of the step that the series of a column of the tangent allows, relative to its own size (`steps.column_step`)."""
-    order, size, last, before = sizes[LANE_ORDER], splat(ZERO_TERM), splat(ZERO_TERM), splat(ZERO_TERM)
+    """The step that the series of a column of the tangent allows, relative to its own size (`steps.column_step`)."""
+    size, step = splat(ZERO_TERM), splat(np.inf)
     for row in range(first, first + sizes[MODEL_ROWS]):
-        series = at[VELOCITIES] + row * STRIDE
         size = maximum(size, maximum(absolute(load(m, at[POSITION] + row)), absolute(load(m, at[VELOCITY] + row))))
-        size = maximum(size, absolute(load(m, series + 1)))
-        last = maximum(last, absolute(load(m, series + order)))
-        before = maximum(before, absolute(load(m, series + order - 1)))
+        size = maximum(size, absolute(load(m, at[VELOCITIES] + row * STRIDE + 1)))
+    for row in range(first, first + sizes[MODEL_ROWS]):
+        step = minimum(step, row_step(m, at[VELOCITIES] + row * STRIDE, sizes[LANE_ORDER], size, log_tol))
+    return step
+
+
+@inline_jit
+def row_step(m, series, order, size, log_tol):
+    """The step of `steps.step_size` for one series: from its last two terms, and from its upper half where they vanish."""
     wanted = log_tol + rough_log2(size)
-    return minimum((wanted - rough_log2(last)) * (1.0 / order), (wanted - rough_log2(before)) * (1.0 / (order - 1)))
+    last = rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + order))))
+    before = rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + order - 1))))
+    step = minimum((wanted - last) * (1.0 / order), (wanted - before) * (1.0 / (order - 1)))
+    step = maximum(minimum(step, splat(500.0)), splat(-500.0))
+    natural, half = rough_exp2(step), order // 2
+    rarely = -log_tol / order - LOG_GAP
+    reach, upper = natural * math.exp2(rarely), absolute(load(m, series + order - 2))
+    for k in range(order - 3, half - 1, -1):
+        upper = fma(upper, reach, absolute(load(m, series + k)))
+    vanishing = bits(rough_log2(upper) + half * (step + rarely) > wanted - log_tol + 1.0)
+    if vanishing:
+        shorter = rough_exp2(upper_half(m, series, order, wanted - log_tol, log_tol))
+        natural = select(mask(vanishing), minimum(shorter, natural), natural)
+    return natural
+
+
+@lean_jit
+def upper_half(m, series, order, log_size, log_tol):
+    """log2 of the step that the upper half of a series allows, its last two terms left out."""
+    step = splat(500.0)
+    for k in range(order // 2, order - 1):
+        growth = (rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + k)))) - log_size) * (1.0 / k)
+        step = minimum(step, log_tol / order - growth)
+    return step
 
 
 @inline_jit
 def sweep(m, at, order, start, h):
-    """Position from `start` on, velocity and acceleration at h, B = h^2 sum_{j>=2} abs(a_j) h^j, and part of its last terms.
+    """Position from `start` on, velocity and acceleration at h, and B = h^2 sum_{j>=2} abs(a_j) h^j.
 
     B bounds how far the second derivative in u = t/h strays from that of the cubic q_0 + ... + q_3 h^3 u^3.
     """
     positions, velocities, accelerations = at[POSITIONS], at[VELOCITIES], at[ACCELERATIONS]
     x, v, a = load(m, positions + order), load(m, velocities + order), load(m, accelerations + order - 1)
-    bend, half = absolute(a), order // 2
+    bend = absolute(a)
     x, v = fma(x, h, load(m, positions + order - 1)), fma(v, h, load(m, velocities + order - 1))
-    for k in range(order - 2, half - 1, -1):
-        coefficient = load(m, accelerations + k)
-        x, v = fma(x, h, load(m, positions + k)), fma(v, h, load(m, velocities + k))
-        a, bend = fma(a, h, coefficient), fma(bend, h, absolute(coefficient))
-    tail = bend
-    for k in range(half - 1, 1, -1):
+    for k in range(order - 2, 1, -1):
         coefficient = load(m, accelerations + k)
         x, v = fma(x, h, load(m, positions + k)), fma(v, h, load(m, velocities + k))
         a, bend = fma(a, h, coefficient), fma(bend, h, absolute(coefficient))
     x, v, a = fma(x, h, load(m, positions + 1)), fma(v, h, load(m, velocities + 1)), fma(a, h, load(m, accelerations + 1))
     square = h * h
-    return fma(x, h, start), fma(v, h, load(m, velocities)), fma(a, h, load(m, accelerations)), bend * (square * square), tail
+    return fma(x, h, start), fma(v, h, load(m, velocities)), fma(a, h, load(m, accelerations)), bend * (square * square)
 
 
 @inline_jit
