@@ -117,7 +117,7 @@ def test_every_point_is_a_motion_of_the_system(name):
         assert orbit.admissible
         times = np.append(orbit.crossings, orbit.crossings[:1] + orbit.duration)
         assert (np.diff(times) > 0).all()
-        if orbit.slowest > 1e-6:
+        if min(orbit.slowest, orbit.clearance) > 1e-6:  # a touch closer than that has, to rounding, an impact or none
             assert orbit.defect < 1e-8 * (1 + np.abs(orbit.multipliers).max())
 
 
