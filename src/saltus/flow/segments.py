@@ -15,7 +15,7 @@ from saltus.flow.contact import rate_of
 from saltus.flow.jit import IMPACT_EQUATIONS, SEGMENTS, jit
 from saltus.flow.jit import not_here as cached_jit
 from saltus.flow.layout import *
-from saltus.flow.roots import DEPTH, NARROW, horner, newton, scale_gap, split, to_bernstein, variations
+from saltus.flow.roots import DEPTH, NARROW, NOISE, horner, newton, scale_gap, split, to_bernstein, variations
 from saltus.flow.steps import column_step, leaps, step_size
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -29,8 +29,8 @@ SHORT = 1e-6  # a segment's duration below which the derivatives of its quotient
 
 
 @jit
-def roots_within(p, n, roots):
-    """All places in (0, 1) at which a polynomial of degree n goes through zero; returns how many it has put into `roots`."""
+def roots_within(p, n, roots, noise):
+    """The places in (0, 1) at which a polynomial of degree n goes through zero, except within `noise`; returns how many."""
     boxes = np.empty((DEPTH, n + 1))
     left, width = np.empty(DEPTH), np.empty(DEPTH)
     to_bernstein(p, n, boxes[0])
@@ -40,9 +40,14 @@ def roots_within(p, n, roots):
         top -= 1
         b, low, wide = boxes[top], left[top], width[top]
         count = variations(b, n)
-        if count == 0 or (wide < NARROW and b[0] * b[n] > 0.0):
+        largest = 0.0
+        for i in range(n + 1):
+            largest = max(largest, abs(b[i]))
+        if count == 0 or largest <= noise or found == roots.size:
             continue
-        if (count == 1 or wide < NARROW or top + 2 > DEPTH) and found < roots.size:
+        if count == 1 or wide < NARROW or top + 2 > DEPTH:
+            if count % 2 == 0:
+                continue
             if b[0] < 0.0:  # `newton` starts where p is positive
                 for k in range(n + 1):
                     p[k] = -p[k]
@@ -68,7 +73,10 @@ def look(where, model, work, side, t, h, order, roots, seen):
     seen[TOP], seen[BOTTOM] = max(seen[TOP], q[0, 0]), min(seen[BOTTOM], q[0, 0])
     scale_gap(v[0], 0, order, h, poly)
     rate = rate_of(model, side) if where[SIDES] > 0 else 1.0
-    for i in range(roots_within(poly, order, roots)):
+    size = 0.0
+    for k in range(order + 1):
+        size += abs(poly[k])
+    for i in range(roots_within(poly, order, roots, NOISE * size)):
         x = horner(q[0], order, roots[i] * h)
         seen[TOP], seen[BOTTOM] = max(seen[TOP], x), min(seen[BOTTOM], x)
         gap = rate * (x - model[4][0])
@@ -78,10 +86,11 @@ def look(where, model, work, side, t, h, order, roots, seen):
         if where[SIDES] > 0 and rate * turn > 0.0 and gap < seen[HUMP]:
             seen[HUMP], seen[HUMP_TIME] = gap, t + roots[i] * h
     for j in range(where[STOPS]):
-        least = min(m[j, 0], horner(m[j], order, h))
+        least, size = min(m[j, 0], horner(m[j], order, h)), abs(m[j, 0])
         for k in range(1, order + 1):
             poly[k - 1] = k * m[j, k] * h**k
-        for i in range(roots_within(poly, order - 1, roots)):
+            size += abs(poly[k - 1])
+        for i in range(roots_within(poly, order - 1, roots, NOISE * size)):
             least = min(least, horner(m[j], order, roots[i] * h))
         seen[LEAST_MARGIN + j] = min(seen[LEAST_MARGIN + j], least)
 

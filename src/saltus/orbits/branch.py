@@ -28,7 +28,9 @@ STEP = 0.1  # the longest step: a thirtieth of the parameter's range, or a tenth
 FIRST_STEP = 1e-3
 LEAST_STEP = 1e-11
 MOST_POINTS = 20_000
-MOST_IMPACTS = 400  # of one period
+MOST_IMPACTS = 120  # of one period
+ACCUMULATE = 5  # grazings one after the other that each add impacts, within
+NEARBY = 1e-3  # of the parameter's range: there are infinitely many
 SMALLEST = 1e-7  # amplitude below which an orbit has shrunk to rest
 FAR = 0.3  # share of a step by which its end may differ from its tangent's
 
@@ -187,10 +189,19 @@ class _Walk:
         if isinstance(following, str):
             self.reason = following
         elif following.curve.problem.signature.crossings > MOST_IMPACTS:
-            self.reason = f"more than {MOST_IMPACTS} impacts a period: the orbits accumulate towards rest"
+            self.reason = f"more than {MOST_IMPACTS} impacts a period"
+        elif self._accumulates(following):
+            self.reason = f"grazings accumulate near {following.parameter:.9g}: {following.orbit.signature.crossings} impacts and more"
         else:
             self.points.append(following)
         return True
+
+    def _accumulates(self, following: Point) -> bool:
+        """Whether the last grazings have all added impacts, ever closer to one parameter."""
+        last = [(s.parameter, s.orbit.signature.crossings) for s in self.special if s.kind == "GR"][-ACCUMULATE:]
+        counts = [*(n for _, n in last), following.orbit.signature.crossings]
+        span = max(p for p, _ in last) - min(p for p, _ in last)
+        return len(last) == ACCUMULATE and bool((np.diff(counts) > 0).all()) and span < NEARBY * following.curve.scale
 
     def _note(self, a: Point, b: Point) -> None:
         """Locate the special points of a step, in order."""

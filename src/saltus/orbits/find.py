@@ -158,15 +158,13 @@ def orbit_near(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOr
 def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tuple[Problem, np.ndarray]:
     """The problem with a motion's signature, and its unknowns along the motion."""
     crossings = motion.crossings
-    if not len(crossings):
+    # with two sides an odd impact is one near the section that was counted once too often, or not at all
+    count = len(crossings) - (len(crossings) % 2 if len(base.system.model.sides) == 2 else 0)
+    if not count:
         return base.with_signature(Signature((), periods, False, motion.side)), state
-    rate = np.abs(crossings.velocity_before)
-    sides = tuple(int(s) for s in crossings.side)
-    unknowns = np.stack([crossings.time * base.frequency(base.values), rate], axis=1).ravel()
-    if (
-        len(base.system.model.sides) == 2 and len(sides) % 2
-    ):  # an impact near the section was counted once too often, or not at all
-        sides, unknowns = sides[:-1], unknowns[:-2]
+    rate = np.abs(crossings.velocity_before[:count])
+    sides = tuple(int(s) for s in crossings.side[:count])
+    unknowns = np.stack([crossings.time[:count] * base.frequency(base.values), rate], axis=1).ravel()
     return base.with_signature(Signature(sides, periods)), unknowns
 
 

@@ -1,0 +1,112 @@
+"""Onto the branches that are born at a special point: the doubled orbit at a PD, the unsymmetric ones at a BPC."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.orbits.branch import STEP, Branch, check_bounds, follow_from
+from saltus.orbits.newton import Solution, solve
+from saltus.orbits.path import Curve, Point
+from saltus.orbits.problem import Problem
+from saltus.orbits.signature import Signature
+from saltus.orbits.special import SpecialPoint, UserFunction
+from saltus.orbits.symmetry import whole
+
+LONGEST = 64  # forcing periods of an orbit: periods double six times
+
+
+def switch_branch(
+    special: SpecialPoint,
+    bounds: tuple[float, float],
+    *,
+    functions: dict[str, UserFunction] | None = None,
+    step: float = STEP,
+) -> tuple[Branch, ...]:
+    """The branches that begin at a special point of another one.
+
+    At a PD that of the doubled orbit; at a BPC those of the two unsymmetric orbits, mirror images of one another, or, where two
+    branches cross, the two halves of the other branch.
+
+    Raises:
+        ParameterError: a special point where no branch begins.
+    """
+    low, high = check_bounds(bounds)
+    path = special.point.curve.problem.paths[0]
+    origin = f"{special.kind} at {special.parameter:.9g}"
+    if special.kind not in ("PD", "BPC"):
+        raise ParameterError(f"no branch begins at a {special.kind}; switch at a PD or a BPC (grazings are gone through anyway)")
+    if special.kind == "BPC" and not special.orbit.symmetric:
+        starts = _crossing_branch(special.point)
+    else:
+        starts = (_doubled(special.point),) if special.kind == "PD" else _unsymmetric(special.point)
+    branches = [follow_from(start, path, (low, high), origin, functions, step) for start in starts if start is not None]
+    return tuple(branches)
+
+
+def _kernel(matrix: np.ndarray) -> np.ndarray:
+    vector: np.ndarray = np.linalg.svd(matrix)[2][-1]
+    return vector
+
+
+def _doubled(point: Point) -> Point | None:
+    """The orbit gone round twice, and the direction in which the two rounds differ."""
+    problem, signature = point.curve.problem, point.curve.problem.signature
+    if 2 * signature.periods > LONGEST:
+        return None
+    twice = Signature((*signature.sides, *signature.sides), 2 * signature.periods, False, signature.side)
+    unknowns, direction = point.solution.unknowns, _kernel(point.solution.equations.jacobian(-1.0))
+    if not signature.sides:
+        return _along(point, problem.with_signature(twice), unknowns, direction)
+    later = unknowns.copy()
+    later[::2] += problem.closing
+    return _along(
+        point, problem.with_signature(twice), np.concatenate([unknowns, later]), np.concatenate([direction, -direction])
+    )
+
+
+def _unsymmetric(point: Point) -> tuple[Point | None, ...]:
+    """The symmetric orbit over its whole period, and the two directions in which its halves differ."""
+    problem, solution = whole(point.curve.problem, point.solution)
+    direction = _kernel(point.solution.equations.jacobian(-1.0))
+    if point.curve.problem.signature.sides:
+        direction = np.concatenate([direction, -direction])
+    return tuple(_along(point, problem, solution.unknowns, sign * direction) for sign in (1.0, -1.0))
+
+
+def _along(point: Point, problem: Problem, unknowns: np.ndarray, direction: np.ndarray) -> Point | None:
+    """The first point of the new branch, to be followed in a direction of the unknowns."""
+    values = point.solution.values
+    equations = problem.evaluate(unknowns, values, look=True)
+    if equations is None:
+        return None
+    curve = Curve(problem, point.curve.scale, point.curve.symmetric)
+    tangent = np.append(direction, 0.0)
+    return Point(curve, Solution(unknowns, values, equations, 0), tangent / curve.norm(tangent))
+
+
+def _crossing_branch(point: Point) -> tuple[Point | None, ...]:
+    """Where two branches cross: the direction in the two-dimensional kernel that is not the branch's own, both ways."""
+    equations, curve = point.solution.equations, point.curve
+    matrix = np.column_stack([equations.jacobian(), equations.parameters[:, 0]]) / curve.weights
+    own = point.tangent * curve.weights
+    kernel = np.linalg.svd(matrix)[2][-2:]
+    other = kernel[int(np.argmin(np.abs(kernel @ own)))]
+    other = other - (other @ own) * own
+    tangent = other / curve.weights
+    tangent = tangent / curve.norm(tangent)
+    return tuple(Point(curve, point.solution, sign * tangent) for sign in (1.0, -1.0))
+
+
+def mirror_image(orbit_problem: Problem, solution: Solution) -> tuple[Problem, Solution] | None:
+    """The mirror image of an orbit of a symmetric system, itself an orbit half a forcing period later."""
+    signature = orbit_problem.signature
+    if signature.symmetric:
+        return orbit_problem, solution
+    if not signature.sides:
+        return None
+    other = orbit_problem.with_signature(Signature(tuple(-s for s in signature.sides), signature.periods, False, -signature.side))
+    unknowns = solution.unknowns.copy()
+    unknowns[::2] += np.pi
+    found = solve(other, unknowns, solution.values)
+    return None if found is None else (other, found)
