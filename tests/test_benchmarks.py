@@ -166,6 +166,22 @@ def test_a_machine_without_auto_is_told_what_to_install(monkeypatch: pytest.Monk
     assert not (tmp_path / "auto.png").exists()
 
 
+def test_the_report_on_auto_tells_what_is_missing_and_draws_what_is_there(tmp_path: Path) -> None:
+    from auto.picture import draw
+
+    points = diagram.parse(RECORDED.read_text())
+    curve = {"omega": [p.omega for p in points], "amplitude": [p.amplitude for p in points]}
+    names = {"amplitude": 0.5, "sharpness": 1000.0, "mesh": "20 x 4", "timed": None, "curve": curve}
+    rows = [names | verdicts.row(program.Run(points, 1.0), case.KNOWN[0.5])]
+    exact = [{"lowest": 0.2, "fails": "too many impacts"}] * 2
+    results = {"about": {}, "version": "0", "auto": rows, "exact": {"0.5": exact, "1.0": exact}, "curve": curve}
+    text = section.report(results)
+    assert text.count("too many impacts") == 4
+    assert "| 1.00 | 14 | 3e-05, 1e-04 | does not get there | turns round, back at 3 | 6 / 3 / 1 / 0 | 1 |" in text
+    draw(results, tmp_path / "auto.png")
+    assert (tmp_path / "auto.png").stat().st_size > 10_000
+
+
 @pytest.mark.parametrize("amplitude", [0.5, 1.0])
 def test_auto_starts_from_an_orbit_of_period_1(amplitude: float) -> None:
     orbit = case.first_orbit(amplitude)

@@ -59,9 +59,10 @@ def _errors(ax: Any, results: dict[str, Any]) -> None:
         for amplitude in KNOWN:
             points = [(r["sharpness"], max(r["fold_errors"])) for r in rows
                       if r["mesh"] == mesh and r["amplitude"] == amplitude and None not in r["fold_errors"]]  # fmt: skip
-            filled = color if amplitude == SHOWN else "white"
-            ax.plot(*zip(*points, strict=True), color=color, marker=marker, markersize=4, linewidth=0.7,
-                    markerfacecolor=filled, label=mesh if amplitude == SHOWN else None) if points else None  # fmt: skip
+            if points:
+                filled, name = (color, mesh) if amplitude == SHOWN else ("white", None)
+                look = {"color": color, "marker": marker, "markerfacecolor": filled, "markersize": 4, "linewidth": 0.7}
+                ax.plot(*zip(*points, strict=True), label=name, **look)
     ax.set(xscale="log", yscale="log", xlabel=r"$B$", ylabel=r"larger error of the two folds in $\Omega$")
     ax.grid(True, color=FAINT, linewidth=0.4)
     ax.legend(title="mesh", title_fontsize=8)

@@ -21,7 +21,7 @@ from auto.diagram import Point, parse
 
 EQUATIONS = Path(__file__).with_name("smoothed.f90")
 LIMIT = 180.0  # seconds for one run
-MOST_POINTS = 1500
+MOST_POINTS = 800
 TURNED_BACK = HIGHEST + 0.2  # a branch that comes back here has lost its way
 
 

@@ -100,7 +100,7 @@ def _ratio(exact: dict[str, Any], rows: list[dict[str, Any]]) -> str:
         return ""
     texts = []
     for sharpness in dict.fromkeys(row["sharpness"] for row in rows):
-        times = [(row["timed"], row["mesh"]) for row in rows if row["sharpness"] == sharpness and row["arrives"]]
+        times = [(row["timed"], row["mesh"]) for row in rows if row["sharpness"] == sharpness and row["timed"]]
         cells = ", ".join(f"{number(t)} s on {mesh} ({number(t / exact['seconds'])}x)" for t, mesh in sorted(times))
         texts.append(f"* B = {sharpness:g}: {cells or 'no mesh gets there'}")
     return f"From Omega = {HIGHEST:g} to {TIMED:g} saltus takes {number(exact['seconds'])} s; AUTO:\n\n" + "\n".join(texts)
