@@ -46,6 +46,7 @@ def _marks(folds: Any, grazing: Any) -> None:
     known = KNOWN[SHOWN]
     for omega in known.folds:
         folds.axvline(omega, color=FAINT, linewidth=0.6, zorder=0)
+    grazing.set_xticks([0.2844, 0.2848, 0.2852])
     grazing.plot(known.grazing, known.grazing_amplitude, "*", color=INK, markersize=8)
     grazing.annotate(
         "grazing", (known.grazing, known.grazing_amplitude), (-5, -2), textcoords="offset points", ha="right", va="top"
@@ -65,4 +66,5 @@ def _errors(ax: Any, results: dict[str, Any]) -> None:
                 ax.plot(*zip(*points, strict=True), label=name, **look)
     ax.set(xscale="log", yscale="log", xlabel=r"$B$", ylabel=r"larger error of the two folds in $\Omega$")
     ax.grid(True, color=FAINT, linewidth=0.4)
-    ax.legend(title="mesh", title_fontsize=8)
+    ax.legend(title="mesh", title_fontsize=8, loc="lower left", handlelength=1.4)
+    ax.set_ylim(bottom=1e-9)

@@ -9,8 +9,8 @@ from auto.case import HIGHEST, LOWEST, Known
 from auto.diagram import Point
 from auto.program import Run
 
-# abs(mean of theta) / max abs(theta) up to which an orbit counts as symmetric: the coarsest mesh errs by 1.6e-3 where no other
-# orbit is near, and the asymmetric orbits that double here have 3e-3 and more
+# abs(mean of theta) up to which an orbit counts as symmetric: the coarsest mesh errs by 1.4e-3 where no other orbit is near,
+# and the asymmetric orbits that double here have 3e-3 and more
 SYMMETRIC = 2e-3
 NEAR = 1e-2  # relative: a fold farther than this from the exact one is another fold, or none
 NEAR_GRAZING = 2e-3  # in Omega
@@ -29,7 +29,7 @@ def impossible(branch: list[Point]) -> int:
     TR: the product of the multipliers is exp(-C T) < 1, so no pair lies on the unit circle. PD on a symmetric orbit: its
     multipliers are squares of those of the half map, and -1 would be the square of such a pair.
     """
-    return sum(point.kind == "TR" or (point.kind == "PD" and abs(point.mean) < SYMMETRIC * point.amplitude) for point in branch)
+    return sum(point.kind == "TR" or (point.kind == "PD" and abs(point.mean) < SYMMETRIC) for point in branch)
 
 
 def at_grazing(branch: list[Point], known: Known) -> dict[str, Any] | None:
