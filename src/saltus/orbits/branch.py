@@ -16,7 +16,7 @@ from saltus.orbits.newton import solve
 from saltus.orbits.orbit import TOUCH, PeriodicOrbit
 from saltus.orbits.path import Point, start
 from saltus.orbits.problem import Problem
-from saltus.orbits.special import SpecialPoint, UserFunction, asymmetry, grazing, image, located, tests_between
+from saltus.orbits.special import SpecialPoint, UserFunction, asymmetry, grazing, located, parent_point, tests_between
 from saltus.orbits.symmetry import half, keeps_symmetry, whole
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ MOST_IMPACTS = 120  # of one period
 ACCUMULATE = 5  # grazings one after the other that each add impacts, within
 NEARBY = 1e-3  # of the parameter's range: there are infinitely many
 SMALLEST = 1e-7  # amplitude below which an orbit has shrunk to rest
+SAME = 1e-5  # between unknowns of orbits that coincide where both graze
 FAR = 0.3  # share of a step by which its end may differ from its tangent's
 
 
@@ -110,6 +111,7 @@ class _Walk:
     functions: dict[str, UserFunction]
     longest: float
     progress: Callable[[float], object] | None
+    until: str | None = None  # the kind of special point at which to stop
     points: list[Point] = field(default_factory=list)
     special: list[SpecialPoint] = field(default_factory=list)
     reason: str = ""
@@ -134,7 +136,7 @@ class _Walk:
         """The next point, and the length of the step after it."""
         while step > LEAST_STEP:
             ahead = point.curve.solve(point.place + step * point.tangent, point.tangent)
-            if ahead is not None and point.curve.norm(ahead.place - point.place - step * point.tangent) < FAR * step:
+            if ahead is not None and self._on_curve(point, ahead, step):
                 cosine = float(ahead.tangent @ (point.curve.weights**2 * point.tangent))
                 angle = math.acos(min(1.0, max(-1.0, cosine)))
                 if angle < SHARPEST:
@@ -144,23 +146,30 @@ class _Walk:
         self.reason = "the steps shrink to nothing: the branch has a singularity that is none of the known kinds"
         return None, step
 
+    def _on_curve(self, point: Point, ahead: Point, step: float) -> bool:
+        """Whether a step has stayed on its branch: near its tangent, and not on that of the orbits that are their own images."""
+        before, after = asymmetry(point), asymmetry(ahead)
+        if before is not None and after is not None and np.abs(before).max() > 1e-6 > 100.0 * np.abs(after).max():
+            return False
+        return point.curve.norm(ahead.place - point.place - step * point.tangent) < FAR * step
+
     def _take(self, point: Point, ahead: Point, born: bool) -> bool | None:
         """Accept a step, up to the first of a grazing, a bound, the orbit's own image and the closing of the loop.
 
         Returns None for an ordinary step, True after a grazing.
         """
-        graze = located("GR", _grazing, point, ahead) if grazing(ahead) < 0.0 else None
+        graze = located("GR", grazing, point, ahead) if grazing(ahead) < 0.0 else None
         if grazing(ahead) < 0.0 and graze is None:
             self.reason = "a grazing that could not be located"
             return None
         if graze is not None:
             ahead = graze.point
-        turned = self._own_image(point, ahead) if not born else None
-        if turned is not None:
-            ahead, graze = turned.point, None
+        if not born and _passes_image(point, ahead):
+            self._end_at_image(point, ahead)
+            return None
         beyond = self._beyond(point, ahead)
         if beyond is not None:
-            ahead, graze, turned = beyond, None, None
+            ahead, graze = beyond, None
         if len(self.points) > 3 and self._closes(point, ahead):
             self._note(point, self.points[0])
             self.points.append(self.points[0])
@@ -169,10 +178,9 @@ class _Walk:
         if not born:
             self._note(point, ahead)
         self.points.append(ahead)
-        if turned is not None:
-            self.special.append(turned)
-            self.reason = f"meets its own image at a {turned.kind}"
-        elif beyond is not None:
+        if self.reason:
+            return None
+        if beyond is not None:
             self.reason = f"bound {ahead.parameter:g}"
         elif ahead.orbit.amplitude < SMALLEST:
             self.reason = "shrinks to rest"
@@ -188,6 +196,8 @@ class _Walk:
         following = other_side(graze.point)
         if isinstance(following, str):
             self.reason = following
+        elif (shorter := repetition(following)) is not None:
+            self.reason = f"ends at a grazing of the {shorter}"
         elif following.curve.problem.signature.crossings > MOST_IMPACTS:
             self.reason = f"more than {MOST_IMPACTS} impacts a period"
         elif self._accumulates(following):
@@ -214,15 +224,19 @@ class _Walk:
             for s in found
             if not (s.kind == "BPC" and not s.orbit.symmetric and any(abs(s.parameter - p) < 1e-8 for p in folds))
         ]
-        self.special += sorted(found, key=lambda s: a.curve.norm(s.point.place - a.place))
+        for special in sorted(found, key=lambda s: a.curve.norm(s.point.place - a.place)):
+            self.special.append(special)
+            if special.kind == self.until and not self.reason:
+                self.reason = f"the first {special.kind}"
 
-    def _own_image(self, a: Point, b: Point) -> SpecialPoint | None:
-        """Where an orbit becomes its own image, at the branch point that its family comes from."""
-        before, after = asymmetry(a), asymmetry(b)
-        if before is None or after is None or before @ after > 0.0 or np.abs(before).max() < 1e-6:
-            return None
+    def _end_at_image(self, a: Point, b: Point) -> None:
+        """End where the orbit becomes its own image: on the branch that its family was born from, at its BPC or PD."""
         kind = "BPC" if a.curve.problem.signature.periods % 2 else "PD"
-        return located(kind, image(before), a, b)
+        parent = parent_point(kind, a, b)
+        self.reason = f"meets its own image at a {kind}"
+        if parent is not None:
+            self.points.append(parent.point)
+            self.special.append(parent)
 
     def _beyond(self, a: Point, b: Point) -> Point | None:
         """The point on the bound of the parameter that the step goes over."""
@@ -250,8 +264,27 @@ class _Walk:
         return 0.0 < share <= 1.0 and b.curve.norm(along - share * across) < 0.2 * length
 
 
-def _grazing(point: Point) -> float:
-    return grazing(point)
+def _passes_image(a: Point, b: Point) -> bool:
+    """Whether a step goes through an orbit that is its own image."""
+    before, after = asymmetry(a), asymmetry(b)
+    return before is not None and after is not None and bool(before @ after < 0.0) and np.abs(before).max() > 1e-6
+
+
+def repetition(point: Point) -> str | None:
+    """What an orbit is that is another one gone round several times, or its own mirror image; None for one that is not."""
+    signature, n = point.curve.problem.signature, len(point.curve.problem.signature.sides)
+    difference = asymmetry(point)
+    if signature.periods % 2 and difference is not None and np.abs(difference).max() < SAME:
+        return "symmetric orbit"
+    for periods in range(1, signature.periods):
+        part = n * periods // signature.periods
+        if signature.periods % periods or n * periods % signature.periods or part == 0 or signature.symmetric:
+            continue
+        pairs = point.solution.unknowns.reshape(-1, part, 2).copy()
+        pairs[:, :, 0] -= 2.0 * math.pi * periods * np.arange(len(pairs))[:, None]
+        if signature.sides == signature.sides[:part] * len(pairs) and np.ptp(pairs, axis=0).max() < SAME:
+            return f"orbit of period {periods}"
+    return None
 
 
 def separation(problem: Problem, unknowns: np.ndarray, other: Point) -> np.ndarray | None:
@@ -336,9 +369,10 @@ def follow_from(
     origin: str,
     functions: dict[str, UserFunction] | None = None,
     step: float = STEP,
+    until: str | None = None,
 ) -> Branch:
     """The branch that begins at a special point of another one, in the direction of its tangent."""
-    walk = _Walk(bounds, functions or {}, step, None)
+    walk = _Walk(bounds, functions or {}, step, None, until)
     walk.follow(first, born=True)
     return Branch(path, tuple(walk.points), tuple(walk.special), (origin, walk.reason), origin)
 

@@ -25,6 +25,8 @@ KINDS = {
     "LP-GR": "fold and grazing at once",
     "PD-GR": "period doubling and grazing at once",
     "BPC-GR": "symmetry breaking and grazing at once",
+    "LP-PD-GR": "a grazing at which folds and period doublings of the orbits with more impacts both end",
+    "LP-BPC-GR": "the same, with symmetry breakings of symmetric orbits",
     "GR-GR": "two grazings at once",
 }
 
@@ -58,14 +60,22 @@ class CodimensionTwo:
 Test = Callable[["LocusPoint"], float]
 
 
-def tests_of(kind: str) -> list[tuple[str, Test]]:
-    """The test functions along a curve of a kind, by the codimension-two point at which each vanishes."""
-    if kind == "GR":
-        return [("LP-GR", lambda point: determinant(point, 1.0)), ("LP-GR", lambda point: without(point, 1.0)),
-                ("PD-GR", lambda point: determinant(point, -1.0)), ("PD-GR", lambda point: without(point, -1.0))]  # fmt: skip
-    return (
-        [("CP", lambda point: quadratic(point.judged))] if kind == "LP" else [("DBPC" if kind == "BPC" else "GPD", normal_form)]
-    )
+def tests_of(kind: str, symmetric: bool) -> list[tuple[str, Test]]:
+    """The test functions along a curve of a kind, by the codimension-two point at which each vanishes.
+
+    Beside a grazing the trace of the multipliers' matrix of the orbits with more impacts is (a number) / v. Where that number
+    vanishes, both a multiplier +1 and one -1 come as near to the grazing as one likes.
+    """
+    if kind == "LP":
+        return [("CP", lambda point: quadratic(point.judged))]
+    if kind in ("PD", "BPC"):
+        return [("GPD" if kind == "PD" else "DBPC", normal_form)]
+    flip = "BPC" if symmetric else "PD"
+    return [
+        ("LP-GR", lambda point: without(point, 1.0)),
+        (f"{flip}-GR", lambda point: without(point, -1.0)),
+        (f"LP-{flip}-GR", lambda point: determinant(point, 1.0)),
+    ]
 
 
 def normal_form(point: LocusPoint) -> float:
@@ -96,7 +106,7 @@ def determinant(point: LocusPoint, closing: float) -> float:
 
 
 def without(point: LocusPoint, closing: float) -> float:
-    """The same determinant of the orbit on the other side of its grazing, without the impacts that have no speed; 1 if none is."""
+    """The same for the orbit on the other side of the grazing, without the impacts that have no speed; 1 if there is none."""
     other = _removed(cast(Any, point))
     equations = None if isinstance(other, str) else other[0].evaluate(other[1], point.solution.values)
     return 1.0 if equations is None else _scaled(equations.jacobian(closing))
@@ -111,30 +121,26 @@ def located(kind: str, test: Test, a: LocusPoint, b: LocusPoint) -> CodimensionT
     """The point between a and b at which a test function goes through zero; None if the curve cannot be followed between."""
     from scipy.optimize import brentq
 
-    chord, known = b.place - a.place, {0.0: a, 1.0: b}
+    chord, known = b.place - a.place, {0.0: (a, test(a)), 1.0: (b, test(b))}
 
     def value_at(share: float) -> float:
         if share not in known:
             point = a.near(a.place + share * chord, chord)
             if point is None:
                 raise ArithmeticError
-            known[share] = point
-        return test(known[share])
+            known[share] = (point, test(point))
+        return known[share][1]
 
-    before, after = test(a), test(b)
+    before, after = value_at(0.0), value_at(1.0)
     if before * after > 0.0 or not np.isfinite([before, after]).all():
         return None
     try:
         brentq(value_at, 0.0, 1.0, xtol=NARROW, rtol=1e-15)
     except (ArithmeticError, RuntimeError):
         return None
-    values = {share: test(point) for share, point in known.items()}
-    best = min(values, key=lambda share: abs(values[share]))
-    point = known[best]
+    point, value = min(known.values(), key=lambda pair: abs(pair[1]))
     here = point.solution.values
-    sides = [
-        [np.abs(known[s].solution.values - here) for s, v in values.items() if (v > 0) == positive] for positive in (True, False)
-    ]
+    sides = [[np.abs(p.solution.values - here) for p, v in known.values() if (v > 0) == positive] for positive in (True, False)]
     first, second = np.max([np.min(side, axis=0) for side in sides if side], axis=0)
-    evidence = CodimensionTwoEvidence(point.residual, (float(first), float(second)), before, after, values[best])
+    evidence = CodimensionTwoEvidence(point.residual, (float(first), float(second)), before, after, value)
     return CodimensionTwo(kind, (float(here[0]), float(here[1])), point.orbit, evidence, point)

@@ -142,7 +142,8 @@ def cubic(condition: Singular, solution: Solution, judgement: Judgement) -> floa
     """The coefficient of a^3 in the equation of the amplitude a of the orbits born at a PD or BPC, with d scaled to unit length.
 
     They lie on the other side of the parameter where it changes its sign (GPD, DBPC). Perturbed by +-a u + a^2 h / 2, J h =
-    -F_yy u u, over two (half) periods in turn, the part of the equations along +-d is odd in a: its third difference, refined once.
+    -F_yy u u, over two (half) periods in turn, the part of the equations along +-d is odd in a: here its third difference,
+    refined once.
 
     Raises:
         ParameterError: a motion so near to another kind that it cannot be followed at the perturbed orbit.

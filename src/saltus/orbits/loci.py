@@ -111,7 +111,7 @@ class _Walk:
     def _note(self, a: LocusPoint, b: LocusPoint) -> None:
         """Locate the codimension-two points of a step, in order."""
         found = []
-        for kind, test in tests_of(self.kind):
+        for kind, test in tests_of(self.kind, a.orbit.symmetric):
             try:
                 special = located(kind, test, a, b) if test(a) * test(b) < 0.0 else None
             except ParameterError:  # a normal form beside another grazing
@@ -242,8 +242,8 @@ def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[Problem, So
     symmetric = keeps_symmetry(system, paths[0]) and keeps_symmetry(system, paths[1])
     if old.signature.symmetric and not symmetric and special.kind != "LP":
         raise ParameterError(
-            f"{paths[1]} takes away the mirror symmetry on which this {special.kind} rests; change it a little, follow the branch "
-            "again, and continue the special points into which this one splits"
+            f"{paths[1]} takes away the mirror symmetry on which this {special.kind} rests; change it a little, follow the "
+            "branch again, and continue the special points into which this one splits"
         )
     if special.kind == "GR":
         signature, unknowns = _touching(special)

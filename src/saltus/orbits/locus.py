@@ -102,7 +102,7 @@ class LocusPoint:
 
 @dataclass(frozen=True, eq=False)
 class Locus:
-    """A curve of special points in two parameters: its points in order, the codimension-two points, and why it ends on both sides."""
+    """A curve of special points in two parameters: its points in order, its codimension-two points, and why it ends."""
 
     kind: str  # LP, PD, BPC or GR
     paths: tuple[str, str]

@@ -124,8 +124,10 @@ class PeriodicOrbit:
 
     @property
     def admissible(self) -> bool:
-        """Whether it is a motion of the system: every impact has a speed, and the gap is open between them."""
-        return self.clearance > -TOUCH and self.slowest > -TOUCH
+        """Whether it is a motion of the system: every impact has a speed, the next one comes later, the gap is open between."""
+        phases = self._phases
+        in_order = np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.periods)) > -TOUCH
+        return self.clearance > -TOUCH and self.slowest > -TOUCH and bool(in_order.all())
 
     @cached_property
     def margins(self) -> dict[str, float]:
@@ -174,7 +176,8 @@ class PeriodicOrbit:
         if self.signature.sides:  # the motion ends at an impact: before or after it
             ends = [np.abs(np.append(np.atleast_1d(motion.position) - begin, np.abs(motion.velocity) - np.abs(v))).max()
                     for v in (start["velocity"], self.speeds[0])]  # fmt: skip
-            return min(ends) if abs(len(motion.crossings) - self.signature.crossings) <= 1 else math.inf
+            grazes = min(abs(self.clearance), abs(self.slowest)) < TOUCH  # then rounding decides whether there is an impact
+            return min(ends) if grazes or abs(len(motion.crossings) - self.signature.crossings) <= 1 else math.inf
         velocity = np.atleast_1d(motion.velocity) - np.atleast_1d(start["velocity"])
         return float(np.abs(np.concatenate([np.atleast_1d(motion.position) - begin, velocity])).max())
 

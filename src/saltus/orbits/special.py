@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.path import Point
+from saltus.orbits.path import Curve, Point
+from saltus.orbits.signature import Signature
 
+REACHES = 10.0 ** np.arange(-8, -0.9)  # along a parent's branch, until its special point is found between
 NARROW = 1e-15  # bracket, in the step that contains the point
 KINDS = {
     "LP": "fold (limit point)",
@@ -116,18 +118,6 @@ def asymmetry(point: Point) -> np.ndarray | None:
     return np.asarray((halves[1] - halves[0]).ravel())
 
 
-def image(last: np.ndarray | None) -> Test:
-    """How far a point is from being its own image, positive on the side of `last`."""
-
-    def test(point: Point) -> float:
-        difference = asymmetry(point)
-        assert difference is not None
-        assert last is not None
-        return float(difference @ last / np.linalg.norm(last))
-
-    return test
-
-
 def located(kind: str, test: Test, a: Point, b: Point) -> SpecialPoint | None:
     """The point between a and b at which a test function goes through zero; None if the branch cannot be followed between."""
     from scipy.optimize import brentq
@@ -158,6 +148,35 @@ def located(kind: str, test: Test, a: Point, b: Point) -> SpecialPoint | None:
     bracket = max((min(abs(p - point.parameter) for p in side) for side in sides if side), default=0.0)
     evidence = Evidence(point.solution.residual, bracket, before, after, values[best])
     return SpecialPoint(kind, point.orbit, point.parameter, evidence, point)
+
+
+def parent_point(kind: str, a: Point, b: Point) -> SpecialPoint | None:
+    """The special point at which a family was born that passes through an orbit that is its own image, on the parent's branch.
+
+    There the family's own equations are singular; those of the parent, over half of the period, are not.
+    """
+    signature, n = a.curve.problem.signature, len(a.curve.problem.signature.sides)
+    before, after = asymmetry(a), asymmetry(b)
+    assert before is not None
+    assert after is not None
+    length = float(np.linalg.norm(before))
+    share = length / (length + float(np.linalg.norm(after)))
+    place = a.place + share * (b.place - a.place)
+    halves = place[:-1].reshape(2, n // 2, 2).copy()
+    halves[1, :, 0] -= np.pi * signature.periods
+    odd = bool(signature.periods % 2)
+    short = Signature(signature.sides[: n // 2], signature.periods if odd else signature.periods // 2, odd)
+    curve = Curve(a.curve.problem.with_signature(short), a.curve.scale, a.curve.symmetric)
+    guess = np.append(halves.mean(axis=0).ravel(), place[-1])
+    upwards = np.append(np.zeros(curve.problem.size), 1.0)
+    middle = curve.solve_at(guess, upwards)
+    if middle is None:
+        return None
+    for reach in REACHES:
+        ends = [curve.solve(middle.place + sign * reach * middle.tangent, middle.tangent) for sign in (-1.0, 1.0)]
+        if ends[0] is not None and ends[1] is not None and flip(ends[0]) * flip(ends[1]) < 0.0:
+            return located(kind, flip, ends[0], ends[1])
+    return None
 
 
 def tests_between(a: Point, b: Point, functions: dict[str, UserFunction]) -> Iterator[tuple[str, Test]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from saltus.errors import ParameterError
@@ -110,3 +112,50 @@ def mirror_image(orbit_problem: Problem, solution: Solution) -> tuple[Problem, S
     unknowns[::2] += np.pi
     found = solve(other, unknowns, solution.values)
     return None if found is None else (other, found)
+
+
+@dataclass(frozen=True)
+class Cascade:
+    """Period doublings one after the other, and how fast they follow: the ratios tend to Feigenbaum's 4.6692."""
+
+    points: tuple[SpecialPoint, ...]
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Where the period doubles, from q to 2 q, 4 q, ..."""
+        return np.array([point.parameter for point in self.points])
+
+    @property
+    def periods(self) -> np.ndarray:
+        """Of the orbits that double."""
+        return np.array([point.orbit.periods for point in self.points])
+
+    @property
+    def ratios(self) -> np.ndarray:
+        """(p_{n+1} - p_n) / (p_{n+2} - p_{n+1})."""
+        steps = np.diff(self.parameters)
+        return np.asarray(steps[:-1] / steps[1:])
+
+
+def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, longest: int = 32, step: float = STEP) -> Cascade:
+    """The period doublings that follow one, each on the branch born at the one before, up to orbits of `longest` forcing periods.
+
+    It ends early where a doubled branch has no further doubling within the bounds.
+
+    Raises:
+        ParameterError: a special point that is no PD.
+    """
+    if first.kind != "PD":
+        raise ParameterError(f"a cascade begins at a PD, not at a {first.kind}")
+    low, high = check_bounds(bounds)
+    points = [first]
+    while 2 * points[-1].orbit.periods <= longest:
+        start = _doubled(points[-1].point)
+        if start is None:
+            break
+        path = start.curve.problem.paths[0]
+        branch = follow_from(start, path, (low, high), f"PD at {points[-1].parameter:.9g}", None, step, until="PD")
+        if not branch.special or branch.special[-1].kind != "PD" or branch.ends[1] != "the first PD":
+            break
+        points.append(branch.special[-1])
+    return Cascade(tuple(points))
