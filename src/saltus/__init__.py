@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from saltus.config import load_study
     from saltus.errors import MotionError, ParameterError, SaltusError, TraceError
     from saltus.flow import EventKind, Motion, Sensitivities, Stop, capture_speed, sensitivities, simulate, simulate_many
-    from saltus.orbits import Branch, PeriodicOrbit, SpecialPoint, continue_orbit, find_orbit
+    from saltus.orbits import Branch, Locus, PeriodicOrbit, SpecialPoint, continue_orbit, continue_special, find_orbit
     from saltus.systems import (
         EnergyRestitution,
         Harmonic,
@@ -45,7 +45,7 @@ _HOMES = {
         "simulate",
         "simulate_many",
     ),
-    "saltus.orbits": ("Branch", "PeriodicOrbit", "SpecialPoint", "continue_orbit", "find_orbit"),
+    "saltus.orbits": ("Branch", "Locus", "PeriodicOrbit", "SpecialPoint", "continue_orbit", "continue_special", "find_orbit"),
     "saltus.systems": (
         "EnergyRestitution",
         "Harmonic",
@@ -74,6 +74,7 @@ __all__ = [
     "Harmonic",
     "InelasticImpact",
     "Load",
+    "Locus",
     "Metainterface",
     "Model",
     "Motion",
@@ -95,6 +96,7 @@ __all__ = [
     "WallOscillator",
     "capture_speed",
     "continue_orbit",
+    "continue_special",
     "find_orbit",
     "flow",
     "load_study",

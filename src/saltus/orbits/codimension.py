@@ -95,7 +95,7 @@ def room(point: LocusPoint) -> float:
     humps, phases = looks[:, at.HUMP], looks[:, at.HUMP_TIME] * orbit.frequency
     if touching:
         touch = point.solution.unknowns[2 * touching[0]]
-        away = np.abs(np.array([phases - touch, phases - touch - orbit.problem.closing])).min(axis=0)
+        away = np.abs(np.array([phases - touch + turn * orbit.problem.closing for turn in (-1, 0, 1)])).min(axis=0)
         humps = humps[~(away < TOGETHER)]
     return min(CAP, float(speeds.min(initial=np.inf)), float(humps.min(initial=np.inf)))
 
