@@ -33,6 +33,7 @@ ACCUMULATE = 5  # grazings one after the other that each add impacts, within
 NEARBY = 1e-3  # of the parameter's range: there are infinitely many
 SMALLEST = 1e-7  # amplitude below which an orbit has shrunk to rest
 SAME = 1e-5  # between unknowns of orbits that coincide where both graze
+AHEAD = 1e-6  # of a point along its tangent, to tell its direction
 FAR = 0.3  # share of a step by which its end may differ from its tangent's
 
 
@@ -151,6 +152,8 @@ class _Walk:
         before, after = asymmetry(point), asymmetry(ahead)
         if before is not None and after is not None and np.abs(before).max() > 1e-6 > 100.0 * np.abs(after).max():
             return False
+        if grazing(point) <= TOUCH and grazing(ahead) < 0.0:  # born at a grazing, and already over the next one
+            return False
         return point.curve.norm(ahead.place - point.place - step * point.tangent) < FAR * step
 
     def _take(self, point: Point, ahead: Point, born: bool) -> bool | None:
@@ -261,7 +264,17 @@ class _Walk:
         first = np.append(shift, self.points[0].parameter)
         along, across = first - a.place, b.place - a.place
         share = float(along @ (b.curve.weights**2 * across)) / length**2
-        return 0.0 < share <= 1.0 and b.curve.norm(along - share * across) < 0.2 * length
+        if not (0.0 < share <= 1.0 and b.curve.norm(along - share * across) < 0.2 * length):
+            return False
+        return self._goes_as_the_first(shift, b)  # a branch that comes back along itself does not close
+
+    def _goes_as_the_first(self, shift: np.ndarray, b: Point) -> bool:
+        """Whether a point is followed in the direction of the first one, whose unknowns lie nearest to it as `shift`."""
+        first = self.points[0]
+        moved = separation(first.curve.problem, first.solution.unknowns + AHEAD * first.tangent[:-1], b)
+        assert moved is not None
+        direction = np.append((moved - shift) / AHEAD, first.tangent[-1])
+        return float(direction @ (b.curve.weights**2 * b.tangent)) > 0.0
 
 
 def _passes_image(a: Point, b: Point) -> bool:
@@ -344,6 +357,8 @@ def continue_orbit(
         raise ParameterError(f"{path} is not a number, so an orbit cannot be continued along it")
     if not low <= value <= high:
         raise ParameterError(f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range")
+    for bound in (low, high):
+        orbit.system.with_({path: bound})  # refuses bounds beyond what the system allows
     begin, symmetric = along(orbit, path)
     scale = (high - low) / 3.0
     walks = []

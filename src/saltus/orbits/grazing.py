@@ -11,7 +11,7 @@ from saltus.orbits.path import Curve, Point, along_kernel
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 
-PROBES = 10.0 ** -np.arange(2, 8.0)  # along the new branch, until one direction is seen to be admissible
+PROBES = 10.0 ** -np.arange(2, 12.0)  # along the new branch, until one direction is seen to be admissible
 SAME = 1e-7  # between states a period apart: a grazing is located to rounding, but where it touches only to its square root
 TOGETHER = 1e-4  # phase between the two impacts of a pair that vanishes, and their speeds
 

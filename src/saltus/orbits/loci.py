@@ -28,6 +28,7 @@ from saltus.orbits.find import divide
 from saltus.orbits.grazing import TOGETHER, _inserted
 from saltus.orbits.locus import CLOSED, Locus, LocusPoint, Plane
 from saltus.orbits.newton import Solution
+from saltus.orbits.orbit import TOUCH
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.special import SpecialPoint
@@ -288,7 +289,7 @@ def _over_whole_period(problem: Problem, solution: Solution) -> tuple[Problem, S
 def _touching(special: SpecialPoint) -> tuple[Signature, np.ndarray]:
     """The signature with more impacts of the two that meet at a grazing, and the orbit's unknowns in it."""
     point = special.point
-    if not point.orbit.clearance < abs(point.orbit.slowest):
+    if point.orbit.slowest < TOUCH:  # then the touch is an impact of its own, whose gap has its minimum there too
         return point.curve.problem.signature, point.solution.unknowns
     changed = _inserted(point)
     if isinstance(changed, str):
