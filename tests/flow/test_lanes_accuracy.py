@@ -1,4 +1,4 @@
-"""A step in lanes is as exact as one of the scalar kernel: at equal tolerance, and where the last coefficients vanish by symmetry."""
+"""A step in lanes is as exact as one of the scalar kernel, also where the last coefficients vanish by symmetry."""
 
 import math
 from dataclasses import dataclass
@@ -116,7 +116,7 @@ def test_tangents_whose_last_coefficients_vanish_follow_the_lemniscate(tol):
 
 
 def test_energy_drifts_no_more_than_in_the_scalar_kernel():
-    """Over 300 periods, root mean square of eight motions: below 10 tol, and in the mean over tolerances within twice the scalar's."""
+    """Over 300 periods, root mean square of eight motions: below 10 tol, and in the mean within twice the scalar's."""
     system, starts, ratios = driven(C=0.0), np.linspace(0.1, 1.5, 8), []
 
     def energy(theta, velocity):

@@ -144,6 +144,14 @@ def release_columns(where, state, env, model, events, t, origin):
 
 
 @jit
+def motion_end(where, settings):
+    """The time at which the motion ends, as counted from the present forcing period."""
+    if where[VISIT] > 0:
+        return settings[HORIZON]
+    return (where[LAST] - where[PERIOD]) * settings[LENGTH] + settings[END]
+
+
+@jit
 def decide(where, state, settings, env, model, work, steps, events, origin, t_end):
     """At contact: find the next mode. Returns PAUSED to go on, or why the motion ends."""
     q = work[0]
@@ -166,7 +174,7 @@ def decide(where, state, settings, env, model, work, steps, events, origin, t_en
     speed = rate_of(model, float(where[SIDE])) * velocity
     if speed < slow_speed(settings[TOLERANCE]):
         mode, left = accumulation(where, env, model, work, speed, t, origin, settings[TOLERANCE])
-        if mode == REST and where[PERIOD] == where[LAST] and t + left > t_end:
+        if mode == REST and t + left > motion_end(where, settings):
             mode = ARC  # the motion ends before the accumulation does
         if mode == REST:
             record_event(where, events, RESTING, 0, 0, t + left, 0.0, 0.0)

@@ -51,7 +51,7 @@ MEANINGS = {
     "not_finite": "the motion leaves the range of numbers",
     "stalled": "the acceleration is singular",
     "outside": "the state at the start lies beyond the contact",
-    "unresolved": "impacts accumulate too slowly to be followed: more than a million in a forcing period",
+    "unresolved": "impacts accumulate too slowly to be followed: more than a million in a unit of time",
 }
 
 

@@ -24,7 +24,8 @@ VISIT = 17  # whether `advance` returns VISITED as soon as a smooth motion is al
 OWN, COLUMNS = 18, 19  # the model's own coordinates, and the columns of a tangent: DOF = OWN (1 + COLUMNS) are followed
 WHERE = 20  # the length of `where`
 TIME, SPEED, STATE = 0, 1, 2  # in `state`: local time, chatter speed, then DOF coordinates, DOF velocities, COLUMNS shifts
-LENGTH, END, TOLERANCE = 0, 1, 2  # in `settings`: the forcing period, the local time at the end, the tolerance
+LENGTH, END, TOLERANCE = 0, 1, 2  # in `settings`: the forcing period, the local time at the end, the tolerance,
+HORIZON = 3  # and in a visit, which ends before its motion may, the local time at which that does
 
 SAFETY = 0.9  # of a step: its error is then a tenth of tol, and 1000 periods add up to a drift in energy below 1e-12
 GAP = 0.65  # in the log of the radius between the last terms and those before: 0.6 for a sine, more where they vanish

@@ -20,7 +20,8 @@ from saltus.systems import Model, Record, System
 from saltus.systems.checks import check_number
 from saltus.systems.parameters import children, is_number, numbers
 
-MOST_EVENTS = 20_000_000  # beyond this an accumulation of impacts is not being resolved but endured
+MOST_EVENTS = 20_000_000  # that are kept
+MOST_IMPACTS = 1_000_000  # of a unit of time: beyond them an accumulation of impacts is not being resolved but endured
 
 
 @dataclass(frozen=True)
@@ -286,6 +287,7 @@ def _advance(
     """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended."""
     advance, begin = load_kernel(), _global_time(where, state, settings)
     end = where[k.LAST] * settings[k.LENGTH] + settings[k.END]
+    looked_at, counted, unit = begin, 0, min(settings[k.LENGTH] or 1.0, 1.0)
     while True:
         status = advance(where, state, settings, run.env, run.model, recorder.steps, recorder.events)
         recorder.take(where)
@@ -295,10 +297,17 @@ def _advance(
         if status not in (k.FULL, k.PAUSED):
             _refuse(system, status, where, state, settings)
             return status
+        if recorder.total > counted + MOST_IMPACTS:
+            if time < looked_at + unit:
+                raise MotionError(
+                    f"more than {MOST_IMPACTS} impacts from time {looked_at:.6g} to {time:.6g}: they accumulate too slowly to be "
+                    "followed; raise the loss at impact, or ask for a shorter time"
+                )
+            looked_at, counted = time, recorder.total
         if recorder.total > MOST_EVENTS:
             raise MotionError(
-                f"more than {MOST_EVENTS} impacts before time {time:.6g}: they accumulate too slowly to be followed; "
-                "raise the loss at impact, or ask for a shorter time"
+                f"more than {MOST_EVENTS} impacts before time {time:.6g}, too many to be kept; ask for a shorter time, or use "
+                "simulate_many, which only counts them"
             )
 
 

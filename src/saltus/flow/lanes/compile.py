@@ -11,7 +11,7 @@ from saltus.flow import layout as scalar_layout
 from saltus.flow import records, roots
 from saltus.flow.compile import Pointer, body, is_compiled, load_module, module_name
 from saltus.flow.emit import Emitter
-from saltus.flow.lanes import alone, driver, layout, observe, steps, straight, vector, visits
+from saltus.flow.lanes import alone, driver, layout, legs, observe, steps, straight, vector, visits
 from saltus.flow.lanes.straight import Slots
 from saltus.flow.trace import Trace
 
@@ -38,7 +38,7 @@ def load_driver() -> Callable[..., None]:
 
 
 def _driver_text() -> str:
-    return "".join(body(text) for text in (scalar_layout, layout, records, steps, observe, driver))
+    return "".join(body(text) for text in (scalar_layout, layout, records, steps, observe, legs, driver))
 
 
 def compile_driver_aside() -> subprocess.Popen[bytes] | None:

@@ -1,6 +1,6 @@
 """Many trajectories at once: a group of lanes, each with its own time, step, side and parameters, refilled as they end.
 
-The texts of `layout.py`, `steps.py`, `observe.py` and this file are compiled as one, with `flow/layout.py` and `flow/records.py`,
+The texts of `layout.py`, `steps.py`, `observe.py`, `legs.py` and this file are compiled as one, with two of `flow`,
 once for every model, for the width of this machine's registers. What a structure adds, `code`, comes through
 pointers: `lane_series`, `lane_impact`, `lane_field` (see `straight.py`), and the scalar `constants` and `geometry`.
 
@@ -10,7 +10,7 @@ gap; Newton's method in the lanes whose gap is concave and negative at the end; 
 from the start of that step. No lane sees another one, so results depend neither on the width nor on the order.
 
 `m` is the lanes' memory, in slots of one vector (`layout.py`). `jobs` and `results` are arrays with a row for each
-trajectory. `flags` = [lanes that hold a trajectory, lanes whose gap is zero at the start of the step, lanes not in an arc].
+trajectory. `flags` holds bits of lanes: see `layout.py`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ import numpy as np
 from saltus.flow.jit import inline_jit, lean_jit
 from saltus.flow.jit import not_here as cached_jit
 from saltus.flow.lanes.layout import *
-from saltus.flow.lanes.observe import LONGEST_CYCLE, cycle_length, watch_range
+from saltus.flow.lanes.legs import arrive, begin_records, fill, finish, sizes_rows, unresolved
+from saltus.flow.lanes.observe import LONGEST_CYCLE, watch_range
 from saltus.flow.lanes.signatures import RUN_LANES
 from saltus.flow.lanes.steps import *
 from saltus.flow.lanes.vector import *
@@ -31,191 +32,7 @@ from saltus.flow.records import anchor, expand_record
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-AWAKE, AT_CONTACT, PARKED = 0, 1, 2  # in `flags`
 FAST = 1e300  # a state beyond this has left the range of numbers
-
-
-@lean_jit
-def fill(lane, i, code, sizes, at, m, flags, lanes, jobs, tables):
-    """Put trajectory i into a lane."""
-    state, numbers, labels, parameters = jobs
-    where, gauge, constants, geometry, _, streak = lanes
-    where[lane, IDENT], where[lane, LEG], where[lane, LAST_LEG] = i, labels[i, 0], labels[i, 1]
-    where[lane, FORCED_SIDE], where[lane, PIECE_NOW] = labels[i, 2], labels[i, 3]
-    where[lane, HELD_NOW] = where[lane, SKIP_NOW] = where[lane, COUNT] = where[lane, TOUCHES] = where[lane, LEGS_DONE] = 0
-    gauge[lane, PERIOD_LENGTH], gauge[lane, END_TIME], gauge[lane, CHATTER_NOW] = numbers[i, 1], numbers[i, 2], 0.0
-    gauge[lane, TOP], gauge[lane, BOTTOM], gauge[lane, SLOWEST] = -np.inf, np.inf, np.inf
-    gauge[lane, LEG_START] = numbers[i, 0]
-    streak[lane, :] = 0
-    env = (parameters[i], constants[lane], tables[0], tables[1])
-    code[3](parameters[i], constants[lane])
-    code[4](env, geometry[lane])
-    half = state.shape[1] // 2
-    for row in range(half):
-        m[(at[POSITION] + row) * WIDTH + lane], m[(at[VELOCITY] + row) * WIDTH + lane] = state[i, row], state[i, half + row]
-    for j in range(parameters.shape[1]):
-        m[(at[PARAMETERS] + j) * WIDTH + lane] = parameters[i, j]
-    for j in range(constants.shape[1]):
-        m[(at[CONSTANTS_AT] + j) * WIDTH + lane] = constants[lane, j]
-    for j in range(3):
-        m[(POINT + j) * WIDTH + lane] = geometry[lane, j]
-    m[NOW * WIDTH + lane], m[CAPTURE * WIDTH + lane] = numbers[i, 0], numbers[i, 3]
-    bit = 1 << lane
-    flags[AWAKE] |= bit
-    flags[AT_CONTACT] &= ~bit
-    where[lane, MODE_NOW], side = begin_mode(sizes[SIDED], state[i, 0], state[i, half], geometry[lane])
-    m[SIDE_NOW * WIDTH + lane] = float(side)
-    flags[PARKED] = flags[PARKED] & ~bit if where[lane, MODE_NOW] == ARC else flags[PARKED] | bit
-    begin_leg(lane, m, lanes, tables)
-
-
-@lean_jit
-def begin_mode(sides, position, velocity, geometry):
-    """The mode and the side of a state, as `simulation.py` chooses them; the mode BEYOND is no state of the model."""
-    if sides == 0:
-        return ARC, 1
-    into, open_side, pressed = 0, 0, False
-    for i in range(sides):
-        side, rate = 1 - 2 * i, geometry[1 + i]
-        gap = rate * (position - geometry[0])
-        if gap > 0.0 and open_side == 0:
-            open_side = side
-        pressed = pressed or gap < 0.0
-        if rate * velocity > 0.0 and into == 0:
-            into = side
-    if open_side != 0:
-        return ARC, open_side
-    if pressed:
-        return BEYOND, 1
-    if velocity == 0.0:
-        return CONTACT, 1
-    return (CONTACT, into) if into != 0 else (ARC, 1)
-
-
-@inline_jit
-def leg_end(lane, lanes):
-    """The local time at which a leg ends: a forcing period after it began, or with the motion."""
-    where, gauge = lanes[0], lanes[1]
-    if where[lane, LEG] == where[lane, LAST_LEG]:
-        return gauge[lane, END_TIME]
-    return gauge[lane, LEG_START] + gauge[lane, PERIOD_LENGTH]
-
-
-@inline_jit
-def begin_leg(lane, m, lanes, tables):
-    """Set where a lane's next stop is: the end of its forcing period, of its motion, or a breakpoint of the records."""
-    where, breaks = lanes[0], tables[0]
-    origin, target = where[lane, LEG] * lanes[1][lane, PERIOD_LENGTH], leg_end(lane, lanes)
-    piece = where[lane, PIECE_NOW]
-    while piece < breaks.size and breaks[piece] - origin <= m[NOW * WIDTH + lane]:
-        piece += 1
-    where[lane, PIECE_NOW] = piece
-    if piece < breaks.size:
-        target = min(target, breaks[piece] - origin)
-    m[ORIGIN * WIDTH + lane], m[TARGET * WIDTH + lane] = origin, target
-
-
-@inline_jit
-def begin_records(lane, at, m):
-    """Start what is recorded of a forcing period, with the position at its beginning."""
-    x = m[at[POSITION] * WIDTH + lane]
-    m[HIGHEST * WIDTH + lane], m[LOWEST * WIDTH + lane] = x, x
-    m[LEAST * WIDTH + lane], m[CROSSINGS * WIDTH + lane] = np.inf, 0.0
-
-
-@inline_jit
-def keep_sample(lane, sizes, at, m, lanes, results):
-    """Keep the state and what happened since the leg began, in the ring of the last samples."""
-    where, own = lanes[0], sizes[MODEL_ROWS]
-    row = results[3][where[lane, IDENT], where[lane, LEGS_DONE] % sizes[LAST_KEPT]]
-    for d in range(own):
-        row[d], row[own + d] = m[(at[POSITION] + d) * WIDTH + lane], m[(at[VELOCITY] + d) * WIDTH + lane]
-    for j in range(4):
-        row[2 * own + j] = m[(HIGHEST + j) * WIDTH + lane]
-    total_up(lane, at, m, lanes)
-    where[lane, LEGS_DONE] += 1
-
-
-@inline_jit
-def end_leg(lane, sizes, at, m, lanes, results):
-    """Keep a leg that is over; the length of the cycle that the trajectory has settled on, or 0."""
-    where, gauge, _, _, ring, streak = lanes
-    keep_sample(lane, sizes, at, m, lanes, results)
-    if sizes[SETTLE] == 0:
-        return 0
-    legs, own = where[lane, LEGS_DONE], sizes[MODEL_ROWS]
-    here = legs % (2 * LONGEST_CYCLE)
-    for d in range(own):
-        ring[lane, here, d], ring[lane, here, own + d] = (
-            m[(at[POSITION] + d) * WIDTH + lane],
-            m[(at[VELOCITY] + d) * WIDTH + lane],
-        )
-    if where[lane, MODE_NOW] == CHATTER:
-        ring[lane, here, own] = gauge[lane, CHATTER_NOW]
-    return cycle_length(ring[lane], streak[lane], legs, own)
-
-
-@inline_jit
-def total_up(lane, at, m, lanes):
-    """Add what was recorded of a forcing period to what is recorded of the trajectory, and start anew."""
-    where, gauge = lanes[0], lanes[1]
-    where[lane, COUNT] += int(m[CROSSINGS * WIDTH + lane])
-    gauge[lane, TOP], gauge[lane, BOTTOM] = (
-        max(gauge[lane, TOP], m[HIGHEST * WIDTH + lane]),
-        min(gauge[lane, BOTTOM], m[LOWEST * WIDTH + lane]),
-    )
-    gauge[lane, SLOWEST] = min(gauge[lane, SLOWEST], m[LEAST * WIDTH + lane])
-    begin_records(lane, at, m)
-
-
-@inline_jit
-def arrive(lane, sizes, at, m, lanes, tables, results):
-    """At the end of a leg or at a breakpoint: go on. Returns DONE, SETTLED, or PAUSED, and the length of the cycle."""
-    where, gauge = lanes[0], lanes[1]
-    leg, now, start = where[lane, LEG], m[NOW * WIDTH + lane], gauge[lane, LEG_START]
-    last, t_end = leg == where[lane, LAST_LEG], leg_end(lane, lanes)
-    if now >= t_end:
-        if last and t_end <= start and where[lane, LEGS_DONE] > 0:  # the end of whole periods: there is nothing to record
-            return DONE, 0
-        cycle = end_leg(lane, sizes, at, m, lanes, results)
-        if last:
-            return DONE, 0
-        if cycle > 0:
-            return SETTLED, cycle
-        where[lane, LEG] = leg + 1
-        m[NOW * WIDTH + lane] = start + (now - t_end)
-    begin_leg(lane, m, lanes, tables)
-    return PAUSED, 0
-
-
-@lean_jit
-def finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results):
-    """Write the end of a lane's trajectory; the lane is free."""
-    where, gauge = lanes[0], lanes[1]
-    state, numbers, labels, _ = results
-    i, half = where[lane, IDENT], state.shape[1] // 2
-    part = m[NOW * WIDTH + lane] > gauge[lane, LEG_START] or m[CROSSINGS * WIDTH + lane] > 0.0 or where[lane, LEGS_DONE] == 0
-    if part and reason != DONE and reason != SETTLED and reason != OUTSIDE:  # it ends within a leg
-        keep_sample(lane, sizes, at, m, lanes, results)
-    total_up(lane, at, m, lanes)
-    for row in range(half):
-        state[i, row], state[i, half + row] = m[(at[POSITION] + row) * WIDTH + lane], m[(at[VELOCITY] + row) * WIDTH + lane]
-    numbers[i, 0], numbers[i, 1] = m[NOW * WIDTH + lane], gauge[lane, CHATTER_NOW]
-    numbers[i, 2], numbers[i, 3], numbers[i, 4] = gauge[lane, TOP], gauge[lane, BOTTOM], gauge[lane, SLOWEST]
-    if sizes[COLUMN_COUNT] > 0 and where[lane, MODE_NOW] == ARC:  # how fast the state changes at the end
-        store(m, NEW_TIME, load(m, NOW))
-        for row in range(2 * sizes_rows(at)):
-            store(m, at[NEW_POSITION] + row, load(m, at[POSITION] + row))
-        code[2](m)
-        for row in range(sizes[MODEL_ROWS]):
-            numbers[i, 5 + row] = m[(at[AFTER_VELOCITY] + row) * WIDTH + lane]
-        for j in range(sizes[COLUMN_COUNT]):
-            numbers[i, 5 + sizes[MODEL_ROWS] + j] = m[(at[AFTER_POSITION] + j) * WIDTH + lane]
-    labels[i, 0], labels[i, 1], labels[i, 2] = reason, detail, where[lane, MODE_NOW]
-    labels[i, 3], labels[i, 4] = int(m[SIDE_NOW * WIDTH + lane]), where[lane, LEG]
-    labels[i, 5], labels[i, 6], labels[i, 7] = where[lane, COUNT], where[lane, TOUCHES], where[lane, LEGS_DONE]
-    flags[AWAKE] &= ~(1 << lane)
-    flags[PARKED] &= ~(1 << lane)
 
 
 @lean_jit
@@ -235,7 +52,7 @@ def expand_records(sizes, at, m, flags, lanes, tables, row):
 def propose(code, sizes, at, m, flags, settings, helpers, poly, gap):
     """The step of every lane up to its first contact, put at NEW_*. Returns (bits that hit, bits to visit, h, tau, bend)."""
     order, tol = sizes[LANE_ORDER], settings[TOLERANCE]
-    code[0](m, order)
+    code[SERIES_CODE](m, order)
     natural, size = natural_step(m, at, sizes, math.log2(tol))
     now, target = load(m, NOW), load(m, TARGET)
     h = minimum(natural, target - now)
@@ -264,12 +81,6 @@ def propose(code, sizes, at, m, flags, settings, helpers, poly, gap):
     return hit & sound & alive, alive & ~sound, h, tau, bend
 
 
-@lean_jit
-def sizes_rows(at):
-    """How many coordinates there are, those of the sensitivities included."""
-    return at[VELOCITY] - at[POSITION]
-
-
 @inline_jit
 def meet(sizes, at, m, flags, h, start, x, v, a, bend, alive, helpers, poly, gap):
     """Which of the lanes in `alive` meet the contact within the step, which are in doubt, and when."""
@@ -293,7 +104,7 @@ def meet(sizes, at, m, flags, h, start, x, v, a, bend, alive, helpers, poly, gap
         for lane in range(WIDTH):
             if (unclear >> lane) & 1:
                 at_start = vector_lane(g0, lane)
-                root = helpers[0](
+                root = helpers[ROOT_ALONE](
                     m,
                     at[POSITIONS],
                     order,
@@ -317,7 +128,7 @@ def meet(sizes, at, m, flags, h, start, x, v, a, bend, alive, helpers, poly, gap
 @inline_jit
 def strike(code, sizes, at, m, settings, hit):
     """Impacts at the new state. Returns (bits that went through, bits to visit, bits that are captured)."""
-    code[1](m)
+    code[IMPACT_CODE](m)
     before, after = load(m, at[NEW_VELOCITY]), load(m, at[AFTER_VELOCITY])
     up, down = load(m, RATE_UP), load(m, RATE_DOWN)
     old = select(mask(bits(load(m, SIDE_NOW) > 0.0)), up, down)
@@ -367,8 +178,8 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
     constants_count = at[RECORDS] - at[CONSTANTS_AT]
     own = sizes[MODEL_ROWS]
     lanes = (
-        np.zeros((WIDTH, 11), dtype=np.int64),
-        np.zeros((WIDTH, 7)),
+        np.zeros((WIDTH, LANE_LABELS), dtype=np.int64),
+        np.zeros((WIDTH, GAUGES)),
         np.zeros((WIDTH, constants_count)),
         np.zeros((WIDTH, 3)),
         np.zeros((WIDTH, 2 * LONGEST_CYCLE, 2 * own)),
@@ -392,18 +203,18 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
         if arrived == 0:
             if sizes[RECORD_ROWS] > 0:
                 expand_records(sizes, at, m, flags, lanes, tables, poly)
-            away, captured, endless = flags[PARKED], 0, 0
+            away, captured, looking = flags[PARKED], 0, 0
             if flags[AWAKE] != flags[PARKED]:
                 doubtful, captured = fly(code, sizes, at, m, flags, settings, helpers, poly, gap)
                 away |= doubtful
-                endless = bits(load(m, CROSSINGS) > MOST_IMPACTS) & flags[AWAKE]
-            for lane in range(WIDTH if away | captured | endless else 0):
-                if (endless >> lane) & 1:
+                looking = bits(load(m, CROSSINGS) > load(m, NEXT_LOOK)) & flags[AWAKE]
+            for lane in range(WIDTH if away | captured | looking else 0):
+                if (looking >> lane) & 1 and unresolved(lane, m, lanes[1]):
                     finish(lane, UNRESOLVED, 0, code, sizes, at, m, flags, lanes, results)
                 elif (captured >> lane) & 1:
                     finish(lane, CAPTURED, 0, code, sizes, at, m, flags, lanes, results)
                 elif (away >> lane) & 1:
-                    reason, detail = helpers[2](
+                    reason, detail = helpers[VISIT_ALONE](
                         lane, scalar, sizes, at, m, flags, settings, lanes, jobs[3], tables, poly, control
                     )
                     if reason != PAUSED:

@@ -11,7 +11,8 @@ from __future__ import annotations
 NOW, ORIGIN, SIDE_NOW, NEW_TIME, NEW_SIDE, TARGET = 0, 1, 2, 3, 4, 5
 POINT, RATE_UP, RATE_DOWN, CAPTURE = 6, 7, 8, 9
 HIGHEST, LOWEST, LEAST, CROSSINGS = 10, 11, 12, 13
-FIRST_PLACE = 14
+NEXT_LOOK = 14  # at this many impacts of a leg the clock is looked at
+FIRST_PLACE = 15
 # Then, from the slots that `at` lists, as many as the structure needs.
 POSITION, VELOCITY, NEW_POSITION, NEW_VELOCITY, AFTER_POSITION, AFTER_VELOCITY = 0, 1, 2, 3, 4, 5
 PARAMETERS, CONSTANTS_AT, RECORDS, POSITIONS, VELOCITIES, ACCELERATIONS, MARGINS, END_OF_MEMORY = 6, 7, 8, 9, 10, 11, 12, 13
@@ -24,6 +25,7 @@ MODEL_ROWS, COLUMN_COUNT, STOP_ROWS, SIDED, BENDS, RECORD_ROWS = 0, 1, 2, 3, 4, 
 LANE_ORDER, SCALAR_ORDER, WORKSPACE, LAST_KEPT, WATCH, SETTLE = 6, 7, 8, 9, 10, 11
 
 SHORTEST_STEP, SLOWEST_IMPACT = 3, 4  # in `settings`, after those of `layout.py`
+SETTINGS, SIZES = 5, 12  # the lengths of `settings` and `sizes`
 
 # For each lane: in `lane`, and in `gauge`.
 IDENT, LEG, LAST_LEG, PIECE_NOW, MODE_NOW, HELD_NOW, SKIP_NOW, FORCED_SIDE, COUNT, TOUCHES, LEGS_DONE = (
@@ -39,11 +41,17 @@ IDENT, LEG, LAST_LEG, PIECE_NOW, MODE_NOW, HELD_NOW, SKIP_NOW, FORCED_SIDE, COUN
     9,
     10,
 )
-PERIOD_LENGTH, END_TIME, CHATTER_NOW, TOP, BOTTOM, SLOWEST, LEG_START = 0, 1, 2, 3, 4, 5, 6
+LANE_LABELS = 11  # the length of a row of `lane`
+PERIOD_LENGTH, END_TIME, CHATTER_NOW, TOP, BOTTOM, SLOWEST, LEG_START, LOOKED_AT = 0, 1, 2, 3, 4, 5, 6, 7
+GAUGES = 8  # and of `gauge`
+
+AWAKE, AT_CONTACT, PARKED = 0, 1, 2  # in `flags`: bits of the lanes that hold a trajectory, that start at contact, not in an arc
+ROOT_ALONE, TURNS_ALONE, VISIT_ALONE = 0, 1, 2  # in `helpers`: what is done for one lane at a time
+SERIES_CODE, IMPACT_CODE, FIELD_CODE, CONSTANTS_CODE, GEOMETRY_CODE = 0, 1, 2, 3, 4  # in `code`: the functions of a structure
 
 # Why a trajectory ended, after the reasons of `layout.py` (DONE, NOT_UNIQUE, NO_IMPACT, NOT_FINITE, STALLED, LIMITED).
 CAPTURED, SETTLED, OUTSIDE, UNRESOLVED = 9, 10, 11, 12
 BEYOND = 4  # a mode after those of `flow/layout.py`: on no side of the contact
 
-MOST_IMPACTS = 1e6  # of a forcing period: beyond them an accumulation is not being resolved but endured
+MOST_IMPACTS = 1e6  # of a unit of time, or of a shorter forcing period: beyond, an accumulation is not resolved but endured
 NO_ROOT, TOUCH = -1.0, -2.0  # instead of the time of a lane's root

@@ -64,7 +64,7 @@ def watch_range(m, at, sizes, h, tau, bend, chosen, helpers, poly, gap):
             if (unclear >> lane) & 1:
                 for k in range(order + 1):
                     gap[k] = m[(at[POSITIONS] + k) * WIDTH + lane]
-                above, below = helpers[1](gap, order, vector_lane(tau, lane), poly)
+                above, below = helpers[TURNS_ALONE](gap, order, vector_lane(tau, lane), poly)
                 m[HIGHEST * WIDTH + lane] = max(m[HIGHEST * WIDTH + lane], above)
                 m[LOWEST * WIDTH + lane] = min(m[LOWEST * WIDTH + lane], below)
 

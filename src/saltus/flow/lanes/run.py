@@ -135,12 +135,12 @@ class Lanes:
         structure, order = self.program.structure, lane_order(self.tol)
         module, scalar = structure.module, structure.functions
         code = (*self.functions, Pointer(module.constants), Pointer(module.geometry))
-        sizes = np.zeros(12, dtype=np.int64)
+        sizes = np.zeros(at.SIZES, dtype=np.int64)
         sizes[[at.MODEL_ROWS, at.COLUMN_COUNT, at.STOP_ROWS]] = module.OWN, module.COLUMNS, module.STOPS
         sizes[[at.SIDED, at.BENDS, at.RECORD_ROWS]] = module.SIDES, module.STEEP, self.slots.records
         sizes[[at.LANE_ORDER, at.SCALAR_ORDER, at.WORKSPACE]] = order, taylor_order(self.tol), module.ROWS
         sizes[[at.LAST_KEPT, at.WATCH, at.SETTLE]] = self.kept, self.watch, self.settle
-        settings = np.zeros(5)
+        settings = np.zeros(at.SETTINGS)
         settings[k.TOLERANCE], settings[at.SHORTEST_STEP] = self.tol, k.SHORTEST
         settings[at.SLOWEST_IMPACT] = max(k.SLOW * math.sqrt(self.tol), k.CHATTER_SPEED)
         places = np.array(list(self.slots.places.values()), dtype=np.int64)

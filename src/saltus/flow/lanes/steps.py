@@ -211,7 +211,7 @@ def series_true(code, m, at, sizes, tol, h, size):
 
     The new state must be in place. See `steps.leaps`.
     """
-    code[2](m)
+    code[FIELD_CODE](m)
     defect = splat(0.0)
     for row in range(sizes[MODEL_ROWS]):
         series, slope = at[ACCELERATIONS] + row * STRIDE, splat(0.0)

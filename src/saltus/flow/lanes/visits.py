@@ -25,10 +25,10 @@ def depart(lane, sizes, at, m, flags, settings, lanes):
     """The scalar kernel's state for a lane: counters, numbers and settings (see `kernel.py`)."""
     own, gauge = lanes[0][lane], lanes[1][lane]
     rows = at[VELOCITY] - at[POSITION]
-    where, state, limits = np.zeros(WHERE, dtype=np.int64), np.zeros(2 + 2 * rows + sizes[COLUMN_COUNT]), np.zeros(3)
+    where, state, limits = np.zeros(WHERE, dtype=np.int64), np.zeros(2 + 2 * rows + sizes[COLUMN_COUNT]), np.zeros(4)
     where[PERIOD], where[LAST], where[MODE], where[HELD] = own[LEG], own[LEG], own[MODE_NOW], own[HELD_NOW]
     where[SIDE], where[PIECE], where[FORCED] = int(m[SIDE_NOW * WIDTH + lane]), own[PIECE_NOW], own[FORCED_SIDE]
-    where[SKIP] = (flags[1] >> lane) & 1 if own[MODE_NOW] == ARC else own[SKIP_NOW]
+    where[SKIP] = (flags[AT_CONTACT] >> lane) & 1 if own[MODE_NOW] == ARC else own[SKIP_NOW]
     where[ORDER], where[DENSE], where[VISIT] = sizes[SCALAR_ORDER], sizes[WATCH], 1
     where[DOF], where[STOPS], where[ROWS] = rows, sizes[STOP_ROWS], sizes[WORKSPACE]
     where[SIDES], where[STEEP] = sizes[SIDED], sizes[BENDS]
@@ -39,6 +39,7 @@ def depart(lane, sizes, at, m, flags, settings, lanes):
         state[STATE + rows + row] = m[(at[VELOCITY] + row) * WIDTH + lane]
     limits[LENGTH], limits[TOLERANCE] = gauge[PERIOD_LENGTH], settings[TOLERANCE]
     limits[END] = gauge[END_TIME] if own[LEG] == own[LAST_LEG] else gauge[LEG_START] + gauge[PERIOD_LENGTH]
+    limits[HORIZON] = (own[LAST_LEG] - own[LEG]) * gauge[PERIOD_LENGTH] + gauge[END_TIME]
     return where, state, limits
 
 
@@ -72,8 +73,21 @@ def come_back(lane, sizes, at, m, flags, lanes, where, state):
         m[(at[POSITION] + row) * WIDTH + lane] = state[STATE + row]
         m[(at[VELOCITY] + row) * WIDTH + lane] = state[STATE + rows + row]
     arc = where[MODE] == ARC and where[SKIP] <= 1
-    flags[2] = flags[2] & ~bit if arc else flags[2] | bit
-    flags[1] = flags[1] | bit if arc and where[SKIP] == 1 else flags[1] & ~bit
+    flags[PARKED] = flags[PARKED] & ~bit if arc else flags[PARKED] | bit
+    flags[AT_CONTACT] = flags[AT_CONTACT] | bit if arc and where[SKIP] == 1 else flags[AT_CONTACT] & ~bit
+
+
+@lean_jit
+def is_captured(where, state, model, threshold):
+    """Whether it is at rest, or at the contact with a speed of the gap below the one that is proved to be captured."""
+    if where[MODE] == REST:
+        return threshold > 0.0
+    if where[MODE] == CHATTER:
+        return state[SPEED] < threshold
+    if where[MODE] != ARC or where[SKIP] != 1:
+        return False
+    rate = model[4][1] if where[SIDE] > 0 else model[4][2]
+    return rate * state[STATE + where[DOF]] < threshold
 
 
 @cached_jit(VISIT_LANE)
@@ -98,14 +112,10 @@ def visit(lane, scalar, sizes, at, m, flags, settings, lanes, parameters, tables
         detail = note(lane, where, m, lanes, steps, events, sizes, poly)
         if (reason != FULL and reason != PAUSED) or control[0] != 0:
             break
-        if m[CROSSINGS * WIDTH + lane] > MOST_IMPACTS:
-            reason = UNRESOLVED
-            break
     come_back(lane, sizes, at, m, flags, lanes, where, state)
     for j in range(sizes[COLUMN_COUNT]):  # how the time of a last event moves, for `finish`
         m[(at[AFTER_POSITION] + j) * WIDTH + lane] = state[STATE + 2 * where[DOF] + j]
     gauge[lane, CHATTER_NOW] = state[SPEED] if where[MODE] == CHATTER else 0.0
     if reason in (DONE, VISITED, FULL, PAUSED):
-        captured = where[MODE] == REST and m[CAPTURE * WIDTH + lane] > 0.0
-        return CAPTURED if captured else PAUSED, 0
+        return CAPTURED if is_captured(where, state, model, m[CAPTURE * WIDTH + lane]) else PAUSED, 0
     return reason, detail

@@ -1,0 +1,216 @@
+"""A trajectory in its lane: how it gets there, goes from one forcing period to the next, and leaves.
+
+`lanes` = (lane, gauge, constants, geometry, ring, streak): for each lane counters and numbers (see `layout.py`), the structure's
+constants and contact, its last states, and how long each cycle has lasted. This text is compiled together with the lanes (see
+`driver.py`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.flow.jit import inline_jit, lean_jit
+from saltus.flow.lanes.layout import *
+from saltus.flow.lanes.observe import LONGEST_CYCLE, cycle_length
+from saltus.flow.lanes.vector import *
+from saltus.flow.layout import *
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@lean_jit
+def sizes_rows(at):
+    """How many coordinates there are, those of the sensitivities included."""
+    return at[VELOCITY] - at[POSITION]
+
+
+@lean_jit
+def fill(lane, i, code, sizes, at, m, flags, lanes, jobs, tables):
+    """Put trajectory i into a lane."""
+    state, numbers, labels, parameters = jobs
+    where, gauge, constants, geometry, _, streak = lanes
+    where[lane, IDENT], where[lane, LEG], where[lane, LAST_LEG] = i, labels[i, 0], labels[i, 1]
+    where[lane, FORCED_SIDE], where[lane, PIECE_NOW] = labels[i, 2], labels[i, 3]
+    where[lane, HELD_NOW] = where[lane, SKIP_NOW] = where[lane, COUNT] = where[lane, TOUCHES] = where[lane, LEGS_DONE] = 0
+    gauge[lane, PERIOD_LENGTH], gauge[lane, END_TIME], gauge[lane, CHATTER_NOW] = numbers[i, 1], numbers[i, 2], 0.0
+    gauge[lane, TOP], gauge[lane, BOTTOM], gauge[lane, SLOWEST] = -np.inf, np.inf, np.inf
+    gauge[lane, LEG_START] = gauge[lane, LOOKED_AT] = numbers[i, 0]
+    streak[lane, :] = 0
+    env = (parameters[i], constants[lane], tables[0], tables[1])
+    code[CONSTANTS_CODE](parameters[i], constants[lane])
+    code[GEOMETRY_CODE](env, geometry[lane])
+    half = state.shape[1] // 2
+    for row in range(half):
+        m[(at[POSITION] + row) * WIDTH + lane], m[(at[VELOCITY] + row) * WIDTH + lane] = state[i, row], state[i, half + row]
+    for j in range(parameters.shape[1]):
+        m[(at[PARAMETERS] + j) * WIDTH + lane] = parameters[i, j]
+    for j in range(constants.shape[1]):
+        m[(at[CONSTANTS_AT] + j) * WIDTH + lane] = constants[lane, j]
+    for j in range(3):
+        m[(POINT + j) * WIDTH + lane] = geometry[lane, j]
+    m[NOW * WIDTH + lane], m[CAPTURE * WIDTH + lane] = numbers[i, 0], numbers[i, 3]
+    bit = 1 << lane
+    flags[AWAKE] |= bit
+    flags[AT_CONTACT] &= ~bit
+    where[lane, MODE_NOW], side = begin_mode(sizes[SIDED], state[i, 0], state[i, half], geometry[lane])
+    m[SIDE_NOW * WIDTH + lane] = float(side)
+    flags[PARKED] = flags[PARKED] & ~bit if where[lane, MODE_NOW] == ARC else flags[PARKED] | bit
+    begin_leg(lane, m, lanes, tables)
+
+
+@lean_jit
+def begin_mode(sides, position, velocity, geometry):
+    """The mode and the side of a state, as `simulation.py` chooses them; the mode BEYOND is no state of the model."""
+    if sides == 0:
+        return ARC, 1
+    into, open_side, pressed = 0, 0, False
+    for i in range(sides):
+        side, rate = 1 - 2 * i, geometry[1 + i]
+        gap = rate * (position - geometry[0])
+        if gap > 0.0 and open_side == 0:
+            open_side = side
+        pressed = pressed or gap < 0.0
+        if rate * velocity > 0.0 and into == 0:
+            into = side
+    if open_side != 0:
+        return ARC, open_side
+    if pressed:
+        return BEYOND, 1
+    if velocity == 0.0:
+        return CONTACT, 1
+    return (CONTACT, into) if into != 0 else (ARC, 1)
+
+
+@lean_jit
+def unresolved(lane, m, gauge):
+    """Whether the last MOST_IMPACTS impacts took less than a unit of time, or than a shorter forcing period."""
+    now, length = m[NOW * WIDTH + lane], gauge[lane, PERIOD_LENGTH]
+    since, gauge[lane, LOOKED_AT] = gauge[lane, LOOKED_AT], now
+    m[NEXT_LOOK * WIDTH + lane] += MOST_IMPACTS
+    return now - since < (min(length, 1.0) if length > 0.0 else 1.0)
+
+
+@inline_jit
+def leg_end(lane, lanes):
+    """The local time at which a leg ends: a forcing period after it began, or with the motion."""
+    where, gauge = lanes[0], lanes[1]
+    if where[lane, LEG] == where[lane, LAST_LEG]:
+        return gauge[lane, END_TIME]
+    return gauge[lane, LEG_START] + gauge[lane, PERIOD_LENGTH]
+
+
+@inline_jit
+def begin_leg(lane, m, lanes, tables):
+    """Set where a lane's next stop is: the end of its forcing period, of its motion, or a breakpoint of the records."""
+    where, breaks = lanes[0], tables[0]
+    origin, target = where[lane, LEG] * lanes[1][lane, PERIOD_LENGTH], leg_end(lane, lanes)
+    piece = where[lane, PIECE_NOW]
+    while piece < breaks.size and breaks[piece] - origin <= m[NOW * WIDTH + lane]:
+        piece += 1
+    where[lane, PIECE_NOW] = piece
+    if piece < breaks.size:
+        target = min(target, breaks[piece] - origin)
+    m[ORIGIN * WIDTH + lane], m[TARGET * WIDTH + lane] = origin, target
+
+
+@inline_jit
+def begin_records(lane, at, m):
+    """Start what is recorded of a forcing period, with the position at its beginning."""
+    x = m[at[POSITION] * WIDTH + lane]
+    m[HIGHEST * WIDTH + lane], m[LOWEST * WIDTH + lane] = x, x
+    m[LEAST * WIDTH + lane], m[CROSSINGS * WIDTH + lane], m[NEXT_LOOK * WIDTH + lane] = np.inf, 0.0, MOST_IMPACTS
+
+
+@inline_jit
+def keep_sample(lane, sizes, at, m, lanes, results):
+    """Keep the state and what happened since the leg began, in the ring of the last samples."""
+    where, own = lanes[0], sizes[MODEL_ROWS]
+    row = results[3][where[lane, IDENT], where[lane, LEGS_DONE] % sizes[LAST_KEPT]]
+    for d in range(own):
+        row[d], row[own + d] = m[(at[POSITION] + d) * WIDTH + lane], m[(at[VELOCITY] + d) * WIDTH + lane]
+    for j in range(4):
+        row[2 * own + j] = m[(HIGHEST + j) * WIDTH + lane]
+    total_up(lane, at, m, lanes)
+    where[lane, LEGS_DONE] += 1
+
+
+@inline_jit
+def end_leg(lane, sizes, at, m, lanes, results):
+    """Keep a leg that is over; the length of the cycle that the trajectory has settled on, or 0."""
+    where, gauge, _, _, ring, streak = lanes
+    keep_sample(lane, sizes, at, m, lanes, results)
+    if sizes[SETTLE] == 0:
+        return 0
+    legs, own = where[lane, LEGS_DONE], sizes[MODEL_ROWS]
+    here = legs % (2 * LONGEST_CYCLE)
+    for d in range(own):
+        ring[lane, here, d], ring[lane, here, own + d] = (
+            m[(at[POSITION] + d) * WIDTH + lane],
+            m[(at[VELOCITY] + d) * WIDTH + lane],
+        )
+    if where[lane, MODE_NOW] == CHATTER:
+        ring[lane, here, own] = gauge[lane, CHATTER_NOW]
+    return cycle_length(ring[lane], streak[lane], legs, own)
+
+
+@inline_jit
+def total_up(lane, at, m, lanes):
+    """Add what was recorded of a forcing period to what is recorded of the trajectory, and start anew."""
+    where, gauge = lanes[0], lanes[1]
+    where[lane, COUNT] += int(m[CROSSINGS * WIDTH + lane])
+    gauge[lane, TOP], gauge[lane, BOTTOM] = (
+        max(gauge[lane, TOP], m[HIGHEST * WIDTH + lane]),
+        min(gauge[lane, BOTTOM], m[LOWEST * WIDTH + lane]),
+    )
+    gauge[lane, SLOWEST] = min(gauge[lane, SLOWEST], m[LEAST * WIDTH + lane])
+    begin_records(lane, at, m)
+
+
+@inline_jit
+def arrive(lane, sizes, at, m, lanes, tables, results):
+    """At the end of a leg or at a breakpoint: go on. Returns DONE, SETTLED, or PAUSED, and the length of the cycle."""
+    where, gauge = lanes[0], lanes[1]
+    leg, now, start = where[lane, LEG], m[NOW * WIDTH + lane], gauge[lane, LEG_START]
+    last, t_end = leg == where[lane, LAST_LEG], leg_end(lane, lanes)
+    if now >= t_end:
+        if last and t_end <= start and where[lane, LEGS_DONE] > 0:  # the end of whole periods: there is nothing to record
+            return DONE, 0
+        cycle = end_leg(lane, sizes, at, m, lanes, results)
+        if last:
+            return DONE, 0
+        if cycle > 0:
+            return SETTLED, cycle
+        where[lane, LEG] = leg + 1
+        m[NOW * WIDTH + lane] = gauge[lane, LOOKED_AT] = start + (now - t_end)
+    begin_leg(lane, m, lanes, tables)
+    return PAUSED, 0
+
+
+@lean_jit
+def finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results):
+    """Write the end of a lane's trajectory; the lane is free."""
+    where, gauge = lanes[0], lanes[1]
+    state, numbers, labels, _ = results
+    i, half = where[lane, IDENT], state.shape[1] // 2
+    part = m[NOW * WIDTH + lane] > gauge[lane, LEG_START] or m[CROSSINGS * WIDTH + lane] > 0.0 or where[lane, LEGS_DONE] == 0
+    if part and reason != DONE and reason != SETTLED and reason != OUTSIDE:  # it ends within a leg
+        keep_sample(lane, sizes, at, m, lanes, results)
+    total_up(lane, at, m, lanes)
+    for row in range(half):
+        state[i, row], state[i, half + row] = m[(at[POSITION] + row) * WIDTH + lane], m[(at[VELOCITY] + row) * WIDTH + lane]
+    numbers[i, 0], numbers[i, 1] = m[NOW * WIDTH + lane], gauge[lane, CHATTER_NOW]
+    numbers[i, 2], numbers[i, 3], numbers[i, 4] = gauge[lane, TOP], gauge[lane, BOTTOM], gauge[lane, SLOWEST]
+    if sizes[COLUMN_COUNT] > 0 and where[lane, MODE_NOW] == ARC:  # how fast the state changes at the end
+        store(m, NEW_TIME, load(m, NOW))
+        for row in range(2 * sizes_rows(at)):
+            store(m, at[NEW_POSITION] + row, load(m, at[POSITION] + row))
+        code[FIELD_CODE](m)
+        for row in range(sizes[MODEL_ROWS]):
+            numbers[i, 5 + row] = m[(at[AFTER_VELOCITY] + row) * WIDTH + lane]
+        for j in range(sizes[COLUMN_COUNT]):
+            numbers[i, 5 + sizes[MODEL_ROWS] + j] = m[(at[AFTER_POSITION] + j) * WIDTH + lane]
+    labels[i, 0], labels[i, 1], labels[i, 2] = reason, detail, where[lane, MODE_NOW]
+    labels[i, 3], labels[i, 4] = int(m[SIDE_NOW * WIDTH + lane]), where[lane, LEG]
+    labels[i, 5], labels[i, 6], labels[i, 7] = where[lane, COUNT], where[lane, TOUCHES], where[lane, LEGS_DONE]
+    flags[AWAKE] &= ~(1 << lane)
+    flags[PARKED] &= ~(1 << lane)
