@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -31,6 +31,7 @@ MOST_POINTS = 20_000
 MOST_IMPACTS = 120  # of one period
 ACCUMULATE = 5  # grazings one after the other that each add impacts, within
 NEARBY = 1e-3  # of the parameter's range: there are infinitely many
+STEEPEST = 1e8  # multiplier beyond which an orbit is no longer solved for: its motions part by that much within a period
 SMALLEST = 1e-7  # amplitude below which an orbit has shrunk to rest
 SAME = 1e-5  # between unknowns of orbits that coincide where both graze
 AHEAD = 1e-6  # of a point along its tangent, to tell its direction
@@ -144,7 +145,11 @@ class _Walk:
                     factor = min(2.0, max(0.5, ANGLE / max(angle, 1e-3)))
                     return ahead, min(self.longest, step * (factor if ahead.solution.iterations <= 5 else min(factor, 0.7)))
             step *= 0.4
-        self.reason = "the steps shrink to nothing: the branch has a singularity that is none of the known kinds"
+        largest = abs(point.orbit.multipliers[0])
+        if largest > STEEPEST and not point.orbit.grazes:
+            self.reason = f"the orbit repels too strongly to be followed: its largest multiplier is {largest:.1g}"
+        else:
+            self.reason = "the steps shrink to nothing: the branch has a singularity that is none of the known kinds"
         return None, step
 
     def _on_curve(self, point: Point, ahead: Point, step: float) -> bool:
@@ -417,7 +422,3 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
         problem, found = half(problem, found) or (problem, found)
     return PeriodicOrbit(problem, found), symmetric
 
-
-def inadmissible(branch: Branch) -> Iterator[Point]:
-    """Points that are no motions of the system: there must be none."""
-    return (point for point in branch.points if not point.orbit.admissible or point.orbit.slowest < -TOUCH)

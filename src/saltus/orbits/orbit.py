@@ -146,9 +146,14 @@ class PeriodicOrbit:
         return values[np.argsort(-np.abs(values))]
 
     @property
+    def grazes(self) -> bool:
+        """Whether it touches the contact without speed: then its motions beside have no derivative, and multipliers mean nothing."""
+        return min(abs(self.clearance), abs(self.slowest)) < TOUCH
+
+    @property
     def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle."""
-        return bool((np.abs(self.multipliers) < 1.0).all())
+        """Whether all multipliers lie inside the unit circle, and it does not graze."""
+        return bool((np.abs(self.multipliers) < 1.0).all()) and not self.grazes
 
     def start(self) -> dict[str, Any]:
         """The arguments of `simulate` that start the motion: just before its first impact, or at phase 0."""
@@ -169,15 +174,17 @@ class PeriodicOrbit:
 
     @cached_property
     def defect(self) -> float:
-        """The distance between its state and the one a period later, by direct simulation; inf if the impacts differ in number."""
+        """The distance between its state and the one a period later, by direct simulation; inf if the impacts differ in number.
+
+        Where it grazes, rounding decides whether there is an impact, and the distance is that of its square root.
+        """
         motion = self.motion()
         start = self.start()
         begin = np.array([start[name] for name in self.system.model.coordinates])
         if self.signature.sides:  # the motion ends at an impact: before or after it
             ends = [np.abs(np.append(np.atleast_1d(motion.position) - begin, np.abs(motion.velocity) - np.abs(v))).max()
                     for v in (start["velocity"], self.speeds[0])]  # fmt: skip
-            grazes = min(abs(self.clearance), abs(self.slowest)) < TOUCH  # then rounding decides whether there is an impact
-            return min(ends) if grazes or abs(len(motion.crossings) - self.signature.crossings) <= 1 else math.inf
+            return min(ends) if self.grazes or abs(len(motion.crossings) - self.signature.crossings) <= 1 else math.inf
         velocity = np.atleast_1d(motion.velocity) - np.atleast_1d(start["velocity"])
         return float(np.abs(np.concatenate([np.atleast_1d(motion.position) - begin, velocity])).max())
 

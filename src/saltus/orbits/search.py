@@ -22,6 +22,22 @@ TRANSIENT = 24  # forcing periods of each motion in which near returns are looke
 RETURN = 0.15  # distance of a near return from which Newton's method is tried for an orbit that repels
 GUESSES = 12  # the nearest returns that are tried, for each period
 SETTLED = 1e-6
+EVEN = 1.32471795724474602596 ** -np.array([1.0, 2.0])  # steps that cover a square evenly: powers of the plastic number, x^3 = x + 1
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What direct simulation has settled on, an array entry for each motion that has."""
+
+    value: np.ndarray  # of the parameter
+    periods: np.ndarray  # forcing periods after which it repeats
+    highest: np.ndarray  # of the first coordinate over that time
+    lowest: np.ndarray
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """max abs of the coordinate."""
+        return np.asarray(np.maximum(np.abs(self.highest), np.abs(self.lowest)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +53,7 @@ class Search:
     seed: int
     unsettled: np.ndarray  # (values,): how many of the motions did not settle on an orbit of up to so many periods: slow or chaotic
     at_rest: np.ndarray  # (values,): and how many came to rest
+    settled: Settled  # the attractors as simulation shows them
 
     def __repr__(self) -> str:
         kinds = sorted({orbit.periods for orbit in self.orbits})
@@ -56,14 +73,15 @@ def search_orbits(
     starts: int = 48,
     region: tuple[float, float] = REGION,
     seed: int = 0,
-    unstable: bool = True,
+    repelling: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Search:
     """Periodic orbits of up to `longest` forcing periods at several values of a parameter, each once for each value.
 
-    Initial states are spread evenly (a Sobol sequence) over the region around the contact, or around 0 for a model without
+    Initial states are spread evenly (a sequence of low discrepancy) over the region around the contact, or around 0 for a model without
     one. Motions that settle lead to the attracting orbits. Returns of the motions near to where they were, on their way or in
-    chaos, are first guesses for Newton's method, which finds repelling ones.
+    chaos, are first guesses for Newton's method, which finds repelling ones, of up to `repelling` forcing periods (by default
+    `longest`; 0 looks for none).
 
     Raises:
         ParameterError: an unknown parameter, no values, an effort without meaning.
@@ -77,28 +95,32 @@ def search_orbits(
     if len(system.model.coordinates) > 1:
         raise ParameterError("search_orbits works on models with one coordinate; use find_orbit from your own states")
     states = initial_states(system, starts, region, seed)
-    strobes = _strobes(system, path, grid, states, longest)
+    early, late, extrema = _strobes(system, path, grid, states, longest)
     found: list[PeriodicOrbit] = []
     unsettled, at_rest = np.zeros(len(grid), dtype=int), np.zeros(len(grid), dtype=int)
+    settled: list[tuple[float, int, float, float]] = []
     for i, value in enumerate(grid):
         base = Problem(system.with_({path: float(value)}), Signature((), 1), (path,))
-        early, late = strobes[0][i], strobes[1][i]
-        moving = np.isfinite(late).all(axis=(1, 2)) & (np.abs(late - _contact(system)).max(axis=(1, 2)) > 1e-6)
-        at_rest[i] = int((~moving).sum())
-        here, unsettled[i] = _attracting(base, late[moving], longest)
-        if unstable:
-            here += _repelling(base, np.concatenate([early[moving], late[moving]]), longest, here)
+        alive = np.isfinite(late[i]).all(axis=(1, 2))
+        moving = alive & (np.abs(late[i] - _contact(system)).max(axis=(1, 2)) > 1e-6)
+        at_rest[i] = int((alive & ~moving).sum())
+        here, seen, unsettled[i] = _attracting(base, late[i][moving], extrema[i][moving], longest)
+        settled += [(float(value), *row) for row in seen]
+        reach = longest if repelling is None else repelling
+        if reach > 0:
+            here += _repelling(base, np.concatenate([early[i][moving], late[i][moving]]), reach, here)
         found += here
         if progress is not None:
             progress((i + 1) / len(grid))
-    return Search(path, tuple(found), grid, starts, longest, region, seed, unsettled, at_rest)
+    columns = np.array(settled, dtype=float).reshape(-1, 4).T
+    dots = Settled(columns[0], columns[1].astype(int), columns[2], columns[3])
+    return Search(path, tuple(found), grid, starts, longest, region, seed, unsettled, at_rest, dots)
 
 
 def initial_states(system: System, count: int, region: tuple[float, float], seed: int) -> np.ndarray:
     """(count, 2): coordinates and velocities spread over the region, on the side of the contact where motions are."""
-    from scipy.stats import qmc
-
-    points = 2.0 * qmc.Sobol(2, seed=seed).random(1 << max(0, (count - 1).bit_length()))[:count] - 1.0
+    offset = np.random.default_rng(seed).random(2)
+    points = 2.0 * ((offset + np.arange(1, count + 1)[:, None] * EVEN) % 1.0) - 1.0
     states = points * np.asarray(region)
     model = system.model
     if len(model.sides) == 1:
@@ -111,27 +133,42 @@ def _contact(system: System) -> np.ndarray:
     return np.array([float(system.model.contact) if system.model.sides else 0.0, 0.0])
 
 
-def _strobes(system: System, path: str, grid: np.ndarray, states: np.ndarray, longest: int) -> tuple[np.ndarray, np.ndarray]:
-    """States at the ends of forcing periods, (values, starts, periods, 2): early ones, and those after settling."""
-    name = system.model.coordinates[0]
+def _strobes(
+    system: System, path: str, grid: np.ndarray, states: np.ndarray, longest: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """States at the ends of forcing periods, (values, starts, periods, 2): early ones, those after settling, and the extrema of
+    the first coordinate in the latter."""
+    name, kept = system.model.coordinates[0], max(TRANSIENT, longest + 1)
 
-    def run(theta: Any, velocity: Any, periods: int, last: int) -> np.ndarray:
+    def run(theta: Any, velocity: Any, periods: int) -> tuple[np.ndarray, np.ndarray]:
         result = simulate_many(
-            system, **{name: theta}, velocity=velocity, parameters={path: grid[:, None]}, periods=periods, last=last, tol=1e-11
+            system,
+            **{name: theta},
+            velocity=velocity,
+            parameters={path: grid[:, None]},
+            periods=periods,
+            sample=("state", "extrema"),
+            last=kept,
+            tol=1e-11,
         )
-        return np.stack([result[f"sampled_{name}"].values, result["sampled_velocity"].values], axis=-1)
+        states = np.stack([result[f"sampled_{name}"].values, result["sampled_velocity"].values], axis=-1)
+        return states, np.stack([result[f"largest_{name}"].values, result[f"smallest_{name}"].values], axis=-1)
 
-    early = run(states[None, :, 0], states[None, :, 1], *[max(TRANSIENT, longest + 1)] * 2)
-    late = run(early[:, :, -1, 0], early[:, :, -1, 1], SETTLE, max(TRANSIENT, longest + 1))
-    return early, late
+    early, _ = run(states[None, :, 0], states[None, :, 1], kept)
+    last = np.nan_to_num(early[:, :, -1], nan=float(_contact(system)[0]))
+    late, extrema = run(last[:, :, 0], np.where(np.isfinite(early[:, :, -1, 1]), last[:, :, 1], 0.0), SETTLE)
+    return early, late, extrema
 
 
-def _attracting(base: Problem, late: np.ndarray, longest: int) -> tuple[list[PeriodicOrbit], int]:
-    """The orbits on which settled motions are, and how many motions have not settled."""
+def _attracting(
+    base: Problem, late: np.ndarray, extrema: np.ndarray, longest: int
+) -> tuple[list[PeriodicOrbit], list[tuple[int, float, float]], int]:
+    """The orbits on which settled motions are, what simulation shows of each, and how many motions have not settled."""
     found: list[PeriodicOrbit] = []
+    seen: list[tuple[int, float, float]] = []
     known = np.empty((0, 2))
     unsettled = 0
-    for strobes in late:
+    for strobes, range_ in zip(late, extrema, strict=True):
         if known.size and np.abs(known - strobes[-1]).max(axis=1).min() < 1e-5:
             continue
         period = next((q for q in range(1, longest + 1) if np.abs(strobes[-1] - strobes[-1 - q]).max() < SETTLED), None)
@@ -139,20 +176,22 @@ def _attracting(base: Problem, late: np.ndarray, longest: int) -> tuple[list[Per
             unsettled += 1
             continue
         known = np.concatenate([known, strobes[-period:]])
+        seen.append((period, float(range_[-period:, 0].max()), float(range_[-period:, 1].min())))
         orbit = _newton(base, strobes[-1], period)
         if orbit is not None:
             _add(found, orbit)
-    return found, unsettled
+    return found, seen, unsettled
 
 
 def _repelling(base: Problem, strobes: np.ndarray, longest: int, known: list[PeriodicOrbit]) -> list[PeriodicOrbit]:
     """Orbits near which motions return to where they were."""
     found: list[PeriodicOrbit] = []
     for q in range(1, longest + 1):
-        if strobes.shape[1] <= q:
+        if strobes.shape[1] <= q or not len(strobes):
             break
         distance = np.abs(strobes[:, q:] - strobes[:, :-q]).max(axis=2)
         states, distance = strobes[:, :-q].reshape(-1, 2), distance.ravel()
+        distance = np.where(np.isfinite(distance), distance, np.inf)
         order = np.argsort(distance)
         tried: list[np.ndarray] = []
         for i in order:

@@ -24,11 +24,17 @@ def switch_branch(
     *,
     functions: dict[str, UserFunction] | None = None,
     step: float = STEP,
+    both: bool = True,
 ) -> tuple[Branch, ...]:
     """The branches that begin at a special point of another one.
 
     At a PD that of the doubled orbit; at a BPC those of the two unsymmetric orbits, mirror images of one another, or, where two
     branches cross, the two halves of the other branch.
+
+    Args:
+        special: where to begin.
+        bounds, functions, step: as for `continue_orbit`.
+        both: whether both of two mirror images are followed, which differ in nothing but their phase and sign.
 
     Raises:
         ParameterError: a special point where no branch begins.
@@ -41,7 +47,7 @@ def switch_branch(
     if special.kind == "BPC" and not special.orbit.symmetric:
         starts = _crossing_branch(special.point)
     else:
-        starts = (_doubled(special.point),) if special.kind == "PD" else _unsymmetric(special.point)
+        starts = (_doubled(special.point),) if special.kind == "PD" else _unsymmetric(special.point)[: 2 if both else 1]
     branches = [follow_from(start, path, (low, high), origin, functions, step) for start in starts if start is not None]
     return tuple(branches)
 

@@ -1,0 +1,51 @@
+"""Orbits checked by direct simulation: many at once, in lanes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from saltus.flow import simulate_many
+from saltus.orbits.orbit import PeriodicOrbit
+
+
+def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) -> np.ndarray:
+    """The distance of each orbit's state from itself after so many of its periods, by the event-driven flow, (n,).
+
+    All must belong to one system but for its parameters along their common path. A motion that starts after its first impact
+    ends with that impact, before or after it as rounding decides: the nearer counts.
+
+    Raises:
+        ValueError: orbits of different paths.
+    """
+    result = np.full(len(orbits), np.inf)
+    groups: dict[int, list[int]] = {}
+    for i, orbit in enumerate(orbits):
+        groups.setdefault(orbit.periods, []).append(i)
+    for periods, places in groups.items():
+        result[places] = _defects([orbits[i] for i in places], rounds * periods, tol)
+    return result
+
+
+def _defects(orbits: list[PeriodicOrbit], periods: int, tol: float) -> np.ndarray:
+    problem = orbits[0].problem
+    system, (path, *_) = problem.system, problem.paths
+    names = system.model.coordinates
+    starts = [orbit.start() for orbit in orbits]
+    values = np.array([orbit.solution.values[0] for orbit in orbits])
+    begin = {name: np.array([start[name] for start in starts], dtype=float) for name in names}
+    velocity: Any = np.array([start["velocity"] for start in starts], dtype=float)
+    times = np.array([start.get("time", 0.0) for start in starts])
+    columns = velocity if velocity.ndim == 1 else tuple(velocity.T)
+    result = simulate_many(
+        system, **begin, velocity=columns, time=times, parameters={path: values}, periods=periods, sample=(), tol=tol
+    )
+    apart = np.max([np.abs(result[name].values - begin[name]) for name in names], axis=0)
+    after = result["velocity"].values if velocity.ndim == 1 else None
+    if after is None:
+        ends = np.stack([result[f"velocity_{name}"].values for name in names], axis=1)
+        return np.asarray(np.maximum(apart, np.abs(ends - velocity).max(axis=1)))
+    before = np.array([orbit.speeds[0] if orbit.signature.sides else np.inf for orbit in orbits])
+    either = np.minimum(np.abs(after - velocity), np.abs(np.abs(after) - before))
+    return np.asarray(np.maximum(apart, either))
