@@ -1,0 +1,240 @@
+"""Curves of special points in two parameters: against closed forms, against one-parameter branches, and through cusps."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.orbits import Locus, SpecialPoint
+from saltus.orbits.codimension import normal_form
+from saltus.orbits.conditions import Singular
+from saltus.orbits.locus import LocusPoint
+from saltus.orbits.path import Curve
+from saltus.orbits.problem import Problem
+from saltus.theory.wall_orbits import wall_orbits
+
+FREQUENCY, AMPLITUDE, VERTICAL, FORCE = "load.frequency", "load.horizontal.amplitude", "load.vertical", "load.force.amplitude"
+FREE = math.sqrt(1.0 - 0.1**2 / 4)  # frequency of the free oscillator below
+
+
+def metainterface(frequency: float, amplitude: float, vertical: float = -0.5) -> saltus.System:
+    return saltus.System(
+        model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
+        load=saltus.Load(frequency=frequency, horizontal=saltus.Harmonic(amplitude=amplitude), vertical=vertical),
+    )
+
+
+def oscillator(frequency: float, e: float) -> saltus.System:
+    return saltus.System(
+        model=saltus.WallOscillator(stiffness=1.0, damping=0.1, wall=1.0),
+        load=saltus.Load(frequency=frequency, force=saltus.Harmonic(amplitude=0.5, phase=np.pi / 2)),
+        impact=saltus.VelocityReduction(e),
+    )
+
+
+@cache
+def wall_special(kind: str) -> SpecialPoint:
+    """A special point of the impact oscillator's branch along the load's amplitude."""
+    system, start = (oscillator(0.7, 0.6), 0.0) if kind == "PD" else (oscillator(1.0, 0.8), 0.0)
+    if kind == "PD":
+        family = wall_orbits(system)
+        speed = 1.3 * family.doubling_speed
+        system = system.with_({FORCE: family.amplitude(speed)})
+        state = family.orbit(speed).state(0.0)
+        orbit = saltus.find_orbit(system, x=float(state[0]), velocity=float(state[1]), settle=0, period=1)
+    else:
+        orbit = saltus.find_orbit(system, x=start, velocity=0.0)
+    branch = saltus.continue_orbit(orbit, FORCE, (0.05, 0.9))
+    return next(s for s in branch.special if s.kind == kind)
+
+
+@cache
+def wall_locus(kind: str) -> Locus:
+    bounds = (0.72, 0.95) if kind == "PD" else (0.6, 1.9)
+    if kind == "PD":
+        bounds = (0.67, 0.95)
+    return saltus.continue_special(wall_special(kind), FREQUENCY, bounds, first_bounds=(0.01, 6.0))
+
+
+@cache
+def folds() -> Locus:
+    """The folds of the resonance at Hhat = 0.5, continued in the load's amplitude."""
+    orbit = saltus.find_orbit(metainterface(0.9, 0.5), theta=0.3)
+    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.8, 1.0))
+    fold = next(s for s in branch.special if s.kind == "LP")
+    return saltus.continue_special(fold, AMPLITUDE, (0.05, 1.2), first_bounds=(0.3, 2.0))
+
+
+@cache
+def low_frequency(kind: str) -> Locus:
+    """Curves through the special points about the change from two to six crossings at Hhat = 0.5."""
+    orbit = saltus.find_orbit(metainterface(0.29, 0.5), theta=0.3)
+    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.282, 0.3))
+    special = next(s for s in branch.special if s.kind == kind)
+    return saltus.continue_special(special, AMPLITUDE, (0.3, 0.6), first_bounds=(0.18, 0.4))
+
+
+def closed_form(point: LocusPoint, kind: str) -> float:
+    family = wall_orbits(point.orbit.system)
+    if kind == "GR":
+        return float(family.grazing_amplitude)
+    speed = family.fold_speed if kind == "LP" else family.doubling_speed
+    return float(family.amplitude(speed or 0.0))
+
+
+@pytest.mark.parametrize("kind", ["GR", "LP", "PD"])
+def test_curves_of_the_impact_oscillator_are_the_closed_forms(kind: str) -> None:
+    locus = wall_locus(kind)
+    assert len(locus.points) > 15
+    assert np.ptp(locus.parameters[:, 1]) > 0.1
+    expected = [closed_form(point, kind) for point in locus.points]
+    np.testing.assert_allclose(locus.parameters[:, 0], expected, rtol=2e-11)
+
+
+@pytest.mark.parametrize("kind", ["GR", "LP"])
+def test_folds_end_at_the_grazing_where_the_free_motion_takes_whole_half_periods(kind: str) -> None:
+    """There v+ = e v- cannot change where the linear motion touches: alpha of the closed form vanishes."""
+    found = {round(2 * FREE / s.parameters[1]): s for s in wall_locus(kind).special}
+    assert set(found) >= ({2, 3} if kind == "GR" else {2})
+    for halves, special in found.items():
+        assert special.kind == ("LP-PD-GR" if kind == "GR" else "LP-GR")
+        frequency = 2 * FREE / halves
+        assert special.parameters[1] == pytest.approx(frequency, rel=1e-10)
+        assert special.parameters[0] == pytest.approx(abs(complex(1 - frequency**2, 0.1 * frequency)), rel=1e-10)
+        assert special.evidence.before * special.evidence.after < 0
+
+
+def test_both_folds_of_the_resonance_lie_on_one_curve_through_a_cusp() -> None:
+    locus = folds()
+    assert [s.kind for s in locus.special] == ["CP"]
+    for amplitude, known in ((0.5, [0.848485265597, 0.908810732539]), (1.0, [0.811772145949, 0.995113422444])):
+        assert sorted(o.frequency for o in locus.at(AMPLITUDE, amplitude)) == pytest.approx(known, abs=2e-12)
+    assert locus.ends == (f"bound {AMPLITUDE} = 1.2",) * 2
+
+
+@pytest.mark.parametrize(("beyond", "count"), [(0.004, 2), (-0.001, 0)])
+def test_a_branch_has_two_folds_on_one_side_of_the_cusp_and_none_on_the_other(beyond: float, count: int) -> None:
+    cusp = folds().special[0]
+    orbit = saltus.find_orbit(metainterface(0.9, cusp.parameters[1] + beyond), theta=0.3)
+    branch = saltus.continue_orbit(orbit, FREQUENCY, (cusp.parameters[0] - 0.02, 0.91))
+    found = sorted(s.parameter for s in branch.special if s.kind == "LP")
+    assert len(found) == count
+    there = sorted(o.frequency for o in folds().at(AMPLITUDE, cusp.parameters[1] + beyond))
+    assert there == pytest.approx(found, abs=1e-10)
+
+
+def test_onset_of_the_motion_follows_the_vertical_load() -> None:
+    orbit = saltus.find_orbit(metainterface(1.0, 0.05, vertical=-0.4), theta=0.1)
+    branch = saltus.continue_orbit(orbit, AMPLITUDE, (0.005, 0.1))
+    onset = next(s for s in branch.special if s.kind == "LP")
+    locus = saltus.continue_special(onset, VERTICAL, (-0.8, -0.3))
+    assert [o.system.get(AMPLITUDE) for o in locus.at(VERTICAL, -0.5)] == pytest.approx([0.0219879514], abs=1e-10)
+    assert locus.at(VERTICAL, -0.5)[0].defect < 1e-10
+
+
+@pytest.mark.parametrize(("curve", "multiplier"), [("folds", 1), ("BPC", 1), ("PD", -1), ("LP", 1)])
+def test_every_point_is_an_orbit_with_its_multiplier(curve: str, multiplier: int) -> None:
+    locus = folds() if curve == "folds" else wall_locus("PD") if curve == "PD" else low_frequency(curve)
+    last = len(locus.points) - 1
+    for index, point in enumerate(locus.points):
+        assert point.residual < 1e-10
+        assert point.orbit.admissible
+        if 0 < index < last:  # at a grazing multipliers are infinite
+            assert np.abs(point.orbit.multipliers - multiplier).min() < 1e-7
+
+
+def test_every_point_of_a_grazing_curve_touches() -> None:
+    locus = low_frequency("GR")
+    assert len(locus.points) > 20
+    for point in locus.points[::5]:
+        shorter = Problem(point.orbit.system, point.orbit.signature, (FREQUENCY,))
+        assert point.orbit.admissible
+        assert abs(point.orbit.slowest) < 1e-14
+        touching = point.touching
+        phases = point.solution.unknowns[::2][touching]
+        assert np.ptp(phases) < 1e-12
+        motion = point.orbit.motion(tol=1e-13)
+        assert np.abs(motion.at(phases[:1] / shorter.frequency(shorter.values)).theta).max() < 1e-10
+
+
+def test_folds_and_symmetry_breakings_of_six_crossings_end_at_one_point_of_the_grazing_curve() -> None:
+    known = [s for s in low_frequency("GR").special if s.kind == "LP-BPC-GR"]
+    for kind in ("LP", "BPC"):
+        meeting = max((s for s in low_frequency(kind).special if s.kind == f"{kind}-GR"), key=lambda s: s.parameters[0])
+        assert min(math.dist(meeting.parameters, s.parameters) for s in known) < 1e-11
+
+
+def shift_of_the_broken_family(point: LocusPoint, distance: float) -> float:
+    """How far in the first parameter the unsymmetric orbit lies that differs by a distance from a symmetric one at its BPC."""
+    condition = point.condition
+    assert isinstance(condition, Singular)
+    assert condition.twice is not None
+    direction = condition.along(point.judged.right / np.linalg.norm(point.judged.right))
+    curve = Curve(Problem(point.orbit.system, condition.twice.signature, (FREQUENCY,)), 1.0)
+    guess = np.append(condition.doubled(point.solution.unknowns) + distance * direction, point.solution.values[0])
+    broken = curve.solve(guess, np.append(direction, 0.0))
+    assert broken is not None
+    return broken.parameter - float(point.solution.values[0])
+
+
+def test_the_unsymmetric_orbits_change_sides_at_a_degenerate_symmetry_breaking() -> None:
+    locus = low_frequency("BPC")
+    degenerate = min((s for s in locus.special if s.kind == "DBPC"), key=lambda s: abs(s.parameters[0] - 0.2421))
+    place = int(np.argmin(np.abs(locus.parameters - degenerate.parameters).sum(axis=1)))
+    shifts = [[shift_of_the_broken_family(locus.points[place + k], d) / d**2 for d in (2e-3, 4e-3)] for k in (-2, 2)]
+    assert np.sign(shifts[0]) == pytest.approx(-np.sign(shifts[1]))
+    forms = [normal_form(locus.points[place + k]) for k in (-2, 2)]
+    ratio = [form / shift[0] for form, shift in zip(forms, shifts, strict=True)]
+    assert ratio[0] * ratio[1] > 0  # the sign of the normal form says the side
+
+
+def test_a_fold_of_symmetric_orbits_goes_on_without_the_symmetry() -> None:
+    orbit = saltus.find_orbit(metainterface(0.9, 0.5), theta=0.3)
+    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.8, 0.95))
+    fold = next(s for s in branch.special if s.kind == "LP")
+    assert fold.orbit.symmetric
+    locus = saltus.continue_special(fold, "model.stiffness_ratio", (0.98, 1.02), first_bounds=(0.5, 1.5))
+    assert locus.ends == ("bound model.stiffness_ratio = 0.98", "bound model.stiffness_ratio = 1.02")
+    assert [o.frequency for o in locus.at("model.stiffness_ratio", 1.0)] == pytest.approx([fold.parameter], abs=1e-11)
+    assert not locus.orbits[0].symmetric
+
+
+def test_a_curve_keeps_all_in_its_dataset() -> None:
+    locus = folds()
+    data = locus.to_xarray()
+    np.testing.assert_array_equal(data.parameter, locus.parameters)
+    assert list(data.path.values) == [FREQUENCY, AMPLITUDE]
+    assert data.special_kind.values.tolist() == ["CP"]
+    system = saltus.System.from_json(data.attrs["system"])
+    signature = locus.orbits[0].signature
+    assert data.attrs["sides"] == list(signature.sides)
+    again = Problem(system, signature, (FREQUENCY, AMPLITUDE)).evaluate(data.unknowns.values[3], data.parameter.values[3])
+    assert again is not None
+    assert np.abs(again.residual).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("path", "options", "says"),
+    [
+        (FREQUENCY, {}, "name another parameter"),
+        ("load.horizontal.amplitud", {}, "no parameter 'load.horizontal.amplitud'"),
+        ("load.horizontal", {}, "not a number"),
+        (AMPLITUDE, {"bounds": (2.0, 3.0)}, "widen it"),
+        (AMPLITUDE, {"first_bounds": (1.0, 0.1)}, "the smaller one first"),
+    ],
+)
+def test_bad_use_is_answered_with_a_sentence(path: str, options: dict, says: str) -> None:
+    orbit = saltus.find_orbit(metainterface(0.9, 0.5), theta=0.3)
+    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.88, 0.95))
+    with pytest.raises(saltus.ParameterError, match=says):
+        saltus.continue_special(next(s for s in branch.special if s.kind == "LP"), path, **options)
+
+
+def test_a_symmetry_breaking_needs_the_symmetry() -> None:
+    orbit = saltus.find_orbit(metainterface(0.29, 0.5), theta=0.3)
+    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.282, 0.3))
+    special = next(s for s in branch.special if s.kind == "BPC")
+    with pytest.raises(saltus.ParameterError, match="takes away the mirror symmetry"):
+        saltus.continue_special(special, "model.stiffness_ratio")
