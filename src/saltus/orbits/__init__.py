@@ -7,6 +7,7 @@ from saltus.orbits.find import find_orbit
 from saltus.orbits.loci import continue_special
 from saltus.orbits.locus import Locus
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.reload import orbits_of
 from saltus.orbits.search import Search, same_orbit, search_orbits
 from saltus.orbits.signature import Signature
 from saltus.orbits.special import Evidence, SpecialPoint
@@ -27,6 +28,7 @@ __all__ = [
     "defects",
     "doubling_cascade",
     "find_orbit",
+    "orbits_of",
     "same_orbit",
     "search_orbits",
     "switch_branch",

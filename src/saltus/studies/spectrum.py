@@ -3,36 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.orbits import (
-    Branch,
-    PeriodicOrbit,
-    Search,
-    SpecialPoint,
-    continue_orbit,
-    defects,
-    same_orbit,
-    search_orbits,
-    switch_branch,
-)
+from saltus.orbits import search_orbits
 from saltus.orbits.branch import STEP, check_bounds
+from saltus.orbits.find import check_whole
 from saltus.orbits.search import REGION
+from saltus.studies.atlas import Atlas
+from saltus.studies.tree import diagram_tree
 from saltus.systems import System
+from saltus.systems.checks import check_number
 
 if TYPE_CHECKING:
     import xarray
 
 VALUES = 25  # of the parameter at which is searched
 STARTS = 48  # initial states at each
-FOLLOWED = 20.0  # times the range's upper end: how far families of a longer period are followed
-MOST_BRANCHES = 60
-SAME_PLACE = 1e-6  # between special points of two branches that are one
-KEPT_ROUNDS = 20  # periods for which a stable orbit must stay where it is
+SEARCHED, FOLLOWED = 0.4, 0.9  # shares of the work done when the search, and when all branches are
 
 
 def response_spectrum(
@@ -89,27 +79,25 @@ def diagram(
         path: dotted path of the parameter.
         bounds: its range.
         max_period: the longest period, in forcing periods.
-        values, starts, region, seed: where is searched, see `search_orbits`.
+        values, starts, region, seed: where is searched, see `search_orbits`; values within the bounds.
         repelling: up to which period repelling orbits are searched for.
         switch: whether branches are followed that are born at special points.
         step: the longest step along a branch.
         progress: called with the fraction done and what is being done.
 
     Returns:
-        A DataTree: the search in the attributes; `branch_000`, ... (see `orbits/dataset.py`, with `defect` after a period and,
-        for stable orbits, `kept` after 20); `attractors`, what simulation settled on; `bands`, empty until chaos is classified.
+        A DataTree: the search in the attributes and in `search`; `branch_000`, ... (see `orbits/dataset.py`, with `defect` after
+        a period and, for stable orbits, `kept` after 20); `attractors`, what simulation settled on; `bands`, empty until chaos is
+        classified. The attribute `complete` is 0 where there were more branches than are followed; `left` counts the special
+        points at which no branch was followed because its orbits are less than a hundredth of the largest one's size.
 
     Raises:
         ParameterError: an argument without meaning.
     """
-    low, high = check_bounds(bounds)
-    if not isinstance(system, System):
-        raise ParameterError(f"a diagram takes a System(model=..., load=..., impact=...), got {system!r}")
+    low, high = _checked(system, path, bounds, max_period=max_period, starts=starts, seed=seed, repelling=repelling)
+    check_number("step", step, above=0.0)
+    grid = _values((low, high), values)
     say = progress or (lambda share, what: None)
-    if values is None:
-        grid = np.linspace(low, high, VALUES + 2)[1:-1]
-    else:
-        grid = np.asarray(list(values), dtype=float)
     say(0.0, "searching")
     found = search_orbits(
         system.with_({path: 0.5 * (low + high)}),
@@ -120,130 +108,44 @@ def diagram(
         region=region,
         seed=seed,
         repelling=repelling,
-        progress=lambda share: say(0.4 * share, "searching"),
+        progress=lambda share: say(SEARCHED * share, "searching"),
     )
-    atlas = _Atlas(path, (low, high), max_period, step, switch, say)
+    atlas = Atlas(path, (low, high), max_period, step, switch)
     for i, orbit in enumerate(sorted(found.orbits, key=lambda o: (o.periods, not o.stable))):
         atlas.add(orbit)
-        say(0.4 + 0.5 * (i + 1) / len(found.orbits), f"following, {len(atlas.branches)} branches")
-    say(0.9, "confirming")
-    tree = _tree(system, atlas, found, max_period)
+        say(SEARCHED + (FOLLOWED - SEARCHED) * (i + 1) / len(found.orbits), f"following, {len(atlas.branches)} branches")
+    say(FOLLOWED, "confirming")
+    tree = diagram_tree(
+        system, atlas.branches, found, (low, high), max_period=max_period, complete=int(not atlas.full), left=atlas.left
+    )
     say(1.0, "done")
     return tree
 
 
-@dataclass
-class _Atlas:
-    """The branches known so far."""
-
-    path: str
-    bounds: tuple[float, float]
-    max_period: int
-    step: float
-    switch: bool
-    say: Callable[[float, str], object]
-    branches: list[Branch] = field(default_factory=list)
-
-    def add(self, orbit: PeriodicOrbit) -> None:
-        """Follow an orbit, and what is born on its branch, unless it lies on a known one."""
-        if len(self.branches) >= MOST_BRANCHES or self._known(orbit):
-            return
-        self._keep(continue_orbit(orbit, self.path, self._range(orbit.periods), step=self.step))
-
-    def _keep(self, branch: Branch) -> None:
-        waiting = [branch]
-        while waiting and len(self.branches) < MOST_BRANCHES:
-            branch = waiting.pop(0)
-            self.branches.append(branch)
-            for special in branch.special if self.switch else ():
-                if self._is_born_at(special) and len(self.branches) < MOST_BRANCHES:
-                    longer = special.orbit.periods * (2 if special.kind == "PD" else 1)
-                    waiting += switch_branch(special, self._range(longer), step=self.step, both=False)
-
-    def _is_born_at(self, special: SpecialPoint) -> bool:
-        """Whether a branch that has not been followed begins at a special point within the bounds."""
-        if special.kind not in ("PD", "BPC") or not self.bounds[0] <= special.parameter <= self.bounds[1]:
-            return False
-        longer = special.orbit.periods * (2 if special.kind == "PD" else 1)
-        if longer > self.max_period:
-            return False
-        return not any(
-            branch.points[i].orbit.periods == longer
-            and any(
-                abs(place - special.parameter) < SAME_PLACE * max(1.0, abs(special.parameter))
-                for place in (branch.points[i].parameter, branch.points[-1 - i].parameter)
-            )
-            for branch in self.branches
-            for i in (0,)
-            if branch.origin.startswith(special.kind) or special.kind in branch.ends[0] + branch.ends[1]
-        )
-
-    def _range(self, periods: int) -> tuple[float, float]:
-        """How far a family is followed: where the range ends, or beyond for those that may be loops."""
-        low, high = self.bounds
-        return (low, high) if periods == 1 else (low, FOLLOWED * high if high > 0 else high)
-
-    def _known(self, orbit: PeriodicOrbit) -> bool:
-        value = float(orbit.solution.values[0])
-        return any(
-            same_orbit(orbit, other)
-            for branch in self.branches
-            if branch.parameters.min() <= value <= branch.parameters.max()
-            for other in branch.at(value)
-        )
+def _checked(system: System, path: str, bounds: tuple[float, float], **efforts: int) -> tuple[float, float]:
+    """The bounds; refuses, before anything is computed, what would fail later."""
+    if not isinstance(system, System):
+        raise ParameterError(f"a diagram takes a System(model=..., load=..., impact=...), got {system!r}")
+    low, high = check_bounds(bounds)
+    if path not in system.parameters:
+        system.get(path)  # refuses what leads nowhere
+        raise ParameterError(f"{path} is not a number, so there is no diagram along it")
+    for bound in (low, high):
+        system.with_({path: bound})  # refuses bounds beyond what the system allows
+    for name, effort in efforts.items():
+        check_whole(name, effort, 1 if name in ("max_period", "starts") else 0)
+    return low, high
 
 
-def _tree(system: System, atlas: _Atlas, found: Search, max_period: int) -> xarray.DataTree:
-    import xarray
-
-    import saltus
-
-    nodes: dict[str, Any] = {}
-    for i, branch in enumerate(sorted(atlas.branches, key=lambda b: (b.points[0].orbit.periods, -len(b.points)))):
-        nodes[f"branch_{i:03d}"] = _confirmed(branch)
-    dots = found.settled
-    nodes["attractors"] = xarray.Dataset(
-        {
-            "parameter": ("dot", dots.value, {"long_name": atlas.path}),
-            "amplitude": ("dot", dots.amplitude),
-            "highest": ("dot", dots.highest),
-            "lowest": ("dot", dots.lowest),
-            "periods": ("dot", dots.periods),
-        }
-    )
-    nodes["bands"] = xarray.Dataset({"low": ("band", np.empty(0)), "high": ("band", np.empty(0)), "kind": ("band", np.empty(0, "U2"))})
-    searched = xarray.Dataset(
-        {
-            "value": ("value", found.values),
-            "unsettled": ("value", found.unsettled),
-            "at_rest": ("value", found.at_rest),
-        }
-    )
-    nodes["search"] = searched.rename({"value": "searched"}) if "value" in searched.dims else searched
-    root = xarray.Dataset(
-        attrs={
-            "system": system.to_json(),
-            "path": atlas.path,
-            "coordinate": system.model.coordinates[0],
-            "bounds": list(atlas.bounds),
-            "max_period": max_period,
-            "starts": found.starts,
-            "region": list(found.region),
-            "seed": found.seed,
-            "complete": int(len(atlas.branches) < MOST_BRANCHES),
-            "saltus": saltus.__version__,
-        }
-    )
-    return xarray.DataTree.from_dict({"/": root, **nodes})
-
-
-def _confirmed(branch: Branch) -> xarray.Dataset:
-    """A branch's dataset with its orbits' distances from themselves by direct simulation."""
-    data, orbits = branch.to_xarray(), branch.orbits
-    stable = np.flatnonzero(data["stable"].values)
-    kept = np.full(len(orbits), np.nan)
-    if stable.size:
-        kept[stable] = defects([orbits[i] for i in stable], KEPT_ROUNDS)
-    data["defect"] = ("point", defects(orbits), {"long_name": "distance after one period, by the event-driven flow"})
-    data["kept"] = ("point", kept, {"long_name": f"distance after {KEPT_ROUNDS} periods, where stable"})
-    return data
+def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.ndarray:
+    """Where is searched: given values, all within the bounds, or 25 spread evenly between them."""
+    if values is None:
+        return np.linspace(*bounds, VALUES + 2)[1:-1]
+    try:
+        grid = np.array([float(value) for value in values])
+    except (TypeError, ValueError):
+        raise ParameterError(f"values must be numbers at which to search, got {values!r}") from None
+    outside = grid[~((grid >= bounds[0]) & (grid <= bounds[1]))]
+    if outside.size:
+        raise ParameterError(f"values must lie within the bounds {bounds}, got {outside[0]:g}; widen the bounds or leave it out")
+    return grid

@@ -1,0 +1,89 @@
+"""A diagram as an xarray.DataTree: its branches with their orbits confirmed, and what was searched."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.orbits import Branch, Search, defects
+from saltus.systems import System
+
+if TYPE_CHECKING:
+    import xarray
+
+KEPT_ROUNDS = 20  # periods for which a stable orbit must stay where it is
+
+
+def diagram_tree(
+    system: System, branches: list[Branch], found: Search, bounds: tuple[float, float], **facts: Any
+) -> xarray.DataTree:
+    """The DataTree that `diagram` returns; `facts` are further attributes."""
+    import xarray
+
+    import saltus
+
+    attributes = {
+        "system": system.to_json(),
+        "path": found.path,
+        "coordinate": system.model.coordinates[0],
+        "bounds": list(bounds),
+        "starts": found.starts,
+        "region": list(found.region),
+        "seed": found.seed,
+        "saltus": saltus.__version__,
+        **facts,
+    }
+    nodes = {"/": xarray.Dataset(attrs=attributes)}
+    by_length = sorted(branches, key=lambda b: (b.points[0].orbit.periods, -len(b.points)))
+    nodes |= {f"branch_{i:03d}": confirmed(branch) for i, branch in enumerate(by_length)}
+    return xarray.DataTree.from_dict({**nodes, "attractors": _attractors(found), "bands": _bands(), "search": _search(found)})
+
+
+def confirmed(branch: Branch) -> xarray.Dataset:
+    """A branch's dataset with its orbits' distances from themselves by direct simulation (`kept`: 20 periods, if stable)."""
+    data, orbits = branch.to_xarray(), branch.orbits
+    stable = np.flatnonzero(data["stable"].values)
+    kept = np.full(len(orbits), np.nan)
+    if stable.size:
+        kept[stable] = defects([orbits[i] for i in stable], KEPT_ROUNDS)
+    data["defect"] = ("point", defects(orbits), {"long_name": "distance after one period, by the event-driven flow"})
+    data["kept"] = ("point", kept, {"long_name": f"distance after {KEPT_ROUNDS} periods, where stable"})
+    return data
+
+
+def _attractors(found: Search) -> xarray.Dataset:
+    """What motions settled on, a dot for each at each value."""
+    import xarray
+
+    dots = found.settled
+    columns = {
+        "parameter": ("dot", dots.value, {"long_name": found.path}),
+        "amplitude": ("dot", dots.amplitude),
+        "highest": ("dot", dots.highest),
+        "lowest": ("dot", dots.lowest),
+        "periods": ("dot", dots.periods, {"long_name": "forcing periods after which it repeats"}),
+    }
+    return xarray.Dataset(columns)
+
+
+def _bands() -> xarray.Dataset:
+    """The place of the bands of chaos, which are not classified yet."""
+    import xarray
+
+    return xarray.Dataset({"low": ("band", np.empty(0)), "high": ("band", np.empty(0)), "kind": ("band", np.empty(0, "U2"))})
+
+
+def _search(found: Search) -> xarray.Dataset:
+    """Where was searched, and how many of the motions led to no orbit."""
+    import xarray
+
+    columns = {
+        "unsettled": (
+            "searched",
+            found.unsettled,
+            {"long_name": "motions that did not settle: slow, of a longer period, or chaotic"},
+        ),
+        "at_rest": ("searched", found.at_rest, {"long_name": "motions that came to rest"}),
+    }
+    return xarray.Dataset(columns, coords={"searched": ("searched", found.values, {"long_name": found.path})})
