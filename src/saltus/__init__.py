@@ -13,7 +13,19 @@ if TYPE_CHECKING:
     from saltus.config import load_study
     from saltus.errors import MotionError, ParameterError, SaltusError, TraceError
     from saltus.flow import EventKind, Motion, Sensitivities, Stop, capture_speed, sensitivities, simulate, simulate_many
-    from saltus.orbits import Branch, Locus, PeriodicOrbit, SpecialPoint, continue_orbit, continue_special, find_orbit
+    from saltus.orbits import (
+        Branch,
+        Locus,
+        PeriodicOrbit,
+        SpecialPoint,
+        continue_orbit,
+        continue_special,
+        doubling_cascade,
+        find_orbit,
+        search_orbits,
+        switch_branch,
+    )
+    from saltus.studies import bifurcation_diagram, response_spectrum
     from saltus.systems import (
         EnergyRestitution,
         Harmonic,
@@ -45,7 +57,19 @@ _HOMES = {
         "simulate",
         "simulate_many",
     ),
-    "saltus.orbits": ("Branch", "Locus", "PeriodicOrbit", "SpecialPoint", "continue_orbit", "continue_special", "find_orbit"),
+    "saltus.orbits": (
+        "Branch",
+        "Locus",
+        "PeriodicOrbit",
+        "SpecialPoint",
+        "continue_orbit",
+        "continue_special",
+        "doubling_cascade",
+        "find_orbit",
+        "search_orbits",
+        "switch_branch",
+    ),
+    "saltus.studies": ("bifurcation_diagram", "response_spectrum"),
     "saltus.systems": (
         "EnergyRestitution",
         "Harmonic",
@@ -65,7 +89,7 @@ _HOMES = {
     ),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
-_ROOMS = ("flow", "orbits", "systems", "theory")
+_ROOMS = ("flow", "orbits", "studies", "systems", "theory")
 
 __all__ = [
     "Branch",
@@ -94,17 +118,23 @@ __all__ = [
     "UnitCell",
     "VelocityReduction",
     "WallOscillator",
+    "bifurcation_diagram",
     "capture_speed",
     "continue_orbit",
     "continue_special",
+    "doubling_cascade",
     "find_orbit",
     "flow",
     "load_study",
     "orbits",
     "register",
+    "response_spectrum",
+    "search_orbits",
     "sensitivities",
     "simulate",
     "simulate_many",
+    "studies",
+    "switch_branch",
     "systems",
     "theory",
 ]

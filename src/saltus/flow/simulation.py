@@ -84,7 +84,7 @@ def simulate(
 
     Args:
         system: what moves.
-        velocity: the velocity at the start (a tuple where there are several coordinates).
+        velocity: the velocity at the start (a tuple where there are several coordinates, or 0 for all).
         periods, duration: how long, in forcing periods or in dimensionless time; one of them.
         tol: the error that one step may make, relative to the state, in [1e-15, 1e-6].
         time: the dimensionless time at the start.
@@ -198,6 +198,8 @@ def _start_state(system: System, velocity: Any, coordinates: dict[str, float]) -
         check_number(name, coordinates[name])
     try:
         speeds = np.atleast_1d(velocity)
+        if np.ndim(velocity) == 0 and velocity == 0.0:
+            speeds = np.zeros(len(names))
     except ValueError:
         raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}") from None
     if speeds.shape != (len(names),):
