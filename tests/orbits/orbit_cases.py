@@ -73,7 +73,7 @@ class Hinge(Model):
     edge: float = 0.4
     cubic: float = 0.2
     damping: float = 0.1
-    bias: float = 0.3
+    bias: float = -0.3
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("push",)

@@ -1,0 +1,138 @@
+"""find_orbit on random systems and starts: an orbit that holds, or a refusal in one sentence; nothing else, ever."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from orbit_cases import FREQUENCY, forced, walled
+
+from saltus import MotionError, ParameterError, Record, System, find_orbit, simulate
+
+FEW = settings(max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+numbers = {
+    "beta0": st.floats(0.5, 2.2),
+    "C": st.floats(0.03, 0.5),
+    "V": st.floats(-1.5, 0.3),
+    "H": st.floats(0.05, 1.5),
+    "W": st.floats(0.3, 4.0),
+    "e": st.one_of(st.just(1.0), st.floats(0.3, 1.0)),
+    "mean": st.one_of(st.just(0.0), st.floats(-0.3, 0.3)),
+}
+
+
+def check(orbit):
+    """That it is what it says, by means of its own."""
+    times = np.append(orbit.crossings, orbit.crossings[:1] + orbit.duration)
+    growth = max(1.0, abs(orbit.multipliers[0]))
+    assert orbit.defect < 1e-9 * growth
+    assert orbit.residual < 1e-9
+    assert orbit.admissible
+    assert (orbit.speeds > 0.0).all()
+    assert (np.diff(times) > 0.0).all()
+    motion = simulate(orbit.system, **orbit.start(), periods=orbit.periods, tol=1e-13)
+    assert motion.side != 0  # it does not rest
+    if len(orbit.crossings):
+        inner = [t for t in motion.crossings.time if 1e-6 < t - orbit.crossings[0] < orbit.duration - 1e-6]
+        assert len(inner) == len(orbit.crossings) - 1
+
+
+def outcome(system, **arguments):
+    """The orbit, or None after a refusal in a sentence that says what to do."""
+    try:
+        return find_orbit(system, parameters=(FREQUENCY,), **arguments)
+    except MotionError as refusal:
+        sentence = str(refusal)
+        assert "\n" not in sentence
+        assert 20 < len(sentence) < 500
+        assert any(word in sentence for word in ("try", "start", "reaches", "name", "choose", "give")), sentence
+        return None
+
+
+@FEW
+@given(theta=st.floats(-2.0, 2.0), velocity=st.floats(-1.0, 1.0), system=st.builds(forced, **numbers))
+def test_settled_motions_of_random_systems(system, theta, velocity):
+    orbit = outcome(system, theta=theta, velocity=velocity, settle=60, longest=3)
+    if orbit is not None:
+        check(orbit)
+
+
+@FEW
+@given(
+    theta=st.floats(-2.0, 2.0), velocity=st.floats(-1.0, 1.0), period=st.integers(1, 4), system=st.builds(forced, **numbers)
+)
+def test_orbits_near_random_states(system, theta, velocity, period):
+    """Newton's method from what is no orbit at all."""
+    orbit = outcome(system, theta=theta, velocity=velocity, settle=0, period=period)
+    if orbit is not None:
+        check(orbit)
+        assert period % orbit.periods == 0
+
+
+@FEW
+@given(
+    x=st.floats(-2.0, -0.5),
+    velocity=st.floats(-1.0, 1.0),
+    wall=st.floats(-0.4, 1.2),
+    W=st.floats(0.4, 3.0),
+    A=st.floats(0.05, 1.5),
+    e=st.floats(0.3, 1.0),
+    settle=st.sampled_from([0, 50]),
+)
+def test_impact_oscillators(x, velocity, wall, W, A, e, settle):
+    orbit = outcome(walled(A=A, W=W, wall=wall, e=e), x=x, velocity=velocity, settle=settle, longest=3)
+    if orbit is not None:
+        check(orbit)
+
+
+def test_chaos_is_refused_with_what_to_try():
+    with pytest.raises(MotionError, match=r"not settled.*chaotic.*settle=0"):
+        find_orbit(forced(H=2.0, W=1.2), theta=0.3, parameters=(FREQUENCY,))
+
+
+def test_rest_is_refused_with_what_to_try():
+    with pytest.raises(MotionError, match=r"rest at contact.*start farther"):
+        find_orbit(forced(H=0.03), theta=0.05, parameters=(FREQUENCY,))
+
+
+def test_a_load_without_frequency_has_no_orbits():
+    still = forced().with_({"load.frequency": None, "load.horizontal": 0.5})
+    with pytest.raises(ParameterError, match=r"without a frequency.*give one"):
+        find_orbit(still, theta=0.3)
+
+
+def test_a_record_has_no_orbits():
+    shaking = Record(time=np.linspace(0.0, 10.0, 41), value=np.sin(np.linspace(0.0, 10.0, 41)))
+    with pytest.raises(ParameterError, match=r"Record is not periodic.*Harmonic"):
+        find_orbit(forced().with_({"load.horizontal": shaking}), theta=0.3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"theta": 0.3, "period": 0}, "period"),
+        ({"theta": 0.3, "period": 1.5}, "whole number"),
+        ({"theta": 0.3, "settle": -1}, "settle"),
+        ({"theta": 0.3, "longest": 0}, "longest"),
+        ({"theta": 0.3, "longest": True}, "longest|number"),
+        ({"theta": math.nan}, "theta"),
+        ({"theta": "0.3"}, "theta"),
+        ({"theta": 0.3, "velocity": math.inf}, "velocity"),
+        ({"thetta": 0.3}, "theta"),
+        ({}, "theta"),
+        ({"theta": 0.3, "parameters": ("load.frequenzy",)}, "load.frequency"),
+        ({"theta": 0.3, "parameters": ("model",)}, "model"),
+        ({"theta": 0.3, "parameters": 3}, "parameters"),
+    ],
+)
+def test_arguments_without_meaning_are_refused_in_a_sentence(arguments, sentence):
+    with pytest.raises(ParameterError, match=sentence) as refusal:
+        find_orbit(forced(), **({"parameters": (FREQUENCY,)} | arguments))
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("wrong", [None, "system", 3, System])
+def test_what_is_no_system_is_refused(wrong):
+    with pytest.raises(ParameterError, match="takes a System"):
+        find_orbit(wrong, theta=0.3)
