@@ -20,10 +20,10 @@ from saltus.flow.steps import column_step, leaps, step_size
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-SEGMENT_START, SEGMENT_END, APPROACH = 0, 1, 2  # in `spans`: times, and the speed of the gap before the impact that starts it
-BEFORE, ALONG = 0, 1  # in `sides`: the side before that impact (0: started from a state), and the side of the segment
-QUOTIENT, RESET_DRIFT, KINDS = 0, 1, 2  # in `ends`: (x - contact) / duration, dv+/dt; then x, v, a at the end, x, v, a at the start
-HUMP, HUMP_TIME, TOP, BOTTOM, LEAST_MARGIN = 0, 1, 2, 3, 4  # in `looks`: the gap's lowest inner minimum, when, largest and least x
+SEGMENT_START, SEGMENT_END, APPROACH = 0, 1, 2  # in `spans`: times, and the gap's speed before the impact that starts it
+BEFORE, ALONG = 0, 1  # in `sides`: the side before that impact (0: from a state), and the side of the segment
+QUOTIENT, RESET_DRIFT, KINDS = 0, 1, 2  # in `ends`: (x - contact) / duration, dv+/dt; x, v, a at the end and at the start
+HUMP, HUMP_TIME, TOP, BOTTOM, LEAST_MARGIN = 0, 1, 2, 3, 4  # in `looks`: lowest inner minimum of the gap, when, range of x
 MOST_STEPS = 100_000  # of one segment
 SHORT = 1e-6  # a segment's duration below which the derivatives of its quotient are those of its beginning
 
@@ -68,7 +68,7 @@ def roots_within(p, n, roots, noise):
 
 @jit
 def look(where, model, work, side, t, h, order, roots, seen):
-    """Take what a step of a segment shows into account: turning points of the coordinate, minima of the gap and of the margins."""
+    """Take in what a step of a segment shows: turning points of the coordinate, minima of the gap and of the margins."""
     q, v, m, poly = work[0], work[1], work[4], work[6]
     seen[TOP], seen[BOTTOM] = max(seen[TOP], q[0, 0]), min(seen[BOTTOM], q[0, 0])
     scale_gap(v[0], 0, order, h, poly)

@@ -259,8 +259,8 @@ class _Walk:
 
     def _closes(self, a: Point, b: Point) -> bool:
         """Whether the step goes by the first point of the branch."""
-        first = self.points[0].parameter
-        if (a.parameter - first) * (b.parameter - first) > 0.0:
+        begin = self.points[0].parameter
+        if (a.parameter - begin) * (b.parameter - begin) > 0.0:
             return False
         shift = separation(self.points[0].curve.problem, self.points[0].solution.unknowns, b)
         length = b.curve.norm(b.place - a.place)

@@ -34,7 +34,7 @@ def _defects(orbits: list[PeriodicOrbit], periods: int, tol: float) -> np.ndarra
     names = system.model.coordinates
     starts = [orbit.start() for orbit in orbits]
     values = np.array([orbit.solution.values[0] for orbit in orbits])
-    begin = {name: np.array([start[name] for start in starts], dtype=float) for name in names}
+    begin: dict[str, Any] = {name: np.array([start[name] for start in starts], dtype=float) for name in names}
     velocity: Any = np.array([start["velocity"] for start in starts], dtype=float)
     times = np.array([start.get("time", 0.0) for start in starts])
     columns = velocity if velocity.ndim == 1 else tuple(velocity.T)

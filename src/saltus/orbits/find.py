@@ -12,6 +12,8 @@ from saltus.flow import EventKind, Motion, simulate
 from saltus.orbits.newton import solve
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
+from saltus.orbits.releases import load_releases
+from saltus.orbits.resting import resting_near
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import half, is_symmetric, keeps_symmetry
 from saltus.systems import System
@@ -34,17 +36,20 @@ def find_orbit(
 ) -> PeriodicOrbit:
     """The periodic orbit that a motion settles on, or, with settle=0, the one that lies near it, stable or not.
 
+    Where impacts have a loss and the load pulls the system off its contact in every period, that may be a `RestingOrbit`.
+
     Args:
         system: what moves, under a load with a frequency.
         velocity, coordinates: the state at phase 0, by the model's names: theta=0.3.
-        period: how many forcing periods the orbit takes; by default the fewest, up to `longest`, after which the settled motion returns.
+        period: how many forcing periods the orbit takes; by default the fewest, up to `longest`, after which the settled motion
+            returns.
         settle: forcing periods to let pass first; by default as many as it takes, up to 4960.
         longest: the longest period looked for.
         parameters: dotted paths along which the orbit will be continued; `continue_orbit` sees to them itself.
 
     Raises:
         ParameterError: an argument without meaning.
-        MotionError: the motion comes to rest, does not settle, or Newton's method does not converge; with what to do.
+        MotionError: the motion comes to rest for good, does not settle, or Newton's method does not converge; with what to do.
     """
     if not isinstance(system, System):
         raise ParameterError(f"find_orbit takes a System(model=..., load=..., impact=...), got {system!r}")
@@ -66,8 +71,9 @@ def find_orbit(
         if q is not None:
             return _polish(base, state, q, passed)
     raise MotionError(
-        f"the motion has not settled on a periodic orbit of up to {period or longest} forcing periods after {passed}: it is chaotic, "
-        "slow to settle or longer; try another start, longest=..., or settle=0 with period=... for an unstable orbit near the start"
+        f"the motion has not settled on a periodic orbit of up to {period or longest} forcing periods after {passed}: it is "
+        "chaotic, slow to settle or longer; try another start, longest=..., or settle=0 with period=... for an unstable orbit "
+        "near the start"
     )
 
 
@@ -81,16 +87,30 @@ def check_whole(name: str, value: Any, least: int) -> None:
 def _after(system: System, state: dict[str, Any], periods: int) -> dict[str, Any]:
     """The state so many forcing periods later."""
     motion = simulate(system, **state, periods=periods, dense=False)
-    _refuse_rest(motion, state)
+    _refuse_rest(system, motion, state)
     return _state_of(system, motion)
 
 
-def _refuse_rest(motion: Motion, state: dict[str, Any]) -> None:
-    if motion.side == 0 or not motion.phase_known:
-        start = ", ".join(f"{name}={value!r}" for name, value in state.items())
+def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
+    """Refuse a motion that stays at the contact for good, or has lost its phase there."""
+    start = ", ".join(f"{name}={value!r}" for name, value in state.items())
+    farther = "start farther from it, for instance with a larger coordinate or velocity"
+    released = bool(load_releases(system))
+    if not motion.phase_known and not released:
         raise MotionError(
-            f"the motion from {start} comes to rest at contact, the undeformed state, which is no orbit to follow; start farther "
-            "from it, for instance with a larger coordinate or velocity"
+            f"the motion from {start} settles on the undeformed state, which is no orbit to follow: its impacts lose nothing and get "
+            f"ever smaller without end; {farther}"
+        )
+    if not motion.phase_known:
+        raise MotionError(
+            f"the impacts of the motion from {start} lose nothing and become too small to be followed before the load pulls again, so "
+            "its phase is lost and no orbit can be read from it; start farther from the contact, or give the impacts a loss "
+            "(an e below 1): then it rests until the load pulls, which is an orbit"
+        )
+    if motion.side == 0 and not released:
+        raise MotionError(
+            f"the motion from {start} comes to rest at contact for good, as the load never pulls it off: it settles on the undeformed "
+            f"state, which is no orbit to follow; {farther}"
         )
     if motion.limit is not None:
         raise MotionError(f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0: no orbit there")
@@ -135,6 +155,9 @@ def _polish(base: Problem, state: dict[str, Any], periods: int, passed: int | No
     orbit = orbit_near(base, state, periods)
     if orbit is not None and orbit.admissible:
         return orbit
+    resting = resting_near(base, simulate(base.system, **state, periods=periods, dense=False), periods)
+    if resting is not None:
+        return resting
     when = "from the start" if passed is None else f"after {passed} forcing periods"
     raise MotionError(
         f"Newton's method finds no orbit of period {periods} near the motion {when}; "

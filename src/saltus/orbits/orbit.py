@@ -147,7 +147,7 @@ class PeriodicOrbit:
 
     @property
     def grazes(self) -> bool:
-        """Whether it touches the contact without speed: then its motions beside have no derivative, and multipliers mean nothing."""
+        """Whether it touches the contact without speed: motions beside it then have no derivative, and multipliers no meaning."""
         return min(abs(self.clearance), abs(self.slowest)) < TOUCH
 
     @property
@@ -219,5 +219,6 @@ class PeriodicOrbit:
         kind = "symmetric " if self.symmetric else ""
         return (
             f"PeriodicOrbit({kind}period {self.periods}, {self.signature.crossings} impacts, amplitude={self.amplitude:.9g}, "
-            f"{'stable' if self.stable else 'unstable'}, largest multiplier {self.multipliers[0]:.6g}, residual={self.residual:.1g})"
+            f"{'stable' if self.stable else 'unstable'}, largest multiplier {self.multipliers[0]:.6g}, "
+            f"residual={self.residual:.1g})"
         )

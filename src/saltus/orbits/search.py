@@ -22,7 +22,7 @@ TRANSIENT = 24  # forcing periods of each motion in which near returns are looke
 RETURN = 0.15  # distance of a near return from which Newton's method is tried for an orbit that repels
 GUESSES = 12  # the nearest returns that are tried, for each period
 SETTLED = 1e-6
-EVEN = 1.32471795724474602596 ** -np.array([1.0, 2.0])  # steps that cover a square evenly: powers of the plastic number, x^3 = x + 1
+EVEN = 1.32471795724474602596 ** -np.array([1.0, 2.0])  # steps that cover a square evenly: x^-1, x^-2 of x^3 = x + 1
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class Search:
     longest: int  # forcing periods
     region: tuple[float, float]
     seed: int
-    unsettled: np.ndarray  # (values,): how many of the motions did not settle on an orbit of up to so many periods: slow or chaotic
-    at_rest: np.ndarray  # (values,): and how many came to rest
+    unsettled: np.ndarray  # (values,): how many motions did not settle on an orbit of up to so many periods: slow or chaotic;
+    at_rest: np.ndarray  # (values,): how many came to rest
     settled: Settled  # the attractors as simulation shows them
 
     def __repr__(self) -> str:
@@ -78,8 +78,8 @@ def search_orbits(
 ) -> Search:
     """Periodic orbits of up to `longest` forcing periods at several values of a parameter, each once for each value.
 
-    Initial states are spread evenly (a sequence of low discrepancy) over the region around the contact, or around 0 for a model without
-    one. Motions that settle lead to the attracting orbits. Returns of the motions near to where they were, on their way or in
+    Initial states are spread evenly (a sequence of low discrepancy) over the region around the contact, or around 0 for a
+    model without one. Motions that settle lead to the attracting orbits. Returns of the motions near to where they were, on their way or in
     chaos, are first guesses for Newton's method, which finds repelling ones, of up to `repelling` forcing periods (by default
     `longest`; 0 looks for none).
 
