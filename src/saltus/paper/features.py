@@ -1,0 +1,113 @@
+"""What a spectrum or a diagram shows, as numbers, from its DataTree alone: peaks, detached loops, coexisting motions, onsets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+PROMINENT = 0.02  # rad by which a peak rises above the valleys beside it
+FREE_ENDS = ("closes", "bound")  # of a branch that hangs on no other
+
+
+def named_branches(spectrum: Any) -> Iterator[tuple[str, Any]]:
+    """(name, Dataset) of every branch, in order."""
+    for name in sorted(spectrum.children):
+        if name.startswith("branch_"):
+            yield name, spectrum[name].to_dataset()
+
+
+def within(spectrum: Any, branch: Any) -> np.ndarray:
+    """Which points lie within the study's range: families of longer periods are followed beyond."""
+    low, high = spectrum.attrs["bounds"]
+    values = branch["parameter"].values
+    return np.asarray((values >= low) & (values <= high))
+
+
+def main_branch(spectrum: Any) -> Any:
+    """The period-1 branch that covers most of the range."""
+    return max((b for _, b in named_branches(spectrum) if int(b["periods"][0]) == 1), key=lambda b: np.ptp(b["parameter"].values))
+
+
+def detached(spectrum: Any) -> list[tuple[str, Any]]:
+    """The branches that no special point ties to another one and that reach into the range, without the main one."""
+    found = []
+    for name, branch in named_branches(spectrum):
+        free = all(str(end).startswith(FREE_ENDS) for end in np.atleast_1d(branch.attrs["ends"]))
+        same = branch.equals(main_branch(spectrum))
+        if branch.attrs["origin"] == "start" and free and not same and within(spectrum, branch).any():
+            found.append((name, branch))
+    return found
+
+
+def peaks(branch: Any, below: float = np.inf) -> np.ndarray:
+    """(parameter, amplitude) of the amplitude's maxima along a branch, at parameters under `below` and in their order, (n, 2)."""
+    from scipy.signal import find_peaks
+
+    x, y = branch["parameter"].values, branch["amplitude"].values
+    at, _ = find_peaks(y, prominence=PROMINENT)
+    rows = np.stack([x[at], y[at]], axis=1)
+    return np.asarray(rows[rows[:, 0] < below][np.argsort(rows[rows[:, 0] < below, 0])])
+
+
+def superharmonic(branch: Any) -> np.ndarray:
+    """The peaks at frequencies below 2/3 of that of the highest one, (n, 2): primary resonance is one to one, these are not."""
+    top = branch["parameter"].values[int(np.argmax(branch["amplitude"].values))]
+    return peaks(branch, below=2 / 3 * float(top))
+
+
+def amplitudes_at(branch: Any, value: float, stable: bool | None = None) -> np.ndarray:
+    """The amplitudes with which a branch passes a value of the parameter, between points (both stable, or both not)."""
+    x, y, s = branch["parameter"].values, branch["amplitude"].values, branch["stable"].values.astype(bool)
+    passes = (x[:-1] - value) * (x[1:] - value) <= 0
+    passes &= x[:-1] != x[1:]
+    if stable is not None:
+        passes &= (s[:-1] == stable) & (s[1:] == stable)
+    i = np.flatnonzero(passes)
+    share = (value - x[i]) / (x[i + 1] - x[i])
+    return np.asarray(y[i] + share * (y[i + 1] - y[i]))
+
+
+def stable_motions(spectrum: Any, value: float) -> int:
+    """How many stable periodic motions coexist at a value of the parameter, mirror images counted once."""
+    return sum(len(amplitudes_at(branch, value, stable=True)) for _, branch in named_branches(spectrum))
+
+
+def most_coexisting(spectrum: Any, samples: int = 400) -> tuple[int, float]:
+    """The largest such number over the range, and where it is reached first."""
+    low, high = spectrum.attrs["bounds"]
+    values = low + (high - low) * (np.arange(samples) + 0.5) / samples
+    counts = [stable_motions(spectrum, value) for value in values]
+    return max(counts), float(values[int(np.argmax(counts))])
+
+
+def first_fold(branch: Any) -> tuple[float, float]:
+    """(parameter, amplitude) at which a branch begins: its fold of least parameter, nan where it has none."""
+    kinds = branch["kind"].values if "kind" in branch else np.empty(0)
+    folds = np.flatnonzero(kinds == "LP")
+    if not folds.size:
+        return (np.nan, np.nan)
+    least = folds[int(np.argmin(branch["special_parameter"].values[folds]))]
+    return float(branch["special_parameter"][least]), float(branch["special_amplitude"][least])
+
+
+def count(spectrum: Any, kind: str) -> int:
+    """How many special points of a kind lie on all branches within the range."""
+    low, high = spectrum.attrs["bounds"]
+    return sum(
+        int(((b["kind"] == kind) & (b["special_parameter"] >= low) & (b["special_parameter"] <= high)).sum())
+        for _, b in named_branches(spectrum)
+        if "kind" in b
+    )
+
+
+def turning(branch: Any) -> np.ndarray:
+    """The parameters of the folds at which the stability changes: there motions jump, (n,)."""
+    if "kind" not in branch:
+        return np.empty(0)
+    folds = branch["special_parameter"].values[branch["kind"].values == "LP"]
+    x, s = branch["parameter"].values, branch["stable"].values
+    cuts = np.flatnonzero(s[1:] != s[:-1])
+    width = [abs(x[c + 1] - x[c]) + 1e-2 * np.ptp(x) for c in cuts]
+    return np.array([f for f in folds if any(abs(f - x[c]) <= w for c, w in zip(cuts, width, strict=True))])

@@ -1,0 +1,53 @@
+"""Fig. 10: response spectra under load (ii), a harmonic horizontal ground motion, for two amplitudes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from saltus.paper import spectra
+from saltus.paper.claim import Claim
+from saltus.paper.fig09 import FREQUENCIES, draw_panel
+from saltus.paper.figure import PaperFigure
+from saltus.paper.statements_spectra import ground_spectra
+from saltus.plots.response import legend
+from saltus.plots.style import DOUBLE_COLUMN, new_figure, styled
+
+AMPLITUDES = {"a": 0.25, "b": 0.5}  # zetahat
+
+
+def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any:
+    """One spectrum for each amplitude; options are those of `response_spectrum`."""
+    panels = {name: spectra.spectrum(spectra.on_ground(amplitude=z), FREQUENCIES, **options) for name, z in amplitudes.items()}
+    return spectra.together(panels, what="response spectrum under load (ii)")
+
+
+@styled
+def draw(data: Any) -> Any:
+    """(a) and (b), a panel for each amplitude."""
+    panels = {name: tree for name, tree in data.children.items() if name in AMPLITUDES}
+    figure = new_figure(DOUBLE_COLUMN, 95.0)
+    axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    for ax, (name, tree) in zip(axes, panels.items(), strict=True):
+        draw_panel(ax, tree, name, rf"$\widehat{{\zeta}}={AMPLITUDES[name]:g}$", r"\theta_{\rm eq}")
+        ax.set_xlabel(r"frequency $\Omega$")
+    legend(figure, list(panels.values()))
+    return figure
+
+
+def claims(data: Any) -> list[Claim]:
+    """Every feature that the text names, but for chaos and quasi-periodicity."""
+    return ground_spectra(data, {name: AMPLITUDES[name] for name in data.children})
+
+
+FIGURE = PaperFigure(
+    name="fig10",
+    title="Fig. 10: response spectra under load (ii)",
+    caption=(
+        "As Fig. 9, under the horizontal ground motion ζ = ζ̂ sin Ωτ, in units of θ_eq = arccos(cos β₀ − ζ̂) − β₀. Below the "
+        "frequency at which the main branch begins the ground's acceleration is too small for any motion but rest."
+    ),
+    compute=compute,
+    draw=draw,
+    claims=claims,
+)

@@ -1,0 +1,43 @@
+"""Fig. 11: bifurcation diagrams under load (i), a harmonic horizontal force, for two low frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from saltus.paper import diagrams
+from saltus.paper.claim import Claim
+from saltus.paper.figure import PaperFigure
+from saltus.paper.statements_spectra import force_diagrams
+
+FREQUENCIES = {"a": 0.5, "b": 1.0}  # Omega
+LARGEST = 3.0  # Hhat
+
+
+def compute(frequencies: Mapping[str, float] = FREQUENCIES, **options: Any) -> Any:
+    """One diagram for each frequency; options are those of `bifurcation_diagram`."""
+    return diagrams.compute(frequencies, LARGEST, **options)
+
+
+def draw(data: Any) -> Any:
+    """(a) and (b), a panel for each frequency."""
+    return diagrams.draw(data, FREQUENCIES, zoomed=0.2)
+
+
+def claims(data: Any) -> list[Claim]:
+    """Every feature that the text names, but for chaos."""
+    return force_diagrams("fig11", data, {name: FREQUENCIES[name] for name in data.children})
+
+
+FIGURE = PaperFigure(
+    name="fig11",
+    title="Fig. 11: bifurcation diagrams under load (i), Ω = 0.5 and 1",
+    caption=(
+        "Largest rotation over one period of the motion against the amplitude Ĥ of the horizontal force H = Ĥ sin Ωτ, V = −0.5, "
+        "β₀ = 80°, C = 0.1, lines and dots as in Fig. 9. Purple: the quasi-static bifurcation at Hcr = |V/tan β₀|, below which "
+        "the undeformed state is held; stable motions exist beside it from far smaller amplitudes on (insets)."
+    ),
+    compute=compute,
+    draw=draw,
+    claims=claims,
+)

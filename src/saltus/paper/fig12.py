@@ -1,0 +1,39 @@
+"""Fig. 12: bifurcation diagrams under load (i), a harmonic horizontal force, for two high frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from saltus.paper import diagrams
+from saltus.paper.claim import Claim
+from saltus.paper.figure import PaperFigure
+from saltus.paper.statements_spectra import force_diagrams
+
+FREQUENCIES = {"a": 2.0, "b": 4.0}  # Omega
+LARGEST = 5.0  # Hhat
+
+
+def compute(frequencies: Mapping[str, float] = FREQUENCIES, **options: Any) -> Any:
+    """One diagram for each frequency; options are those of `bifurcation_diagram`."""
+    return diagrams.compute(frequencies, LARGEST, **options)
+
+
+def draw(data: Any) -> Any:
+    """(a) and (b), a panel for each frequency."""
+    return diagrams.draw(data, FREQUENCIES, zoomed=0.2)
+
+
+def claims(data: Any) -> list[Claim]:
+    """Every feature that the text names, but for chaos."""
+    return force_diagrams("fig12", data, {name: FREQUENCIES[name] for name in data.children})
+
+
+FIGURE = PaperFigure(
+    name="fig12",
+    title="Fig. 12: bifurcation diagrams under load (i), Ω = 2 and 4",
+    caption=("As Fig. 11, for two higher frequencies."),
+    compute=compute,
+    draw=draw,
+    claims=claims,
+)

@@ -1,0 +1,344 @@
+"""What section 6 says of Figs. 9 to 13, judged by their data: knots, superharmonics, loops, jumps, onsets, coexistence, symmetry.
+
+Its statements on chaotic and quasi-periodic bands need verdicts on motions that are not periodic; they are not judged here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from saltus.paper.claim import Claim, check
+from saltus.paper.features import (
+    amplitudes_at,
+    count,
+    detached,
+    first_fold,
+    main_branch,
+    most_coexisting,
+    named_branches,
+    stable_motions,
+    superharmonic,
+)
+
+CONFIRMED = 1e-8  # distance of a stable motion from itself, by direct simulation
+ON_BRANCH = 2e-2  # rad between a simulated attractor and the line drawn between the points of its branch
+EQUAL = 1e-10  # rad between amplitudes that are equal
+APART = 0.1  # rad: motions or amplitudes that plainly differ
+
+
+def confirmed(name: str, where: str, data: Any) -> Claim:
+    """The paper's own check, made of everything drawn: stable motions are those of the non-smooth equation."""
+    kept, off, number, dots = 0.0, 0.0, 0, 0
+    for spectrum in data.children.values():
+        for _, branch in named_branches(spectrum):
+            stable = branch["stable"].values.astype(bool)
+            kept = max(kept, float(np.max(branch["kept"].values[stable], initial=0.0)))
+            number += int(stable.sum())
+        places = spectrum["attractors"]
+        for value, amplitude in zip(places["parameter"].values, places["amplitude"].values, strict=True):
+            off, dots = max(off, _off_branches(spectrum, float(value), float(amplitude))), dots + 1
+    return check(
+        f"{name}-confirmed",
+        where,
+        "The stable motions are confirmed by direct integration of the equation without smoothing",
+        printed=number > 0 and dots > 0 and kept < CONFIRMED and off < ON_BRANCH,
+        evidence=f"{number} stable orbits return to within {kept:.1e} after 20 of their periods; {dots} attractors simulated "
+        f"from many starts lie within {off:.1e} rad of a stable branch",
+    )
+
+
+def _off_branches(spectrum: Any, value: float, amplitude: float) -> float:
+    known = [a for _, branch in named_branches(spectrum) for a in amplitudes_at(branch, value, stable=True)]
+    return float(np.abs(np.array(known) - amplitude).min(initial=np.inf))
+
+
+def force_spectra(data: Any, amplitudes: dict[str, float]) -> list[Claim]:
+    """Fig. 9; `amplitudes` by panel."""
+    return [
+        _knots_appear(data, amplitudes),
+        _knots_differ(data, amplitudes),
+        _superharmonics(data, amplitudes),
+        _loops("fig09-loops", "Fig. 9, third bullet", {p: h for p, h in amplitudes.items() if h >= 0.5}, data),
+        _jumps(data),
+        confirmed("fig09", "Fig. 9", data),
+    ]
+
+
+def _knots_appear(data: Any, amplitudes: dict[str, float]) -> Claim:
+    """Knots and unstable motions of the primary resonance: above two thirds of its frequency."""
+    found, unstable = {}, {}
+    for panel, h in amplitudes.items():
+        spectrum, branch = data[panel], main_branch(data[panel])
+        start = 2 / 3 * float(branch["parameter"][int(np.argmax(branch["amplitude"].values))])
+        primary = branch["parameter"].values > start
+        found[h] = int((spectrum["knots"]["parameter"].values > start).sum())
+        unstable[h] = int((branch["stable"].values[primary] == 0).sum())
+    low, middle = [h for h in found if h <= 0.2], [h for h in found if 0.5 <= h <= 1.5]
+    return check(
+        "fig09-knots-appear",
+        "Fig. 9, first bullet",
+        "The primary resonance is a classical one at Ĥ = 0.2; at Ĥ = 0.5, 1, 1.5 it has unstable branches and knots",
+        printed=not any(found[h] + unstable[h] for h in low) and all(found[h] and unstable[h] for h in middle),
+        evidence="knots at "
+        + ", ".join(f"Ĥ = {h:g}: {n} ({unstable[h]} unstable points)" for h, n in found.items() if h in (*low, *middle)),
+    )
+
+
+def _knots_differ(data: Any, amplitudes: dict[str, float]) -> Claim:
+    apart, equal, parts = [], [], []
+    for panel, h in amplitudes.items():
+        knots = data[panel]["knots"]
+        apart += knots["apart"].values.tolist()
+        equal += np.ptp(knots["amplitude"].values, axis=1).tolist()
+        if knots.sizes["knot"]:
+            k = int(np.argmax(knots["parameter"].values))
+            one, two = np.rad2deg(knots["peak"].values[k])
+            parts.append(
+                f"Ĥ = {h:g}: Ω = {float(knots['parameter'][k]):.6f}, max|θ| = {float(knots['amplitude'][k, 0]):.6f}, "
+                f"peaks at phases {one:.0f}° and {two:.0f}°"
+            )
+    return check(
+        "fig09-knots",
+        "Fig. 9, first bullet",
+        "At a self-intersection two stable motions share amplitude and frequency and differ in phase",
+        printed=bool(apart) and min(apart) > APART and max(equal) < EQUAL,
+        evidence=f"{len(apart)} knots, amplitudes equal to {max(equal, default=np.nan):.0e}; " + "; ".join(parts),
+    )
+
+
+def _superharmonics(data: Any, amplitudes: dict[str, float]) -> Claim:
+    number, unstable, parts = {}, {}, []
+    for panel, h in amplitudes.items():
+        branch = main_branch(data[panel])
+        top = superharmonic(branch)
+        number[h] = len(top)
+        low = branch["parameter"].values < (float(top[-1, 0]) * 1.2 if len(top) else 0.0)
+        unstable[h] = int((branch["stable"].values[low] == 0).sum())
+        parts.append(f"Ĥ = {h:g}: Ω = " + (", ".join(f"{x:.3f}" for x in top[::-1, 0]) or "none"))
+    return check(
+        "fig09-superharmonic",
+        "Fig. 9, second bullet",
+        "There are superharmonic resonances at every amplitude, with unstable branches at Ĥ = 0.2 and 0.5",
+        printed=all(number.values()) and all(unstable[h] > 0 for h in amplitudes.values() if h <= 0.5),
+        evidence="peaks below two thirds of the primary one's frequency, " + "; ".join(parts),
+    )
+
+
+def _loops(id: str, where: str, amplitudes: dict[str, float], data: Any) -> Claim:
+    """In each panel a detached branch that somewhere is larger than all of the main one is there."""
+    larger, parts = {}, []
+    for panel, size in amplitudes.items():
+        spectrum, low_high = data[panel], data[panel].attrs["bounds"]
+        found = detached(spectrum)
+        main = main_branch(spectrum)
+        above = [branch for _, branch in found if _rises_above(branch, main, low_high)]
+        larger[size] = len(above)
+        spans = [
+            f"period {int(b['periods'][0])}, Ω {float(b['parameter'].min()):.3f} to {float(b['parameter'].max()):.3f}"
+            for b in above
+        ]
+        parts.append(f"{size:g}: " + (", ".join(spans[:3]) or "none"))
+    return check(
+        id,
+        where,
+        "A part of the spectrum is detached from the main one and has larger rotations",
+        printed=bool(larger) and all(larger.values()),
+        evidence="families that no bifurcation ties to the main branch, by load amplitude: " + "; ".join(parts),
+    )
+
+
+def _rises_above(branch: Any, main: Any, bounds: Any) -> bool:
+    x, y = branch["parameter"].values, branch["amplitude"].values
+    return any(
+        low <= amplitude - np.max(amplitudes_at(main, value), initial=0.0)
+        for value, amplitude in zip(x, y, strict=True)
+        for low in (APART,)
+        if bounds[0] <= value <= bounds[1]
+    )
+
+
+def _jumps(data: Any) -> Claim:
+    before = np.concatenate([spectrum["jumps"]["before"].values for spectrum in data.children.values()])
+    after = np.concatenate([spectrum["jumps"]["after"].values for spectrum in data.children.values()])
+    away = np.abs(after - before) > APART
+    return check(
+        "fig09-jumps",
+        "Fig. 9, third bullet",
+        "Motions jump at the folds of the detached loops",
+        printed=before.size > 0 and bool(away.all()),
+        evidence=f"{before.size} folds where a loop's stability ends; simulated just past them, {int(away.sum())} motions settle "
+        f"on another amplitude (max|θ| changes by {np.abs(after - before).min(initial=np.inf):.2f} rad at least)",
+    )
+
+
+def ground_spectra(data: Any, amplitudes: dict[str, float]) -> list[Claim]:
+    """Fig. 10; `amplitudes` by panel."""
+    tops = {z: superharmonic(main_branch(data[panel])) for panel, z in amplitudes.items()}
+    least = {z: float(main_branch(data[panel])["parameter"].min()) for panel, z in amplitudes.items()}
+    return [
+        check(
+            "fig10-superharmonic",
+            "Fig. 10, first bullet",
+            "Under a ground motion there are no superharmonic resonances",
+            printed=bool(tops) and not any(len(top) for top in tops.values()),
+            evidence="; ".join(
+                f"ζ̂ = {z:g}: {len(top)} peaks below two thirds of the primary one's frequency, the main branch begins at "
+                f"Ω = {least[z]:.4f}"
+                for z, top in tops.items()
+            ),
+        ),
+        _loops("fig10-loops", "Fig. 10, first bullet", amplitudes, data),
+        confirmed("fig10", "Fig. 10", data),
+    ]
+
+
+def force_diagrams(name: str, data: Any, frequencies: dict[str, float]) -> list[Claim]:
+    """Figs. 11 and 12; `frequencies` by panel."""
+    return [
+        _undeformed(name, data, frequencies),
+        _anticipated(name, data, frequencies),
+        _grows(name, data, frequencies),
+        _flattens(name, data, frequencies),
+        coexistence(name, data, {panel: f"Ω = {w:g}" for panel, w in frequencies.items()}),
+        confirmed(name, _where(name), data),
+    ]
+
+
+def _where(name: str) -> str:
+    return f"Fig. {name.removeprefix('fig')}"
+
+
+def _undeformed(name: str, data: Any, frequencies: dict[str, float]) -> Claim:
+    rows = [data[panel]["undeformed"] for panel in frequencies]
+    held = all(int(row["held_below"]) for row in rows)
+    left = all(not int(row["held_above"]) for row in rows)
+    ends = ", ".join(f"{float(row['later']):.3g} at Ω = {w:g}" for row, w in zip(rows, frequencies.values(), strict=True))
+    return check(
+        f"{name}-undeformed",
+        "section 6, first bullet on the diagrams",
+        "θ = 0 becomes unstable for Ĥ > Hcr",
+        printed=held and left,
+        evidence=f"started at rest it stays at Ĥ = 0.999 Hcr and is released at 1.001 Hcr in every period; max|θ| then, after "
+        f"300 periods: {ends} (erratum 24: it is left and closed again, period after period)",
+    )
+
+
+def _anticipated(name: str, data: Any, frequencies: dict[str, float]) -> Claim:
+    stable, parts = [], []
+    for panel, w in frequencies.items():
+        branch, critical = main_branch(data[panel]), float(data[panel].attrs["critical"])
+        fold, _ = first_fold(branch)
+        below = amplitudes_at(branch, (fold + critical) / 2, stable=True)
+        stable.append(fold < critical and below.size > 0)
+        parts.append(f"Ω = {w:g}: from Ĥ = {fold:.6f}")
+    critical = float(next(iter(data.children.values())).attrs["critical"])
+    return check(
+        f"{name}-anticipated",
+        "section 6, first bullet on the diagrams",
+        "A stable limit cycle exists for Ĥ < Hcr, beside the undeformed state",
+        printed=bool(stable) and all(stable),
+        evidence=f"Hcr = {critical:.6f}; it is born at a fold, " + ", ".join(parts),
+    )
+
+
+def first_path(branch: Any, critical: float, samples: int = 40) -> tuple[np.ndarray, np.ndarray]:
+    """Amplitude of the largest stable motion of a branch from just above its first fold to twice Hcr, (n,) and (n,)."""
+    fold = first_fold(branch)[0]
+    values = fold + (2 * critical - fold) * (np.arange(samples) + 1) / samples
+    return values, np.array([np.max(amplitudes_at(branch, v, stable=True), initial=0.0) for v in values])
+
+
+def _grows(name: str, data: Any, frequencies: dict[str, float]) -> Claim:
+    rising, parts = [], []
+    for panel, w in frequencies.items():
+        _, size = first_path(main_branch(data[panel]), float(data[panel].attrs["critical"]))
+        rising.append(bool((np.diff(size) > 0).all() and (size > 0).all()))
+        parts.append(f"Ω = {w:g}: {size[0]:.4f} to {size[-1]:.4f} rad")
+    return check(
+        f"{name}-grows",
+        "section 6, second bullet on the diagrams",
+        "The amplitude of the first limit cycle increases with Ĥ",
+        printed=bool(rising) and all(rising),
+        evidence="largest stable motion of the first branch, from its fold to 2 Hcr, " + ", ".join(parts),
+    )
+
+
+def _flattens(name: str, data: Any, frequencies: dict[str, float]) -> Claim:
+    panels = sorted(frequencies, key=lambda panel: frequencies[panel])
+    critical = float(data[panels[0]].attrs["critical"])
+    at = {
+        frequencies[p]: [
+            float(np.max(amplitudes_at(main_branch(data[p]), f * critical, stable=True), initial=0.0)) for f in (1, 2)
+        ]
+        for p in panels
+    }
+    falling = np.diff(np.array(list(at.values())), axis=0) < 0
+    return check(
+        f"{name}-flattens",
+        "section 6, second bullet on the diagrams",
+        "For a given Ĥ the amplitude of the first limit cycle decreases with Ω",
+        printed=len(at) > 1 and bool(falling.all()),
+        evidence="max|θ| at Hcr and 2 Hcr: " + "; ".join(f"Ω = {w:g}: {a:.4f}, {b:.4f}" for w, (a, b) in at.items()),
+    )
+
+
+def coexistence(name: str, data: Any, panels: dict[str, str]) -> Claim:
+    """`panels` by name, each with the words for it."""
+    rising, parts = [], []
+    for panel, words in panels.items():
+        spectrum = data[panel]
+        low, high = (float(b) for b in spectrum.attrs["bounds"])
+        values = low + (high - low) * (np.arange(600) + 0.5) / 600
+        number = np.array([stable_motions(spectrum, value) for value in values])
+        halves = number[:300].mean(), number[300:].mean()
+        most, where = most_coexisting(spectrum)
+        rising.append(halves[1] > halves[0])
+        parts.append(f"{words}: {halves[0]:.2f} and {halves[1]:.2f}, most {most} at Ĥ = {where:.3f}")
+    return check(
+        f"{name}-coexistence",
+        "section 6, last bullet on the diagrams",
+        "Several stable motions coexist, and more of them at larger Ĥ",
+        printed=bool(rising) and all(rising),
+        evidence="stable motions beside rest (mirror images counted once), on average in the lower and the upper half of "
+        "the range: " + "; ".join(parts),
+    )
+
+
+def both_diagram(data: Any) -> list[Claim]:
+    """Fig. 13."""
+    spectrum = next(iter(data.children.values()))
+    mirror = {
+        str(load): float(gap) for load, gap in zip(data["mirror"]["load"].values, data["mirror"]["gap"].values, strict=True)
+    }
+    own = [int(b["symmetric"].sum()) for _, b in named_branches(spectrum)]
+    main = main_branch(spectrum)
+    uneven = np.abs(main["highest"].values + main["lowest"].values)
+    kinds = {kind: count(spectrum, kind) for kind in ("LP", "PD", "GR")}
+    most, where = most_coexisting(spectrum)
+    return [
+        check(
+            "fig13-symmetry",
+            "Fig. 13 and the text before it",
+            "The response is symmetric under loads (i) and (ii), and not under (iii)",
+            printed=max(mirror["(i)"], mirror["(ii)"]) < CONFIRMED and mirror["(iii)"] > APART and not any(own),
+            evidence="a motion and the mirror image of the mirrored start half a period later differ after 5 periods by "
+            + ", ".join(f"{gap:.1e} under {load}" for load, gap in mirror.items())
+            + f"; of the main branch under (iii) max θ and −min θ differ by up to {uneven.max():.3f} rad",
+        ),
+        check(
+            "fig13-features",
+            "Fig. 13",
+            "Apart from the symmetry the features are the same: several motions coexist and bifurcate",
+            printed=most > 1 and all(kinds.values()),
+            evidence=f"up to {most} stable motions beside rest (at Ĥ = {where:.3f}); "
+            + ", ".join(f"{n} {kind}" for kind, n in kinds.items()),
+        ),
+        confirmed("fig13", "Fig. 13", spectra_only(data)),
+    ]
+
+
+def spectra_only(data: Any) -> Any:
+    """The panels of a figure without its other groups."""
+    return data.filter(lambda node: node.name != "mirror")

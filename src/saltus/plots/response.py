@@ -1,0 +1,228 @@
+"""Response spectra and bifurcation diagrams: branches of periodic motions, their special points, bands and simulated attractors.
+
+They are drawn from the DataTree of a study: children `branch_...` (see `saltus.orbits`), `attractors` (dots) and `bands`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from saltus.plots.style import INK, LIMIT, LIMIT_LINE, STABLE_LINE, UNSTABLE_LINE
+
+DENSER = 6  # parts into which a step of a branch is divided when it is drawn
+LEAST_MARK = 1.5  # mm between two marks of one kind: nearer ones are left to the zooms and to the data
+CHANGES = ("LP", "PD", "BPC", "GR", "NS")  # the kinds at which the number or the stability of motions can change
+
+QSB_LINE: dict[str, Any] = {"color": "#7b2d9b", "linestyle": (0, (3, 2)), "linewidth": 1.0}
+FARTHEST_LINE: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (1, 1.2)), "linewidth": 1.2}
+BANDS = {"QP": "#cfe6f7", "CH": "#fbd9b0"}  # quasi-periodic light blue, chaotic light orange
+BAND_NAMES = {"QP": "quasi-periodic", "CH": "chaotic"}
+DOTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markersize": 2.4, "markeredgewidth": 0.0}
+MARKS: dict[str, dict[str, Any]] = {
+    "LP": {"marker": "o", "markersize": 2.8},
+    "PD": {"marker": "s", "markersize": 2.7},
+    "BPC": {"marker": "D", "markersize": 2.6},
+    "GR": {"marker": "^", "markersize": 3.0},
+    "NS": {"marker": "*", "markersize": 3.6},
+}
+MARK_NAMES = {
+    "LP": "fold (LP)",
+    "PD": "period doubling (PD)",
+    "BPC": "symmetry breaking or branch point (BPC)",
+    "GR": "grazing (GR)",
+    "NS": "Neimark–Sacker (NS)",
+}
+
+
+def branches(spectrum: Any) -> Iterator[Any]:
+    """The branches of a spectrum, as Datasets, in order."""
+    for name in sorted(spectrum.children):
+        if name.startswith("branch_"):
+            yield spectrum[name].to_dataset()
+
+
+def highest(spectrum: Any, low: float, high: float, quantity: str = "amplitude") -> float:
+    """The largest value of a quantity on all branches between two values of the parameter."""
+    return max(float(values.max()) for values in _inside(spectrum, low, high, quantity) if values.size)
+
+
+def lowest(spectrum: Any, low: float, high: float, quantity: str = "amplitude") -> float:
+    """The least one."""
+    return min(float(values.min()) for values in _inside(spectrum, low, high, quantity) if values.size)
+
+
+def _inside(spectrum: Any, low: float, high: float, quantity: str) -> Iterator[np.ndarray]:
+    for branch in branches(spectrum):
+        x = branch["parameter"].values
+        yield branch[quantity].values[(x >= low) & (x <= high)]
+
+
+def draw_branches(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
+    """Every branch, stable motions in solid blue, unstable ones in dashed red; `quantity` in units of `scale`."""
+    for branch in branches(spectrum):
+        for stable, x, y in pieces(branch, quantity):
+            line = STABLE_LINE if stable else UNSTABLE_LINE
+            ax.plot(x, y / scale, zorder=3.2 if stable else 3.0, **line)
+
+
+def pieces(branch: Any, quantity: str = "amplitude") -> Iterator[tuple[bool, np.ndarray, np.ndarray]]:
+    """A branch as runs (stable, parameter, quantity) that meet at the special points where the stability changes.
+
+    They are cut at every grazing too, where curves have corners; between their points they are monotone cubics of the length
+    along them, so that a line that is smooth looks it.
+    """
+    x, y = np.asarray(branch["parameter"].values), np.asarray(branch[quantity].values)
+    stable, impacts = np.asarray(branch["stable"].values, dtype=bool), branch["crossings"].values
+    turned = stable[1:] != stable[:-1]
+    cuts = [int(cut) + 1 for cut in np.flatnonzero(turned | (impacts[1:] != impacts[:-1]))]
+    turns = {cut: [_between(branch, quantity, cut)] if turned[cut - 1] else [] for cut in cuts}
+    for first, last in pairwise([0, *cuts, len(x)]):
+        points = [(x[k], y[k]) for k in range(first, last)]
+        before = turns.get(first, []) or [(x[first - 1], y[first - 1])] * (first > 0)
+        run = np.array([*before, *points, *turns.get(last, [])])
+        yield bool(stable[first]), *_smooth(run)
+
+
+def _smooth(run: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A denser row of points on the monotone cubics through the given ones, (n, 2)."""
+    from scipy.interpolate import PchipInterpolator
+
+    size = np.ptp(run, axis=0)
+    steps = np.linalg.norm(np.diff(run, axis=0) / np.where(size > 0, size, 1.0), axis=1)
+    run = run[np.append(True, steps > 1e-9)]
+    if len(run) < 3:
+        return run[:, 0], run[:, 1]
+    length = np.append(0.0, np.cumsum(steps[steps > 1e-9]))
+    shares = np.arange(DENSER) / DENSER
+    along = np.append((length[:-1, None] + np.diff(length)[:, None] * shares).ravel(), length[-1])
+    dense = PchipInterpolator(length, run)(along)
+    return dense[:, 0], dense[:, 1]
+
+
+def _between(branch: Any, quantity: str, cut: int) -> tuple[float, float]:
+    """Where the stability changes between the points cut - 1 and cut: at the special point there, or in their middle."""
+    names = ("parameter", quantity)
+    a, b = (np.array([float(branch[name][k]) for name in names]) for k in (cut - 1, cut))
+    size = np.array([np.ptp(branch[name].values) or 1.0 for name in names])
+    middle = (float(a[0] + b[0]) / 2, float(a[1] + b[1]) / 2)
+    if "kind" not in branch:
+        return middle
+    known = np.isin(branch["kind"].values, CHANGES)
+    places = np.stack([branch[f"special_{name}"].values[known] for name in names], axis=1)
+    if not len(places):
+        return middle
+    detour = np.linalg.norm((places - a) / size, axis=1) + np.linalg.norm((places - b) / size, axis=1)
+    best = int(detour.argmin())
+    near = detour[best] < 3 * np.linalg.norm((b - a) / size) + 1e-3
+    return (float(places[best, 0]), float(places[best, 1])) if near else middle
+
+
+def draw_special(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
+    """Small marks by kind at the special points inside the axes, the closest ones of a kind thinned out."""
+    box = ax.get_window_extent()
+    unit = np.array([box.width, box.height]) / ax.figure.dpi * 25.4
+    low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
+    for kind, style in MARKS.items():
+        places = special_places(spectrum, kind, quantity) / np.array([1.0, scale])
+        inside = ((places >= low) & (places <= high)).all(axis=1)
+        kept: list[np.ndarray] = []
+        for place in places[inside]:
+            if all(np.linalg.norm((place - other) / (high - low) * unit) > LEAST_MARK for other in kept):
+                kept.append(place)
+        if kept:
+            ax.plot(*np.array(kept).T, linestyle="none", zorder=5, **_mark(style))
+
+
+def special_places(spectrum: Any, kind: str, quantity: str = "amplitude") -> np.ndarray:
+    """(parameter, quantity) of the special points of a kind on all branches, (n, 2)."""
+    rows = [np.empty((0, 2))]
+    for branch in branches(spectrum):
+        if "kind" in branch:
+            here = branch["kind"].values == kind
+            columns = (branch[f"special_{name}"].values[here] for name in ("parameter", quantity))
+            rows.append(np.stack(list(columns), axis=1))
+    return np.concatenate(rows)
+
+
+def _mark(style: dict[str, Any]) -> dict[str, Any]:
+    return {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.5, **style}
+
+
+def draw_attractors(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
+    """The attractors found by direct simulation, as dots over the branches."""
+    dots = spectrum["attractors"]
+    ax.plot(dots["parameter"], dots[quantity] / scale, zorder=4, **DOTS)
+
+
+def draw_bands(ax: Any, spectrum: Any) -> None:
+    """Light blue where motions are quasi-periodic, light orange where they are chaotic."""
+    bands = spectrum["bands"]
+    for low, high, kind in zip(bands["low"].values, bands["high"].values, bands["kind"].values, strict=True):
+        ax.axvspan(low, high, color=BANDS[str(kind)], linewidth=0, zorder=0)
+
+
+def draw_limits(ax: Any, line: float, farthest: float, scale: float = 1.0, mirrored: bool = False) -> None:
+    """Green lines at the straight line, dashed, and at the kinematic limit, dotted, those that fall inside the axes."""
+    low, high = ax.get_ylim()
+    for angle, style in ((line, LIMIT_LINE), (farthest, FARTHEST_LINE)):
+        for value in (angle / scale, *((-angle / scale,) if mirrored else ())):
+            if low < value < high:
+                ax.axhline(value, zorder=2, **style)
+
+
+def draw_critical(ax: Any, critical: float) -> None:
+    """The purple dashed line of the quasi-static bifurcation (QSB)."""
+    ax.axvline(critical, zorder=2, **QSB_LINE)
+
+
+def draw_response(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
+    """Bands, branches, dots and marks; the limits of the axes must be set before."""
+    draw_bands(ax, spectrum)
+    draw_branches(ax, spectrum, quantity, scale)
+    draw_attractors(ax, spectrum, quantity, scale)
+    draw_special(ax, spectrum, quantity, scale)
+
+
+def draw_zoom(
+    ax: Any,
+    spectrum: Any,
+    place: tuple[float, float, float, float],
+    window: tuple[float, float, float, float],
+    quantity: str = "amplitude",
+    scale: float = 1.0,
+) -> Any:
+    """An inset at `place` (x, y, width, height as shares of the axes) with the part `window` (x from, to, y from, to)."""
+    inset = ax.inset_axes(place)
+    inset.set_xlim(window[:2])
+    inset.set_ylim(window[2:])
+    inset.tick_params(labelsize=6, length=2, pad=1.5)
+    inset.locator_params(nbins=3)
+    draw_response(inset, spectrum, quantity, scale)
+    box = ax.indicate_inset_zoom(inset, edgecolor=INK, linewidth=0.4, alpha=1.0)
+    for connector in box.connectors:
+        connector.set_visible(False)  # they would cross the curves
+    return inset
+
+
+def legend(figure: Any, spectra: list[Any], *, limits: bool = True, critical: bool = False, columns: int = 4) -> None:
+    """One legend for all panels, above them, of what is in them."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Any] = [Line2D([], [], label="stable", **STABLE_LINE), Line2D([], [], label="unstable", **UNSTABLE_LINE)]
+    handles.append(Line2D([], [], label="attractors by direct simulation", **{**DOTS, "markersize": 4}))
+    if limits:
+        handles.append(Line2D([], [], label=r"straight line, $\pi-\beta_0$", **LIMIT_LINE))
+        handles.append(Line2D([], [], label=r"kinematic limit, $2(\pi-\beta_0)$", **FARTHEST_LINE))
+    if critical:
+        handles.append(Line2D([], [], label="quasi-static bifurcation (QSB)", **QSB_LINE))
+    for kind, style in MARKS.items():
+        if any(len(special_places(spectrum, kind)) for spectrum in spectra):
+            handles.append(Line2D([], [], linestyle="none", label=MARK_NAMES[kind], **_mark(style)))
+    found = {str(kind) for spectrum in spectra for kind in spectrum["bands"]["kind"].values}
+    handles += [Patch(color=BANDS[kind], label=BAND_NAMES[kind]) for kind in BANDS if kind in found]
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, columnspacing=1.4, handletextpad=0.5)
