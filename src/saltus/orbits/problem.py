@@ -47,15 +47,21 @@ class Equations:
     ends: np.ndarray
     looks: np.ndarray  # (n, 4 + margins), see `segments.py`; empty if not asked for
 
-    def jacobian(self, closing: float = 1.0) -> np.ndarray:
-        """The derivatives to the unknowns; with `closing` -1 of the problem whose perturbations change their sign each time."""
+    @cached_property
+    def _open(self) -> np.ndarray:
+        """The derivatives to the unknowns, without how the last segment depends on the first unknowns."""
         n, d, _ = self.here.shape
         matrix = np.zeros((n, d, n, d))
         rows = np.arange(n)
         matrix[rows, :, rows, :] = self.here
-        matrix[rows[:-1], :, rows[:-1] + 1, :] += self.there[:-1]
-        matrix[n - 1, :, 0, :] += closing * self.there[-1]
+        matrix[rows[:-1], :, rows[1:], :] = self.there[:-1]
         return matrix.reshape(n * d, n * d)
+
+    def jacobian(self, closing: float = 1.0) -> np.ndarray:
+        """The derivatives to the unknowns; with `closing` -1 of the problem whose perturbations change their sign each time."""
+        d, matrix = self.there.shape[1], self._open.copy()
+        matrix[-d:, :d] += closing * self.there[-1]
+        return matrix
 
     def monodromy(self) -> np.ndarray:
         """The chain of the segments' maps, from the first unknowns to those a (half) period later; inf at a grazing."""
@@ -131,34 +137,40 @@ class Problem:
 
     def evaluate(self, unknowns: np.ndarray, values: np.ndarray, look: bool = False) -> Equations | None:
         """The equations at a point, or None where the motion cannot be followed."""
-        parameters = self._values.copy()
-        parameters[self._places] = values
-        frequency = parameters[self._frequency]
-        if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(parameters).all()):
+        frequency = self.frequency(values)
+        if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
             return None
-        env, model = self._run.structure.prepare(parameters, self._records)
-        n, own = len(self.signature.sides) or 1, self.own
-        ends, columns = np.zeros((n, at.KINDS + 6 * own)), np.zeros((n, 4 * own, self._where[k.COLUMNS]))
-        looks = np.zeros((n if look else 0, at.LEAST_MARGIN + max(1, self._where[k.STOPS])))
         spans, sides, states = self._segments(unknowns, frequency)
-        done = load_segments()[0](self._where, self._settings, env, model, spans, sides, states, ends, columns, looks)
-        if done < n:
+        flown = self.fly(spans, sides, states, values, look)
+        if flown is None:
             return None
+        ends, columns, looks, rates = flown
         if not self.signature.sides:
             return self._shooting(unknowns, frequency, ends, columns, looks)
-        return self._crossing(unknowns, frequency, np.sign(model[4][1:]), spans, ends, columns, looks)
+        return self._crossing(unknowns, frequency, rates, spans, ends, columns, looks)
 
     def carried(self, state: np.ndarray, begin: float, end: float, values: np.ndarray) -> np.ndarray | None:
         """The state at phase `end` of the smooth motion without impacts from a state at phase `begin`."""
+        frequency = self.frequency(values)
+        spans, sides = np.array([[begin / frequency, end / frequency, 0.0]]), np.array([[0, self.signature.side]])
+        flown = self.fly(spans, sides, state.reshape(1, -1), values)
+        return None if flown is None else flown[0][0, at.KINDS : at.KINDS + 2 * self.own]
+
+    def fly(
+        self, spans: np.ndarray, sides: np.ndarray, states: np.ndarray, values: np.ndarray, look: bool = False
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+        """Smooth segments, as `fly_segments` takes them: its ends, columns and looks, and the signs of the gap's rate on the sides.
+
+        None where one of them cannot be followed.
+        """
         parameters = self._values.copy()
         parameters[self._places] = values
         env, model = self._run.structure.prepare(parameters, self._records)
-        frequency, own = parameters[self._frequency], self.own
-        ends, columns = np.zeros((1, at.KINDS + 6 * own)), np.zeros((1, 4 * own, self._where[k.COLUMNS]))
-        spans, sides = np.array([[begin / frequency, end / frequency, 0.0]]), np.array([[0, self.signature.side]])
-        looks = np.zeros((0, at.LEAST_MARGIN + 1))
-        done = load_segments()[0](self._where, self._settings, env, model, spans, sides, state.reshape(1, -1), ends, columns, looks)
-        return ends[0, at.KINDS : at.KINDS + 2 * own] if done else None
+        n, own = len(spans), self.own
+        ends, columns = np.zeros((n, at.KINDS + 6 * own)), np.zeros((n, 4 * own, self._where[k.COLUMNS]))
+        looks = np.zeros((n if look else 0, at.LEAST_MARGIN + max(1, self._where[k.STOPS])))
+        done = load_segments()[0](self._where, self._settings, env, model, spans, sides, states, ends, columns, looks)
+        return None if done < n else (ends, columns, looks, np.sign(model[4][1:]))
 
     def _segments(self, unknowns: np.ndarray, frequency: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What `fly_segments` is given: spans, sides, states at the start."""

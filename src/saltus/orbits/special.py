@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -70,11 +71,13 @@ def fold(point: Point) -> float:
     return float(point.tangent[-1])
 
 
+@lru_cache(maxsize=4)  # a point ends one step and begins the next
 def flip(point: Point) -> float:
     """The determinant of the equations for perturbations that change their sign each (half) period, scaled to be moderate."""
     return _determinant(point.solution.equations.jacobian(-1.0))
 
 
+@lru_cache(maxsize=4)
 def crossing(point: Point) -> float:
     """The determinant of the equations with the tangent below them: it changes its sign where two branches cross."""
     equations, curve = point.solution.equations, point.curve
@@ -88,6 +91,7 @@ def _determinant(matrix: np.ndarray) -> float:
     return float(np.linalg.det(matrix / lengths[:, None])) if (lengths > 0).all() else 0.0
 
 
+@lru_cache(maxsize=4)
 def torus(point: Point) -> float:
     """The modulus of a complex pair of multipliers less 1; -1 where there is none.
 
