@@ -37,7 +37,7 @@ def oscillator(frequency: float, e: float) -> saltus.System:
 @cache
 def wall_special(kind: str) -> SpecialPoint:
     """A special point of the impact oscillator's branch along the load's amplitude."""
-    system, start = (oscillator(0.7, 0.6), 0.0) if kind == "PD" else (oscillator(1.0, 0.8), 0.0)
+    system = oscillator(0.7, 0.6) if kind == "PD" else oscillator(1.0, 0.8)
     if kind == "PD":
         family = wall_orbits(system)
         speed = 1.3 * family.doubling_speed
@@ -45,35 +45,42 @@ def wall_special(kind: str) -> SpecialPoint:
         state = family.orbit(speed).state(0.0)
         orbit = saltus.find_orbit(system, x=float(state[0]), velocity=float(state[1]), settle=0, period=1)
     else:
-        orbit = saltus.find_orbit(system, x=start, velocity=0.0)
+        orbit = saltus.find_orbit(system, x=0.0, velocity=0.0)
     branch = saltus.continue_orbit(orbit, FORCE, (0.05, 0.9))
     return next(s for s in branch.special if s.kind == kind)
 
 
 @cache
 def wall_locus(kind: str) -> Locus:
-    bounds = (0.72, 0.95) if kind == "PD" else (0.6, 1.9)
-    if kind == "PD":
-        bounds = (0.67, 0.95)
+    bounds = (0.67, 0.95) if kind == "PD" else (0.6, 1.99)
     return saltus.continue_special(wall_special(kind), FREQUENCY, bounds, first_bounds=(0.01, 6.0))
 
 
 @cache
-def folds() -> Locus:
-    """The folds of the resonance at Hhat = 0.5, continued in the load's amplitude."""
+def resonance_fold() -> SpecialPoint:
+    """One of the two folds of the resonance at Hhat = 0.5."""
     orbit = saltus.find_orbit(metainterface(0.9, 0.5), theta=0.3)
     branch = saltus.continue_orbit(orbit, FREQUENCY, (0.8, 1.0))
-    fold = next(s for s in branch.special if s.kind == "LP")
-    return saltus.continue_special(fold, AMPLITUDE, (0.05, 1.2), first_bounds=(0.3, 2.0))
+    return next(s for s in branch.special if s.kind == "LP")
+
+
+@cache
+def folds() -> Locus:
+    """The curve of folds through it, in the load's frequency and amplitude."""
+    return saltus.continue_special(resonance_fold(), AMPLITUDE, (0.05, 1.2), first_bounds=(0.3, 2.0))
+
+
+@cache
+def low_frequency_special(kind: str) -> SpecialPoint:
+    orbit = saltus.find_orbit(metainterface(0.29, 0.5), theta=0.3)
+    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.282, 0.3))
+    return next(s for s in branch.special if s.kind == kind)
 
 
 @cache
 def low_frequency(kind: str) -> Locus:
     """Curves through the special points about the change from two to six crossings at Hhat = 0.5."""
-    orbit = saltus.find_orbit(metainterface(0.29, 0.5), theta=0.3)
-    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.282, 0.3))
-    special = next(s for s in branch.special if s.kind == kind)
-    return saltus.continue_special(special, AMPLITUDE, (0.3, 0.6), first_bounds=(0.18, 0.4))
+    return saltus.continue_special(low_frequency_special(kind), AMPLITUDE, (0.3, 0.6), first_bounds=(0.18, 0.4))
 
 
 def closed_form(point: LocusPoint, kind: str) -> float:
@@ -126,12 +133,17 @@ def test_a_branch_has_two_folds_on_one_side_of_the_cusp_and_none_on_the_other(be
 
 
 def test_onset_of_the_motion_follows_the_vertical_load() -> None:
-    orbit = saltus.find_orbit(metainterface(1.0, 0.05, vertical=-0.4), theta=0.1)
-    branch = saltus.continue_orbit(orbit, AMPLITUDE, (0.005, 0.1))
+    """The curve of onsets in the vertical load, against a branch along that load at an amplitude a little larger."""
+    orbit = saltus.find_orbit(metainterface(1.0, 0.05), theta=0.1)
+    branch = saltus.continue_orbit(orbit, AMPLITUDE, (0.015, 0.06))
     onset = next(s for s in branch.special if s.kind == "LP")
-    locus = saltus.continue_special(onset, VERTICAL, (-0.8, -0.3))
-    assert [o.system.get(AMPLITUDE) for o in locus.at(VERTICAL, -0.5)] == pytest.approx([0.0219879514], abs=1e-10)
-    assert locus.at(VERTICAL, -0.5)[0].defect < 1e-10
+    assert onset.parameter == pytest.approx(0.0219879514, abs=1e-10)
+    locus = saltus.continue_special(onset, VERTICAL, (-0.9, -0.4))
+    beside = saltus.continue_orbit(branch.at(0.0222)[0], VERTICAL, (-0.9, -0.4))
+    folds_there = [s.parameter for s in beside.special if s.kind == "LP"]
+    assert len(folds_there) == 1
+    assert [o.system.get(VERTICAL) for o in locus.at(AMPLITUDE, 0.0222)] == pytest.approx(folds_there, abs=1e-9)
+    assert locus.at(AMPLITUDE, 0.0222)[0].defect < 1e-10
 
 
 @pytest.mark.parametrize(("curve", "multiplier"), [("folds", 1), ("BPC", 1), ("PD", -1), ("LP", 1)])
@@ -149,14 +161,14 @@ def test_every_point_of_a_grazing_curve_touches() -> None:
     locus = low_frequency("GR")
     assert len(locus.points) > 20
     for point in locus.points[::5]:
-        shorter = Problem(point.orbit.system, point.orbit.signature, (FREQUENCY,))
-        assert point.orbit.admissible
-        assert abs(point.orbit.slowest) < 1e-14
-        touching = point.touching
-        phases = point.solution.unknowns[::2][touching]
-        assert np.ptp(phases) < 1e-12
-        motion = point.orbit.motion(tol=1e-13)
-        assert np.abs(motion.at(phases[:1] / shorter.frequency(shorter.values)).theta).max() < 1e-10
+        orbit, touching = point.orbit, point.touching
+        assert orbit.admissible
+        assert abs(orbit.slowest) < 1e-14
+        assert np.ptp(point.solution.unknowns[::2][touching]) < 1e-12
+        motion, when = orbit.motion(), orbit.crossings[touching[0]]
+        theta, velocity = motion.at(when if when > orbit.crossings[0] else when + 0.5 * orbit.duration)
+        assert abs(theta) < 1e-10
+        assert abs(velocity) < 1e-6
 
 
 def test_folds_and_symmetry_breakings_of_six_crossings_end_at_one_point_of_the_grazing_curve() -> None:
@@ -191,9 +203,7 @@ def test_the_unsymmetric_orbits_change_sides_at_a_degenerate_symmetry_breaking()
 
 
 def test_a_fold_of_symmetric_orbits_goes_on_without_the_symmetry() -> None:
-    orbit = saltus.find_orbit(metainterface(0.9, 0.5), theta=0.3)
-    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.8, 0.95))
-    fold = next(s for s in branch.special if s.kind == "LP")
+    fold = resonance_fold()
     assert fold.orbit.symmetric
     locus = saltus.continue_special(fold, "model.stiffness_ratio", (0.98, 1.02), first_bounds=(0.5, 1.5))
     assert locus.ends == ("bound model.stiffness_ratio = 0.98", "bound model.stiffness_ratio = 1.02")
@@ -226,15 +236,11 @@ def test_a_curve_keeps_all_in_its_dataset() -> None:
     ],
 )
 def test_bad_use_is_answered_with_a_sentence(path: str, options: dict, says: str) -> None:
-    orbit = saltus.find_orbit(metainterface(0.9, 0.5), theta=0.3)
-    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.88, 0.95))
     with pytest.raises(saltus.ParameterError, match=says):
-        saltus.continue_special(next(s for s in branch.special if s.kind == "LP"), path, **options)
+        saltus.continue_special(resonance_fold(), path, **options)
 
 
 def test_a_symmetry_breaking_needs_the_symmetry() -> None:
-    orbit = saltus.find_orbit(metainterface(0.29, 0.5), theta=0.3)
-    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.282, 0.3))
-    special = next(s for s in branch.special if s.kind == "BPC")
+    special = low_frequency_special("BPC")
     with pytest.raises(saltus.ParameterError, match="takes away the mirror symmetry"):
         saltus.continue_special(special, "model.stiffness_ratio")
