@@ -16,6 +16,7 @@ from saltus.orbits.newton import solve
 from saltus.orbits.orbit import TOUCH, PeriodicOrbit
 from saltus.orbits.path import Point, start
 from saltus.orbits.problem import Problem
+from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.special import SpecialPoint, UserFunction, asymmetry, grazing, located, parent_point, tests_between
 from saltus.orbits.symmetry import half, keeps_symmetry, whole
 
@@ -30,7 +31,9 @@ LEAST_STEP = 1e-11
 MOST_POINTS = 20_000
 MOST_IMPACTS = 120  # of one period
 ACCUMULATE = 5  # grazings one after the other that each add impacts, within
-NEARBY = 1e-3  # of the parameter's range: there are infinitely many
+NEARBY = 1e-3  # of the parameter's range, or shrinking towards rest below
+SMALL = 1e-2  # of the largest amplitude with more impacts than
+ENOUGH = 60  # a period: there are infinitely many
 STEEPEST = 1e8  # multiplier beyond which an orbit is no longer solved for: its motions part by that much within a period
 SMALLEST = 1e-7  # amplitude below which an orbit has shrunk to rest
 SAME = 1e-5  # between unknowns of orbits that coincide where both graze
@@ -209,7 +212,9 @@ class _Walk:
         elif following.curve.problem.signature.crossings > MOST_IMPACTS:
             self.reason = f"more than {MOST_IMPACTS} impacts a period"
         elif self._accumulates(following):
-            self.reason = f"grazings accumulate near {following.parameter:.9g}: {following.orbit.signature.crossings} impacts and more"
+            self.reason = (
+                f"grazings accumulate near {following.parameter:.9g}: {following.orbit.signature.crossings} impacts and more"
+            )
         else:
             self.points.append(following)
         return True
@@ -218,8 +223,10 @@ class _Walk:
         """Whether the last grazings have all added impacts, ever closer to one parameter."""
         last = [(s.parameter, s.orbit.signature.crossings) for s in self.special if s.kind == "GR"][-ACCUMULATE:]
         counts = [*(n for _, n in last), following.orbit.signature.crossings]
-        span = max(p for p, _ in last) - min(p for p, _ in last)
-        return len(last) == ACCUMULATE and bool((np.diff(counts) > 0).all()) and span < NEARBY * following.curve.scale
+        span = max((p for p, _ in last), default=0.0) - min((p for p, _ in last), default=0.0)
+        growing = len(last) == ACCUMULATE and bool((np.diff(counts) > 0).all())
+        small = following.orbit.amplitude < SMALL * max(point.orbit.amplitude for point in self.points)
+        return growing and (span < NEARBY * following.curve.scale or (small and counts[-1] > ENOUGH))
 
     def _note(self, a: Point, b: Point) -> None:
         """Locate the special points of a step, in order."""
@@ -364,6 +371,10 @@ def continue_orbit(
         raise ParameterError(f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range")
     for bound in (low, high):
         orbit.system.with_({path: bound})  # refuses bounds beyond what the system allows
+    if isinstance(orbit, RestingOrbit):
+        from saltus.orbits.resting_branch import continue_resting  # which gives a Branch
+
+        return continue_resting(orbit, path, (low, high), functions or {}, step, progress)
     begin, symmetric = along(orbit, path)
     scale = (high - low) / 3.0
     walks = []
@@ -421,4 +432,3 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
     elif symmetric and not signature.symmetric:
         problem, found = half(problem, found) or (problem, found)
     return PeriodicOrbit(problem, found), symmetric
-
