@@ -1,0 +1,96 @@
+"""When a periodic load pulls a system at rest off its contact: what alone fixes how a motion goes on after rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.systems import System
+
+SAMPLES = 64  # of a forcing period for each order of the highest harmonic: the contact acceleration has no narrower peak
+
+
+@dataclass(frozen=True)
+class Release:
+    """A root of a contact acceleration at which it begins to pull: from then on rest cannot be kept."""
+
+    time: float  # in [0, T)
+    side: int  # on which the gap then opens
+    peak: float  # the greatest pull before it presses again: 0 where the release is only touched, and lost
+
+
+def contact_pull(system: System, side: int) -> Callable[[Any], Any]:
+    """The second derivative of the gap of a system at rest at contact on a side, as a function of time: a_s of numerics 1.
+
+    Rest presses there while it is negative.
+    """
+    model, load = system.model, system.load
+    contact = float(model.contact)
+    rate = float(model.gap(contact + 1.0, side)) - float(model.gap(contact, side))
+    return lambda t: rate * np.asarray(model.acceleration(t, contact, 0.0, float(side), load), dtype=float)
+
+
+def load_releases(system: System) -> tuple[Release, ...]:
+    """The releases of one forcing period, by their time; none for a load that always presses, always pulls or has no period.
+
+    For load (i) of the metainterface with equal layers those of side +1 are at sin(Omega t) = Hcr / Hhat, Hcr = abs(V / tan(beta0))
+    (`Hcr`), and those of side -1 half a period later.
+    """
+    if system.load.period is None:
+        return ()
+    found = [release for side in system.model.sides for release in _of_side(system, side)]
+    return tuple(sorted(found, key=lambda release: release.time))
+
+
+def peak_near(system: System, side: int, phase: float) -> float:
+    """The peak of the contact acceleration on a side that follows nearest after a phase of the load, even if it does not pull."""
+    period = system.load.period
+    assert period is not None
+    peaks = _peaks(system, side)
+    after = [((2.0 * np.pi * t / period - phase) % (2.0 * np.pi), value) for t, value in peaks]
+    return min(after)[1] if after else float("-inf")
+
+
+def _grid(system: System) -> np.ndarray:
+    period = system.load.period
+    assert period is not None
+    orders = [getattr(term, "order", 1) for s in system.load.channels.values() for term in getattr(s, "terms", (s,))]
+    count = SAMPLES * max(orders, default=1)
+    return np.arange(count) * (period / count)
+
+
+def _peaks(system: System, side: int) -> list[tuple[float, float]]:
+    """Where the contact acceleration on a side has its maxima, and how large they are."""
+    from scipy.optimize import minimize_scalar
+
+    pull, times = contact_pull(system, side), _grid(system)
+    values = np.broadcast_to(pull(times), times.shape)
+    step, peaks = times[1], []
+    for i in np.flatnonzero((values >= np.roll(values, 1)) & (values > np.roll(values, -1))):
+        best = minimize_scalar(lambda t: -float(pull(t)), bounds=(times[i] - step, times[i] + step), method="bounded",
+                               options={"xatol": 1e-10 * step})  # fmt: skip
+        at_sample = (float(times[i]), float(values[i]))
+        peaks.append(max((float(best.x), -float(best.fun)), at_sample, key=lambda peak: peak[1]))
+    return peaks
+
+
+def _of_side(system: System, side: int) -> list[Release]:
+    """The rising roots before the peaks that pull, each once, with the largest of its peaks."""
+    from scipy.optimize import brentq
+
+    pull, period, times = contact_pull(system, side), system.load.period, _grid(system)
+    assert period is not None
+    step, roots = times[1], dict[float, float]()
+    for time, peak in _peaks(system, side):
+        if peak <= 0.0:
+            continue
+        low = next((t for t in time - step * np.arange(1, times.size) if pull(t) < 0.0), None)
+        if low is None:
+            continue
+        root = float(brentq(lambda t: float(pull(t)), low, time, xtol=1e-15 * period, rtol=1e-15)) % period
+        known = next((t for t in roots if abs((t - root + 0.5 * period) % period - 0.5 * period) < 1e-9 * period), root)
+        roots[known] = max(peak, roots.get(known, 0.0))
+    return [Release(time, side, peak) for time, peak in roots.items()]

@@ -1,0 +1,248 @@
+"""Periodic orbits that rest at the contact for a part of their period (losses at impact).
+
+Impacts die away in a finite time, the system rests, and the load alone fixes when it is released (`releases.py`). So the
+motion after a release is the same whatever came before: an orbit is found by following the motion from release to release
+until one repeats, nothing has to be solved for, and its multipliers are 0.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from saltus.flow import EventKind, Motion, simulate
+from saltus.flow import segments as at
+from saltus.orbits.newton import Solution
+from saltus.orbits.orbit import TOUCH, PeriodicOrbit
+from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
+from saltus.orbits.releases import Release, load_releases, peak_near
+from saltus.orbits.signature import Signature
+from saltus.orbits.symmetry import is_symmetric
+from saltus.systems import System
+
+SAME = 1e-9  # of a forcing period: releases are isolated, and known to rounding
+INTO = 1e-3  # of the first flight after a release, where the look at it begins: before it the gap only opens
+RELEASED, LANDED, SIDE = 0, 1, 2  # in `excursions`
+
+
+@dataclass(frozen=True, eq=False)
+class RestingOrbit(PeriodicOrbit):
+    """A periodic orbit with rest: from each release an excursion, impacts that die away, and rest up to the next release.
+
+    It has all that a `PeriodicOrbit` has. Its impacts are those that the flow resolves before it jumps to rest; there are
+    infinitely many. Its equations are those of the impacts and of the releases, solved by the event-driven flow: `residual` is what the
+    smooth segments between them and the load's own roots leave.
+    """
+
+    excursions: np.ndarray  # (n, 3) of the (half) period: when released, when at rest again, and the side released to
+    bends: np.ndarray  # (impacts,): the gap's second derivative just before each; > 0 only for those that a grazing brings
+
+    def _whole(self, column: int) -> np.ndarray:
+        values = self.excursions[:, column]
+        if not self.symmetric:
+            return values
+        return np.concatenate([values, -values if column == SIDE else values + 0.5 * self.duration])
+
+    @property
+    def _shift(self) -> float:
+        return 0.0  # times are counted from phase 0 of the period of the first release
+
+    @property
+    def releases(self) -> np.ndarray:
+        """The times at which it leaves rest, from phase 0 of the load's period in which the first one lies, (n,)."""
+        return self._whole(RELEASED)
+
+    @property
+    def release_sides(self) -> np.ndarray:
+        """The sides to which it does, (n,)."""
+        return self._whole(SIDE).astype(int)
+
+    @property
+    def rests(self) -> np.ndarray:
+        """The times at which it comes to rest, each after the release of the same index, (n,)."""
+        return self._whole(LANDED)
+
+    @property
+    def rest_durations(self) -> np.ndarray:
+        """How long each rest lasts, (n,)."""
+        following = np.append(self.releases[1:], self.releases[0] + self.duration)
+        durations: np.ndarray = following - self.rests
+        return durations
+
+    @property
+    def rest_share(self) -> float:
+        """The share of its period for which it rests."""
+        return float(self.rest_durations.sum() / self.duration)
+
+    @cached_property
+    def pulls(self) -> np.ndarray:
+        """The largest contact acceleration after each release, (n,): 0 where the load only touches it, and the release is lost."""
+        phases = self.releases * self.frequency
+        return np.array([peak_near(self.system, int(s), phi) for s, phi in zip(self.release_sides, phases, strict=True)])
+
+    @property
+    def multipliers(self) -> np.ndarray:  # type: ignore[override]
+        """0 and 0: motions beside it come to rest before the next release, and are the same from then on."""
+        return np.zeros(2, dtype=complex)
+
+    @property
+    def touching(self) -> np.ndarray:
+        """The speeds of the impacts on which the gap opens already as it closes, as after a grazing."""
+        speeds: np.ndarray = self.solution.unknowns[1::2][self.bends > 0.0]
+        return speeds
+
+    @property
+    def grazes(self) -> bool:
+        """Whether it touches the contact without speed, apart from the impacts that die away."""
+        return min(abs(self.clearance), float(self.touching.min(initial=math.inf))) < TOUCH
+
+    @property
+    def stable(self) -> bool:
+        """True, unless a release is only touched, a rest has no duration or it grazes."""
+        return bool(self.pulls.min() > TOUCH and self.rest_durations.min() > TOUCH) and not self.grazes
+
+    def start(self) -> dict[str, Any]:
+        """The arguments of `simulate` that start the motion: at its first release."""
+        model = self.system.model
+        time, side = float(self.excursions[0, RELEASED]), int(self.excursions[0, SIDE])
+        return {model.coordinates[0]: float(model.contact), "velocity": 0.0, "time": time, "side": side}
+
+    @cached_property
+    def state(self) -> tuple[Any, Any]:
+        """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
+        ahead = 2.0 * math.pi / self.frequency - float(self.excursions[0, RELEASED])
+        motion = simulate(self.system, **self.start(), duration=ahead, tol=1e-13, dense=False)
+        return float(np.atleast_1d(motion.position)[0]), float(np.atleast_1d(motion.velocity)[0])
+
+    @cached_property
+    def defect(self) -> float:
+        """The largest distance between its states and those a period later, by direct simulation over two, at 64 instants."""
+        motion = self.motion(2 * self.periods)
+        times = motion.start + self.duration * (np.arange(64) + 0.5) / 64.0
+        now, later = motion.at(times), motion.at(times + self.duration)
+        return float(np.abs(np.asarray(now) - np.asarray(later)).max())
+
+    def __repr__(self) -> str:
+        kind = "symmetric " if self.symmetric else ""
+        return (
+            f"RestingOrbit({kind}period {self.periods}, {len(self.releases)} rests of together {100 * self.rest_share:.3g} % of the time, "
+            f"amplitude={self.amplitude:.9g}, {'stable' if self.stable else 'unstable'}, residual={self.residual:.1g})"
+        )
+
+
+def resting_near(base: Problem, motion: Motion, longest: int) -> RestingOrbit | None:
+    """The resting orbit of up to `longest` forcing periods on which a motion is after its last release; None if there is none.
+
+    Its times are counted from its earliest release in a forcing period.
+    """
+    last = motion.events.of(EventKind.RELEASE)
+    release = _known(load_releases(base.system), last[-1].time, last[-1].side, base.system) if len(last) else None
+    found = None if release is None else resting_orbit(base, release, longest)
+    if found is None:
+        return None
+    period = base.system.load.period
+    earliest = int(np.argmin(found.releases % period))
+    release = _known(load_releases(base.system), found.releases[earliest], int(found.release_sides[earliest]), base.system)
+    return found if release is None else resting_orbit(base, release, longest)
+
+
+def resting_orbit(base: Problem, release: Release, longest: int) -> RestingOrbit | None:
+    """The resting orbit of up to `longest` forcing periods that the motion from a release at rest leads to; None if there is none."""
+    system, period = base.system, base.system.load.period
+    assert period is not None
+    roots = load_releases(system)
+    motion = _released(system, release, longest + 1)
+    chain, times = [release], [release.time]
+    for event in motion.events.of(EventKind.RELEASE):
+        if event.time - release.time < SAME * period:
+            continue
+        following = _known(roots, event.time, event.side, system)
+        if following is None:
+            return None
+        if following in chain:
+            first = chain.index(following)
+            periods = round((event.time - times[first]) / period)
+            return _orbit(base, tuple(chain[first:]), periods) if periods <= longest else None
+        chain.append(following)
+        times.append(event.time)
+    return None
+
+
+def _released(system: System, release: Release, periods: float) -> Motion:
+    contact = {system.model.coordinates[0]: float(system.model.contact), "velocity": 0.0}
+    return simulate(system, **contact, time=release.time, side=release.side, periods=periods, tol=ORBIT_TOLERANCE)
+
+
+def _known(roots: tuple[Release, ...], time: float, side: int, system: System) -> Release | None:
+    """The load's release at an event's time."""
+    period = system.load.period
+    assert period is not None
+
+    def apart(root: Release) -> float:
+        return abs((root.time - time + 0.5 * period) % period - 0.5 * period)
+
+    nearest = min((root for root in roots if root.side == side), key=apart, default=None)
+    return nearest if nearest is not None and apart(nearest) < SAME * period else None
+
+
+def _orbit(base: Problem, chain: tuple[Release, ...], periods: int) -> RestingOrbit | None:
+    """The orbit that goes through a cycle of releases, by half of it where it is its own mirror image."""
+    system, period = base.system, base.system.load.period
+    assert period is not None
+    first = chain[0]
+    opposite = replace(first, time=(first.time + 0.5 * period) % period, side=-first.side)
+    image = _known(chain, opposite.time, opposite.side, system)
+    symmetric = periods % 2 == 1 and image is not None and is_symmetric(system)
+    span = 0.5 * periods if symmetric else float(periods)
+    motion = _released(system, first, span)
+    excursions = _excursions(motion, first, first.time + span * period, SAME * period)
+    if excursions is None:
+        return None
+    crossings = motion.crossings
+    problem = base.with_signature(Signature(tuple(int(s) for s in crossings.side), periods, symmetric))
+    equations, bends = _between(problem, motion, excursions)
+    if equations is None:
+        return None
+    unknowns = np.stack([crossings.time * base.frequency(base.values), np.abs(crossings.velocity_before)], axis=1).ravel()
+    return RestingOrbit(problem, Solution(unknowns, problem.values, equations, 0), excursions, bends)
+
+
+def _excursions(motion: Motion, first: Release, end: float, slack: float) -> np.ndarray | None:
+    """Releases, rests and sides of a motion that starts at a release and rests at `end`; None where it does not."""
+    releases, sides = [first.time], [first.side]
+    for event in motion.events.of(EventKind.RELEASE):
+        if first.time + slack < event.time < end - slack:
+            releases.append(event.time)
+            sides.append(event.side)
+    rests = [event.time for event in motion.events.of(EventKind.REST) if event.time > first.time + slack]
+    if len(rests) != len(releases) or motion.limit is not None or rests[-1] > end:
+        return None
+    return np.array([releases, rests, sides]).T
+
+
+def _between(problem: Problem, motion: Motion, excursions: np.ndarray) -> tuple[Equations | None, np.ndarray]:
+    """The equations of the impacts along the smooth segments between them, with a look at each, and the gap's bends at impact."""
+    crossings, contact = motion.crossings, float(problem.system.model.contact)
+    speeds = np.abs(crossings.velocity_before)
+    opened = np.searchsorted(crossings.time, excursions[:, RELEASED])  # the first impact of each excursion
+    begins, before = np.append(-np.inf, crossings.time[:-1]), np.append(0, crossings.side[:-1]).astype(np.int64)
+    approach, states = np.append(0.0, speeds[:-1]), np.zeros((len(speeds), 2))
+    into = excursions[:, RELEASED] + INTO * (crossings.time[opened] - excursions[:, RELEASED])
+    begins[opened], before[opened], approach[opened] = into, 0, 0.0
+    states[opened] = np.stack(motion.at(into), axis=1)
+    spans = np.stack([begins, crossings.time, approach], axis=1)
+    along = crossings.side.astype(np.int64)
+    flown = problem.fly(spans, np.stack([before, along], axis=1), states, problem.values, look=True)
+    if flown is None:
+        return None, np.empty(0)
+    ends, _, looks, rates = flown
+    sign = np.where(along > 0, rates[0], rates[-1])
+    closed = np.stack([ends[:, at.KINDS] - contact, -sign * ends[:, at.KINDS + 1] - speeds], axis=1)
+    nothing = np.empty((0, 2, 2))
+    equations = Equations(closed.ravel(), nothing, nothing, np.empty((0, len(problem.paths))), ends, looks)
+    bends: np.ndarray = sign * ends[:, at.KINDS + 2]
+    return equations, bends
