@@ -11,7 +11,7 @@ from saltus.flow import layout as scalar_layout
 from saltus.flow import records, roots
 from saltus.flow.compile import Pointer, body, is_compiled, load_module, module_name
 from saltus.flow.emit import Emitter
-from saltus.flow.lanes import alone, driver, layout, legs, observe, steps, straight, vector, visits
+from saltus.flow.lanes import alone, driver, layout, legs, observe, recurrences, steps, straight, vector, visits, writer
 from saltus.flow.lanes.straight import Slots
 from saltus.flow.trace import Trace
 
@@ -46,7 +46,8 @@ def compile_driver_aside() -> subprocess.Popen[bytes] | None:
     if is_compiled(module_name("lanes", _driver_text(), _header())):
         return None
     try:
-        return subprocess.Popen([sys.executable, "-c", f"from {__name__} import load_driver; load_driver()"])
+        found = f"import sys; sys.path[:] = {sys.path!r}; "  # as this process has come to know it
+        return subprocess.Popen([sys.executable, "-c", f"{found}from {__name__} import load_driver; load_driver()"])
     except OSError:
         return None
 
@@ -70,7 +71,7 @@ def _header() -> str:
     import hashlib
     import inspect
 
-    written_by = inspect.getsource(vector) + inspect.getsource(straight) + inspect.getsource(layout)
+    written_by = "".join(inspect.getsource(module) for module in (vector, writer, recurrences, straight, layout))
     return HEADER + f"# {vector.WIDTH} lanes, written by {hashlib.sha256(written_by.encode()).hexdigest()[:20]}\n"
 
 

@@ -157,7 +157,7 @@ def commit(at, m, moved, hit):
 
 @inline_jit
 def fly(code, sizes, at, m, flags, settings, helpers, poly, gap):
-    """One step of all lanes. Returns (bits to visit, bits captured, bits out of range)."""
+    """One step of all lanes. Returns (bits to visit, bits captured)."""
     hit, away, h, tau, bend = propose(code, sizes, at, m, flags, settings, helpers, poly, gap)
     captured = 0
     new_hit = hit

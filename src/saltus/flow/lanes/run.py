@@ -88,7 +88,7 @@ class Lanes:
         with ThreadPoolExecutor(threads) as pool:
             workers = [pool.submit(self._work, jobs, ends, chunks, lock, control) for control in controls]
             try:
-                while wait(workers, PATIENCE if progress or len(workers) else None).not_done:
+                while wait(workers, PATIENCE).not_done:
                     if progress is not None and total > 0:
                         progress(min(1.0, sum(int(c[1]) for c in controls) / total))
             except BaseException:
