@@ -30,6 +30,7 @@ from saltus.orbits.locus import CLOSED, Locus, LocusPoint, Plane
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import TOUCH
 from saltus.orbits.problem import Problem
+from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.special import SpecialPoint
 from saltus.orbits.symmetry import half, keeps_symmetry
@@ -178,9 +179,13 @@ def continue_special(
         ParameterError: another kind of point, an unknown parameter or the branch's own, bounds that exclude the point, a second
             parameter that takes away the symmetry which a BPC or a grazing on both sides rests on.
     """
-    first_path, system = special.point.curve.problem.paths[0], special.orbit.system
     if special.kind not in FOLLOWED:
         raise ParameterError(f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}")
+    if isinstance(special.orbit, RestingOrbit):
+        raise ParameterError(
+            "curves are followed of orbits between impacts only, and this one rests; continue it along one parameter"
+        )
+    first_path, system = special.point.curve.problem.paths[0], special.orbit.system
     if path == first_path:
         raise ParameterError(f"the branch already runs along {path}; name another parameter to follow its {special.kind} in")
     if path not in system.parameters:
