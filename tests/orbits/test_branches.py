@@ -34,7 +34,7 @@ def branch(name):
         "unequal everything": (lambda: start(k=1.2, m=0.2, c=0.7, mean=0.1, e=0.9), FREQUENCY, (0.25, 3.0)),
         "period 3": (lambda: start(H=1.0, W=2.4, theta=2.0), FREQUENCY, (1.0, 8.0)),
         "loop": (lambda: start(H=0.5, W=2.8, theta=3.0), FREQUENCY, (0.25, 30.0)),
-        "onset": (lambda: start(AMPLITUDE, H=0.05), AMPLITUDE, (0.001, 0.5)),
+        "onset": (lambda: start(AMPLITUDE, H=0.05), AMPLITUDE, (0.001, 0.085)),
         "one side": (lambda: start(AMPLITUDE, H=0.3, V=-1.6, theta=-1.2), AMPLITUDE, (0.01, 3.0)),
         "other side": (lambda: start(AMPLITUDE, H=0.3, V=-1.6, theta=1.2), AMPLITUDE, (0.01, 3.0)),
     }[name]
@@ -221,7 +221,9 @@ def test_the_parameter_turns_only_at_folds_and_grazings(name):
 @pytest.mark.parametrize("name", ["Hhat 0.5", "unequal layers", "impact oscillator"])
 def test_special_points_do_not_depend_on_the_step(name, step):
     found = branch(name)
-    other = continue_orbit(found.orbits[len(found.orbits) // 2], found.path, (found.parameters.min(), found.parameters.max()), step=step)
+    other = continue_orbit(
+        found.orbits[len(found.orbits) // 2], found.path, (found.parameters.min(), found.parameters.max()), step=step
+    )
     wanted = ("LP", "PD", "BPC", "GR")
     one, two = sorted(kinds(found, *wanted)), sorted(kinds(other, *wanted))
     assert [k for k, _ in one] == [k for k, _ in two]
@@ -240,7 +242,7 @@ def test_branch_does_not_depend_on_the_orbit_it_is_followed_from(W):
 
 @pytest.mark.parametrize("W", [0.2, 0.7, 0.88, 2.0])
 def test_branches_along_two_parameters_meet_in_the_same_orbits(W):
-    """Along the frequency at Hhat = 0.5, and along Hhat at that frequency: all orbits that the first has there, the second has."""
+    """Along the frequency at Hhat = 0.5, and along Hhat at that frequency: the orbits of the first are also on the second."""
     along_frequency = [o for o in branch("Hhat 0.5").at(W) if o.stable]
     assert along_frequency
     for orbit in along_frequency:
@@ -261,6 +263,18 @@ def test_orbits_at_a_value_are_solved_there():
     assert found.at(5.0) == []
 
 
+def test_unstable_orbits_are_found_from_beside_them_without_settling():
+    (orbit,) = (o for o in branch("Hhat 0.5").at(0.88) if not o.stable)
+    position, velocity = orbit.state
+    beside = {"theta": position + 1e-3, "velocity": velocity - 1e-3}
+    again = find_orbit(forced(W=0.88), parameters=(FREQUENCY,), **beside, settle=0, period=1)
+    assert not again.stable
+    assert again.amplitude == pytest.approx(orbit.amplitude, abs=1e-11)
+    settled = find_orbit(forced(W=0.88), parameters=(FREQUENCY,), **beside)
+    assert settled.stable
+    assert abs(settled.amplitude - orbit.amplitude) > 0.05
+
+
 def test_mirror_images_have_mirrored_branches():
     one, other = branch("one side"), branch("other side")
     assert [k for k, _ in kinds(one, "LP", "PD", "GR")] == [k for k, _ in kinds(other, "LP", "PD", "GR")]
@@ -275,8 +289,8 @@ def test_mirror_images_have_mirrored_branches():
 @pytest.mark.parametrize("excess", [1e-7, 1e-5, 1e-3])
 def test_systems_that_are_almost_symmetric(excess):
     """The two mirror pairs of impacts appear one after the other, at grazings as near to each other as the stiffness is to 1."""
-    found = continue_orbit(start(k=1.0 + excess, W=0.3), FREQUENCY, (0.24, 0.31))
-    assert found.ends == ("bound 0.24", "bound 0.31")
+    found = continue_orbit(start(k=1.0 + excess, W=0.3), FREQUENCY, (0.2845, 0.31))
+    assert found.ends == ("bound 0.2845", "bound 0.31")
     assert parameter(found, "LP", 0.284668) == pytest.approx(0.284668455747, abs=2 * excess)
     near = [p for _, p in kinds(found, "GR") if abs(p - 0.28463) < 10 * excess]
     assert len(near) == 2
@@ -289,7 +303,7 @@ def test_systems_that_are_almost_symmetric(excess):
 
 def test_symmetric_but_for_rounding():
     """The second grazing lies within rounding of the first: the branch may end there, but with a reason and nothing false."""
-    found = continue_orbit(start(k=1.0 + 1e-9, W=0.3), FREQUENCY, (0.24, 0.31))
+    found = continue_orbit(start(k=1.0 + 1e-9, W=0.3), FREQUENCY, (0.2845, 0.31))
     assert all(o.admissible for o in found.orbits)
     assert not found.closed
     assert found.ends[1] == "bound 0.31"

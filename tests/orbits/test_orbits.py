@@ -161,13 +161,6 @@ def test_an_orbit_of_the_mirrored_system_is_its_mirror_image():
     assert np.abs(np.array(image.state) + np.array([half.theta, half.velocity])).max() < 1e-10
 
 
-def test_unstable_orbits_are_found_from_beside_them_without_settling():
-    """Between the two stable motions of the paper's Fig. 9 at Omega = 0.88, Hhat = 0.5 lies the unstable one of the fold's arch."""
-    orbit = find_orbit(forced(W=0.88), parameters=FORCED, theta=0.0, velocity=-1.05, settle=0, period=1)
-    assert orbit.residual < 1e-12
-    assert orbit.defect < 1e-10
-
-
 def test_a_motion_with_one_impact_over_the_period_is_no_orbit_but_no_crash():
     """Two sides make impacts come in pairs; near a saddle of a chaotic motion a start may show a single one."""
     from saltus import MotionError

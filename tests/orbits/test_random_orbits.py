@@ -10,7 +10,7 @@ from orbit_cases import FREQUENCY, forced, walled
 
 from saltus import MotionError, ParameterError, Record, System, find_orbit, simulate
 
-FEW = settings(max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+FEW = settings(max_examples=10, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 numbers = {
     "beta0": st.floats(0.5, 2.2),
     "C": st.floats(0.03, 0.5),
@@ -59,9 +59,7 @@ def test_settled_motions_of_random_systems(system, theta, velocity):
 
 
 @FEW
-@given(
-    theta=st.floats(-2.0, 2.0), velocity=st.floats(-1.0, 1.0), period=st.integers(1, 4), system=st.builds(forced, **numbers)
-)
+@given(theta=st.floats(-2.0, 2.0), velocity=st.floats(-1.0, 1.0), period=st.integers(1, 4), system=st.builds(forced, **numbers))
 def test_orbits_near_random_states(system, theta, velocity, period):
     """Newton's method from what is no orbit at all."""
     orbit = outcome(system, theta=theta, velocity=velocity, settle=0, period=period)
@@ -92,7 +90,7 @@ def test_chaos_is_refused_with_what_to_try():
 
 
 def test_rest_is_refused_with_what_to_try():
-    with pytest.raises(MotionError, match=r"rest at contact.*start farther"):
+    with pytest.raises(MotionError, match=r"the undeformed state, which is no orbit to follow.*start farther"):
         find_orbit(forced(H=0.03), theta=0.05, parameters=(FREQUENCY,))
 
 
@@ -123,7 +121,6 @@ def test_a_record_has_no_orbits():
         ({}, "theta"),
         ({"theta": 0.3, "parameters": ("load.frequenzy",)}, "load.frequency"),
         ({"theta": 0.3, "parameters": ("model",)}, "model"),
-        ({"theta": 0.3, "parameters": 3}, "parameters"),
     ],
 )
 def test_arguments_without_meaning_are_refused_in_a_sentence(arguments, sentence):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from orbit_cases import CASES, FREQUENCY, Hinge, forced, hinged, paired, random_guess, slope, walled
+from orbit_cases import CASES, hinged, paired, random_guess, slope, walled
 
 from saltus import simulate
 from saltus.flow import segments as at
@@ -30,7 +30,7 @@ def at_impacts(name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_motion_solves_the_equation_of_each_of_its_segments(name):
-    motion, problem, unknowns = at_impacts(name)
+    _, problem, unknowns = at_impacts(name)
     residual = problem.evaluate(unknowns, problem.values).residual.reshape(-1, 2)
     assert np.abs(residual[:-1]).max() < 2e-12  # the last segment closes the period, which the motion does not
 
