@@ -44,7 +44,7 @@ def _defects(orbits: list[PeriodicOrbit], periods: int, tol: float) -> np.ndarra
     apart = np.max([np.abs(result[name].values - begin[name]) for name in names], axis=0)
     after = result["velocity"].values if velocity.ndim == 1 else None
     if after is None:
-        ends = np.stack([result[f"velocity_{name}"].values for name in names], axis=1)
+        ends = np.stack([result[f"{name}_velocity"].values for name in names], axis=1)
         return np.asarray(np.maximum(apart, np.abs(ends - velocity).max(axis=1)))
     before = np.array([orbit.speeds[0] if orbit.signature.sides else np.inf for orbit in orbits])
     either = np.minimum(np.abs(after - velocity), np.abs(np.abs(after) - before))
