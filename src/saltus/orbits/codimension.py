@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.flow import segments as at
 from saltus.orbits.conditions import Singular, cubic, quadratic
-from saltus.orbits.grazing import TOGETHER, _removed
+from saltus.orbits.grazing import TOGETHER, removed
 from saltus.orbits.orbit import PeriodicOrbit
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def determinant(point: LocusPoint, closing: float) -> float:
 
 def without(point: LocusPoint, closing: float) -> float:
     """The same for the orbit on the other side of the grazing, without the impacts that have no speed; 1 if there is none."""
-    other = _removed(cast(Any, point))
+    other = removed(cast(Any, point))
     equations = None if isinstance(other, str) else other[0].evaluate(other[1], point.solution.values)
     return 1.0 if equations is None else _scaled(equations.jacobian(closing))
 

@@ -22,7 +22,7 @@ def other_side(point: Point) -> Point | str:
     A gap that touches zero between impacts gains a pair of impacts without speed there, or a single one at a wall that turns
     the motion round; impacts that have lost their speed are left out.
     """
-    changed = _removed(point) if point.orbit.slowest < TOUCH else _inserted(point)
+    changed = removed(point) if point.orbit.slowest < TOUCH else inserted(point)
     if isinstance(changed, str):
         return changed
     problem, unknowns = changed
@@ -50,7 +50,7 @@ def _turns_round(problem: Problem, side: int) -> bool:
     return bool(model.reset(0.0, 1.0, side, load, impact)[0] == side)
 
 
-def _inserted(point: Point) -> tuple[Problem, np.ndarray] | str:
+def inserted(point: Point) -> tuple[Problem, np.ndarray] | str:
     problem, signature = point.curve.problem, point.curve.problem.signature
     looks = point.solution.equations.looks
     segment = int(np.argmin(looks[:, at.HUMP]))
@@ -66,7 +66,7 @@ def _inserted(point: Point) -> tuple[Problem, np.ndarray] | str:
     return problem.with_signature(longer), np.concatenate([unknowns[: 2 * place], touches, unknowns[2 * place :]])
 
 
-def _removed(point: Point) -> tuple[Problem, np.ndarray] | str:
+def removed(point: Point) -> tuple[Problem, np.ndarray] | str:
     problem, signature = point.curve.problem, point.curve.problem.signature
     n = len(signature.sides)
     phases, speeds = point.solution.unknowns[::2], point.solution.unknowns[1::2]

@@ -25,7 +25,7 @@ from saltus.orbits.branch import (
 from saltus.orbits.codimension import CodimensionTwo, located, room, tests_of
 from saltus.orbits.conditions import Condition, Singular, Slow, matrix
 from saltus.orbits.find import divide
-from saltus.orbits.grazing import TOGETHER, _inserted
+from saltus.orbits.grazing import TOGETHER, inserted
 from saltus.orbits.locus import CLOSED, Locus, LocusPoint, Plane
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import TOUCH
@@ -296,7 +296,7 @@ def _touching(special: SpecialPoint) -> tuple[Signature, np.ndarray]:
     point = special.point
     if point.orbit.slowest < TOUCH:  # then the touch is an impact of its own, whose gap has its minimum there too
         return point.curve.problem.signature, point.solution.unknowns
-    changed = _inserted(point)
+    changed = inserted(point)
     if isinstance(changed, str):
         raise ParameterError(f"this grazing cannot be followed: {changed}")
     return changed[0].signature, changed[1]
