@@ -96,7 +96,9 @@ def diagram(
     """
     low, high = _checked(system, path, bounds, max_period=max_period, starts=starts, seed=seed, repelling=repelling)
     check_number("step", step, above=0.0)
-    grid = _values((low, high), values)
+    grid, region = _values((low, high), values), _region(region)
+    if not (progress is None or callable(progress)):
+        raise ParameterError(f"progress must be a function of the fraction done and of what is being done, got {progress!r}")
     say = progress or (lambda share, what: None)
     say(0.0, "searching")
     found = search_orbits(
@@ -126,6 +128,8 @@ def _checked(system: System, path: str, bounds: tuple[float, float], **efforts: 
     """The bounds; refuses, before anything is computed, what would fail later."""
     if not isinstance(system, System):
         raise ParameterError(f"a diagram takes a System(model=..., load=..., impact=...), got {system!r}")
+    if system.load.frequency is None:
+        raise ParameterError("a load without a frequency has no periodic orbits to draw; give the Load a frequency")
     low, high = check_bounds(bounds)
     if path not in system.parameters:
         system.get(path)  # refuses what leads nowhere
@@ -144,8 +148,21 @@ def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.n
     try:
         grid = np.array([float(value) for value in values])
     except (TypeError, ValueError):
-        raise ParameterError(f"values must be numbers at which to search, got {values!r}") from None
+        grid = np.empty(0)
+    if not grid.size:
+        raise ParameterError(f"values must be numbers at which to search, got {values!r}")
     outside = grid[~((grid >= bounds[0]) & (grid <= bounds[1]))]
     if outside.size:
         raise ParameterError(f"values must lie within the bounds {bounds}, got {outside[0]:g}; widen the bounds or leave it out")
     return grid
+
+
+def _region(region: tuple[float, float]) -> tuple[float, float]:
+    """The half widths of the region of initial states."""
+    try:
+        widths = tuple(float(width) for width in region)
+    except (TypeError, ValueError):
+        widths = ()
+    if len(widths) != 2 or not all(0.0 < width < np.inf for width in widths):
+        raise ParameterError(f"region must be two half widths, of the first coordinate and of its velocity, got {region!r}")
+    return widths[0], widths[1]
