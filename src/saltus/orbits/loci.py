@@ -10,18 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.orbits.branch import (
-    ANGLE,
-    FAR,
-    FIRST_STEP,
-    LEAST_STEP,
-    MOST_POINTS,
-    SHARPEST,
-    SMALLEST,
-    STEP,
-    check_bounds,
-    separation,
-)
+from saltus.orbits.branch import check_bounds
 from saltus.orbits.codimension import CodimensionTwo, located, room, tests_of
 from saltus.orbits.conditions import Condition, Singular, Slow, matrix
 from saltus.orbits.find import divide
@@ -34,6 +23,7 @@ from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.special import SpecialPoint
 from saltus.orbits.symmetry import half, keeps_symmetry
+from saltus.orbits.walk import ANGLE, FAR, FIRST_STEP, LEAST_STEP, MOST_POINTS, SHARPEST, SMALLEST, STEP, separation
 
 FOLLOWED = ("LP", "PD", "BPC", "GR")
 TENFOLD = 10.0  # a parameter without bounds is followed to so many times its value, and to that part of it

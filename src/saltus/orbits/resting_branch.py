@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from saltus.errors import SaltusError
-from saltus.orbits.branch import SMALLEST, Branch
+from saltus.orbits.branch import Branch
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.path import Curve, Point
 from saltus.orbits.problem import Problem
@@ -26,6 +26,7 @@ from saltus.orbits.releases import Release, load_releases, peak_near
 from saltus.orbits.resting import RestingOrbit, resting_orbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.special import Evidence, SpecialPoint, UserFunction
+from saltus.orbits.walk import SMALLEST
 
 if TYPE_CHECKING:
     import xarray
@@ -208,7 +209,9 @@ class _Walk:
             assert after is not None, "an orbit with other impacts"
             few, many = sorted((near, after), key=lambda o: len(o.touching))
             if few.clearance < FAINT and many.touching.min() < FAINT:
-                self._special("GR", few, abs(beyond - float(near.system.get(self.path))), (few.clearance, -many.touching.min(), 0.0))
+                self._special(
+                    "GR", few, abs(beyond - float(near.system.get(self.path))), (few.clearance, -many.touching.min(), 0.0)
+                )
             ahead, following = beyond, after
         tests: dict[str, UserFunction] = {name: lambda o, name=name: o.margins[name] for name in orbit.margins}
         for name, test in (tests | self.functions).items():

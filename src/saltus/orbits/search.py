@@ -79,9 +79,9 @@ def search_orbits(
     """Periodic orbits of up to `longest` forcing periods at several values of a parameter, each once for each value.
 
     Initial states are spread evenly (a sequence of low discrepancy) over the region around the contact, or around 0 for a
-    model without one. Motions that settle lead to the attracting orbits. Returns of the motions near to where they were, on their way or in
-    chaos, are first guesses for Newton's method, which finds repelling ones, of up to `repelling` forcing periods (by default
-    `longest`; 0 looks for none).
+    model without one. Motions that settle lead to the attracting orbits. Returns of the motions near to where they were, on
+    their way or in chaos, are first guesses for Newton's method, which finds repelling ones, of up to `repelling` forcing
+    periods (by default `longest`; 0 looks for none).
 
     Raises:
         ParameterError: an unknown parameter, no values, an effort without meaning.
