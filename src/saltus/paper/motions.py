@@ -10,7 +10,8 @@ from saltus.paper.features import detached, main_branch, turning
 from saltus.paper.provenance import dataset
 
 PHASES = 361  # over one forcing period
-BEYOND = 1e-3  # of the range, by which a motion is pushed past a fold
+BEYOND = 3e-3  # relative distance past a fold at which a motion is let go: nearer to it motions linger where the orbit was
+APART = 1e-5  # relative: a point of a branch may be the fold itself
 SETTLE, LAST = 800, 12  # forcing periods until the motion after a jump is looked at, and for how long
 
 
@@ -110,7 +111,7 @@ def jumps(spectrum: Any) -> Any:
         for fold in turning(branch):
             orbit, sign = _last_stable(branch, float(fold))
             if orbit is not None and low < fold < high:
-                rows.append((name, float(fold), float(fold + sign * BEYOND * (high - low)), orbit))
+                rows.append((name, float(fold), float(fold * (1 + sign * BEYOND)), orbit))
     orbits = [row[3] for row in rows]
     columns = {name: ("jump", np.array([row[k] for row in rows]), "1") for k, name in ((1, "fold"), (2, "value"))}
     return dataset(
@@ -139,8 +140,10 @@ def _settled(system: Any, path: str, values: np.ndarray, orbits: list[Any]) -> n
 
 
 def _last_stable(branch: Any, fold: float) -> tuple[Any, float]:
-    """The stable orbit nearest to a fold, and the sign of the way on which there is none."""
-    stable = np.flatnonzero(branch["stable"].values)
+    """The stable orbit nearest to a fold, but not at it, and the sign of the way on which there is none."""
     x = branch["parameter"].values
+    stable = np.flatnonzero(branch["stable"].values & (np.abs(x - fold) > APART * abs(fold)))
+    if not stable.size:
+        return None, 0.0
     nearest = int(stable[np.argmin(np.abs(x[stable] - fold))])
-    return orbit_at(branch, nearest, float(x[nearest])), float(np.sign(fold - x[nearest])) or 1.0
+    return orbit_at(branch, nearest, float(x[nearest])), float(np.sign(fold - x[nearest]))

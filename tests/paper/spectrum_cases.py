@@ -1,0 +1,59 @@
+"""Diagrams made by hand, of which every feature is known."""
+
+import numpy as np
+import xarray as xr
+
+
+def branch(parameter, amplitude, stable, *, special=(), origin="start", ends=("bound 0", "bound 3"), periods=1, crossings=2):
+    """A branch's dataset with the given points; `special` holds (kind, parameter, amplitude)."""
+    amplitude = np.asarray(amplitude, float)
+    n = len(amplitude)
+    data = {
+        "parameter": ("point", np.asarray(parameter, float)),
+        "amplitude": ("point", amplitude),
+        "highest": ("point", amplitude),
+        "lowest": ("point", -0.5 * amplitude),
+        "stable": ("point", np.asarray(stable, np.int8)),
+        "symmetric": ("point", np.zeros(n, np.int8)),
+        "periods": ("point", np.full(n, periods)),
+        "crossings": ("point", np.broadcast_to(crossings, n).copy()),
+    }
+    if special:
+        kinds, places, sizes = zip(*special, strict=True)
+        data["kind"] = ("special", np.array(kinds))
+        data["special_parameter"] = ("special", np.array(places, float))
+        data["special_amplitude"] = ("special", np.array(sizes, float))
+        data["special_highest"] = ("special", np.array(sizes, float))
+        data["special_lowest"] = ("special", -0.5 * np.array(sizes, float))
+    return xr.Dataset(data, attrs={"origin": origin, "ends": list(ends)})
+
+
+def diagram(*branches, dots=(), bounds=(0.0, 3.0)):
+    """A DataTree of branches and of dots (parameter, amplitude)."""
+    places = np.array(dots, float).reshape(-1, 2)
+    parts = {f"branch_{i:03d}": data for i, data in enumerate(branches)}
+    columns = {"parameter": places[:, 0], "amplitude": places[:, 1], "highest": places[:, 1], "lowest": -0.5 * places[:, 1]}
+    parts["attractors"] = xr.Dataset({name: ("dot", values) for name, values in columns.items()})
+    parts["bands"] = xr.Dataset({"low": ("band", [1.0]), "high": ("band", [1.5]), "kind": ("band", ["CH"])})
+    parts["/"] = xr.Dataset(attrs={"bounds": list(bounds), "path": "load.frequency", "scale": 2.0})
+    return xr.DataTree.from_dict(parts)
+
+
+def folded():
+    """A resonance that leans over: amplitude against frequency with folds at 2 and 1.5, the part between them unstable."""
+    parameter = [0.0, 0.5, 1.0, 1.6, 1.99, 1.75, 1.52, 1.8, 2.4, 3.0]
+    amplitude = [0.5, 0.7, 1.0, 1.5, 2.1, 1.8, 1.2, 0.8, 0.5, 0.4]
+    stable = [1, 1, 1, 1, 1, 0, 0, 1, 1, 1]
+    return branch(parameter, amplitude, stable, special=[("LP", 2.0, 2.0), ("LP", 1.5, 1.1)])
+
+
+def loop():
+    """A closed loop above it, stable below, of period 3."""
+    return branch(
+        [1.0, 1.5, 2.0, 1.5, 1.0],
+        [3.0, 2.5, 3.0, 3.5, 3.0],
+        [1, 1, 1, 0, 1],
+        special=[("LP", 2.0, 3.0), ("LP", 1.0, 3.0)],
+        ends=("closes", "closes"),
+        periods=3,
+    )

@@ -1,0 +1,136 @@
+"""Pictures of branches follow the conventions, and their lines go through what was computed and nothing else."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from spectrum_cases import branch, diagram, folded, loop
+
+from saltus.plots import response, style
+
+
+def lines(ax, line):
+    """The lines of an axes in the colour and dashes of a convention."""
+    return [one for one in ax.lines if one.get_color() == line["color"] and one.get_linestyle() == drawn(line)]
+
+
+def drawn(line):
+    return "-" if line["linestyle"] == "-" else "--"
+
+
+@pytest.fixture
+def axes():
+    figure = style.new_figure(layout=None)
+    ax = figure.subplots()
+    ax.set_xlim(0, 3)
+    ax.set_ylim(0, 4)
+    return ax
+
+
+def test_runs_of_one_stability_meet_at_the_fold_between_them():
+    runs = list(response.pieces(folded()))
+    assert [stable for stable, _, _ in runs] == [True, False, True]
+    for (_, x, y), (_, u, v), fold in zip(runs[:-1], runs[1:], [(2.0, 2.0), (1.5, 1.1)], strict=True):
+        assert (x[-1], y[-1]) == pytest.approx(fold)
+        assert (u[0], v[0]) == pytest.approx(fold)
+
+
+def test_the_line_passes_every_point_and_leaves_the_range_of_its_neighbours_nowhere():
+    data = folded()
+    x, y = (np.concatenate(parts) for parts in zip(*[(x, y) for _, x, y in response.pieces(data)], strict=True))
+    for point in zip(data["parameter"].values, data["amplitude"].values, strict=True):
+        assert np.hypot(x - point[0], y - point[1]).min() < 1e-12
+    (_, first, _), (_, second, _), _ = response.pieces(data)
+    assert (first.max(), second.max(), second.min()) == pytest.approx((2.0, 2.0, 1.5))
+    assert y.max() == pytest.approx(2.1)
+    assert y.min() == pytest.approx(0.4)
+
+
+def test_a_smooth_curve_looks_smooth_between_its_points():
+    angle = np.linspace(0, 2 * np.pi, 41)
+    (run,) = response.pieces(branch(1.5 + np.cos(angle), 2 + np.sin(angle), np.ones(41)))
+    assert np.abs(np.hypot(run[1] - 1.5, run[2] - 2) - 1).max() < 1.5e-3
+    chords = 1 - np.cos(np.pi / 40)
+    assert chords > 1.5e-3
+
+
+def test_a_grazing_keeps_its_corner():
+    data = branch([0, 1, 2, 2, 1, 0], [0, 1, 2, 2, 3, 4], np.ones(6), crossings=[2, 2, 2, 6, 6, 6])
+    one, two = response.pieces(data)
+    for _, x, y in (one, two):
+        corner = (x[-1], y[-1]) if (x[-1], y[-1]) == (2, 2) else (x[0], y[0])
+        assert corner == (2, 2)
+    assert one[1] == pytest.approx(one[2])
+    assert two[1] + two[2] == pytest.approx(4)
+
+
+def test_without_a_special_point_runs_meet_in_the_middle():
+    first, second = response.pieces(branch([0, 1, 2, 3], [1, 1, 2, 2], [1, 1, 0, 0]))
+    assert (first[1][-1], first[2][-1]) == (second[1][0], second[2][0]) == (1.5, 1.5)
+
+
+def test_stable_is_solid_blue_unstable_dashed_red_in_the_given_unit(axes):
+    response.draw_branches(axes, diagram(folded()), scale=2.0)
+    blue, red = lines(axes, style.STABLE_LINE), lines(axes, style.UNSTABLE_LINE)
+    assert (len(blue), len(red)) == (2, 1)
+    assert max(line.get_ydata().max() for line in blue + red) == pytest.approx(2.1 / 2.0)
+
+
+def test_marks_name_the_kinds_that_are_inside_and_are_thinned_out(axes):
+    crowd = [("GR", 1.0 + 1e-4 * k, 1.0) for k in range(50)]
+    data = diagram(branch([0, 3], [1, 1], [1, 1], special=[*crowd, ("LP", 2.0, 1.0), ("PD", 9.0, 1.0)]))
+    response.draw_special(axes, data)
+    counts = {line.get_marker(): len(line.get_xdata()) for line in axes.lines}
+    assert counts == {"^": 1, "o": 1}
+
+
+def test_bands_are_light_blue_and_light_orange_behind_everything(axes):
+    response.draw_bands(axes, diagram(folded()))
+    (band,) = axes.patches
+    assert band.get_facecolor()[:3] == mpl.colors.to_rgb(response.BANDS["CH"])
+    assert (band.get_x(), band.get_width()) == (1.0, 0.5)
+    assert band.get_zorder() == 0
+
+
+def test_limits_are_two_greens_apart_from_each_other_and_from_the_critical_load(axes):
+    response.draw_limits(axes, 1.7, 3.5, scale=1.0)
+    response.draw_critical(axes, 0.1)
+    line, farthest, critical = axes.lines
+    assert line.get_ydata()[0] == 1.7
+    assert farthest.get_ydata()[0] == 3.5
+    assert critical.get_xdata()[0] == 0.1
+    assert len({str(one._dash_pattern) for one in axes.lines}) == 3  # told apart without colour
+    assert line.get_color() == farthest.get_color() != critical.get_color()
+
+
+def test_limits_beyond_the_axes_do_not_stretch_them(axes):
+    response.draw_limits(axes, 1.7, 35.0)
+    assert len(axes.lines) == 1
+    assert axes.get_ylim() == (0, 4)
+
+
+def test_dots_of_simulation_lie_where_they_were_found(axes):
+    response.draw_attractors(axes, diagram(folded(), dots=[(1.0, 1.0), (2.4, 0.5)]), scale=2.0)
+    (dots,) = axes.lines
+    assert dots.get_xydata() == pytest.approx(np.array([[1.0, 0.5], [2.4, 0.25]]))
+
+
+def test_a_zoom_shows_its_window_of_the_same_data(axes):
+    inset = response.draw_zoom(axes, diagram(folded()), (0.4, 0.5, 0.4, 0.4), (1.4, 2.1, 1.0, 2.2))
+    assert inset.get_xlim() == (1.4, 2.1)
+    assert lines(inset, style.UNSTABLE_LINE)
+
+
+def test_the_legend_names_only_the_kinds_and_bands_that_are_there():
+    figure = style.new_figure()
+    response.legend(figure, [diagram(folded(), loop())])
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "fold (LP)" in names
+    assert "chaotic" in names
+    assert not {"grazing (GR)", "period doubling (PD)", "quasi-periodic"} & set(names)
+
+
+def test_the_extremes_are_those_within_the_range():
+    data = diagram(folded(), loop())
+    assert response.highest(data, 0.0, 3.0) == 3.5
+    assert response.highest(data, 2.2, 3.0) == 0.5
+    assert response.lowest(data, 0.0, 3.0, "lowest") == -1.75
