@@ -17,6 +17,7 @@ from saltus.systems import IMPACTS, MODELS
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
+ORBITS = (ROOT / "docs" / "orbits.md").read_text(encoding="utf-8")
 ENSEMBLES = (ROOT / "docs" / "ensembles.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
 
@@ -55,7 +56,7 @@ def test_the_impact_laws_are_all_named():
 # --- Python ------------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/ensembles.md", "docs/models.md"])
+@pytest.mark.parametrize("name", ["README.md", "docs/ensembles.md", "docs/models.md", "docs/orbits.md"])
 def test_every_snippet_runs(name, monkeypatch):
     text = (ROOT / name).read_text(encoding="utf-8")
     code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)).replace(", 200)", ", 12)")  # coarser grids
@@ -107,3 +108,62 @@ def test_the_thresholds_of_capture_are_those_of_the_system_above():
     )
     paths = {"load.horizontal.amplitude": numbers[:, :1], "impact.e": np.array([1.0, 0.9])}
     np.testing.assert_allclose(capture_speed(system, paths), numbers[:, 1:], rtol=0.05)
+
+
+# --- orbits ------------------------------------------------------------------------------------------------------------------
+
+
+def orbits_section(title):
+    return ORBITS.split(f"\n## {title}\n")[1].split("\n## ")[0]
+
+
+def first_cells(text):
+    return re.findall(r"`([^`]+)`", " ".join(re.findall(r"^\| (`[^|]*)\|", text, re.MULTILINE)))
+
+
+def paper_system(**changes):
+    system = saltus.System(
+        model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
+        load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(amplitude=0.5), vertical=-0.5),
+    )
+    return system.with_(changes)
+
+
+def test_the_attributes_of_an_orbit_are_all_there():
+    orbit = saltus.find_orbit(paper_system(), theta=0.3)
+    named = first_cells(orbits_section("One orbit"))
+    assert len(named) > 15
+    for name in named:
+        assert hasattr(orbit, name.removesuffix("()"))
+
+
+def test_the_kinds_of_special_points_are_all_there():
+    from saltus.orbits.special import KINDS
+
+    named = set(first_cells(orbits_section("A branch").split("| `ends` | |")[0]))
+    assert named >= set(KINDS)
+    assert named - set(KINDS) - {"kind"} == {"RL", "CH"}
+
+
+def test_the_options_of_a_diagram_are_all_there():
+    from saltus.studies.spectrum import bifurcation_diagram, diagram, response_spectrum
+
+    options = set(inspect.signature(diagram).parameters) - {"system", "path"}
+    rows = dict(re.findall(r"^\| (`[^|]*)\|([^|]*)\|[^|]*\|$", orbits_section("Spectra and diagrams"), re.MULTILINE))
+    named = {name: default.strip() for cell, default in rows.items() for name in re.findall(r"`(\w+)`", cell)}
+    assert options <= set(named)
+    bounds = [inspect.signature(f).parameters["bounds"].default for f in (response_spectrum, bifurcation_diagram)]
+    assert named["bounds"] == ", ".join(f"({low:g}, {high:g})" for low, high in bounds)
+    for name in ("max_period", "repelling", "step"):
+        assert named[name] == f"{inspect.signature(diagram).parameters[name].default:g}"
+
+
+def test_the_nodes_and_variables_of_a_diagram_are_all_there():
+    from saltus.studies import response_spectrum
+
+    tree = response_spectrum(paper_system(), bounds=(0.8, 1.0), max_period=1, values=[0.9], starts=8)
+    _, rest = orbits_section("Spectra and diagrams").split("| node | |")
+    nodes, variables = rest.split("| variable of a branch |")
+    assert "branch_000" in tree
+    assert set(first_cells(nodes)) == set(tree.children)
+    assert set(first_cells(variables)) == set(tree["branch_000"].data_vars)
