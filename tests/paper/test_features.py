@@ -38,14 +38,16 @@ def test_superharmonic_peaks_are_those_below_two_thirds_of_the_highest_one():
 
 
 def test_coexisting_stable_motions_are_counted_through_folds_and_loops():
-    data = diagram(folded(), loop())
-    counts = [features.stable_motions(data, value) for value in (0.6, 1.2, 1.78, 2.2)]
-    assert counts == [1, 2, 2, 1]
+    values = np.array([0.6, 1.2, 1.78, 1.995, 2.2])
+    assert features.stable_motions(diagram(folded(), loop()), values).tolist() == [1, 2, 3, 3, 1]  # both arms and the loop
     assert features.amplitudes_at(folded(), 1.78).size == 3
-    assert features.amplitudes_at(folded(), 1.25, stable=True) == pytest.approx([1.0 + 0.5 * 0.25 / 0.6])
-    most, where = features.most_coexisting(data)
-    assert most == 3  # both stable arms of the resonance and the loop
-    assert 1.8 < where < 2.0
+
+
+def test_amplitudes_are_read_off_up_to_the_special_point_where_the_stability_ends():
+    data = branch([0, 1, 2, 3], [1, 1, 1, 1], [1, 1, 1, 0], special=[("PD", 2.9, 1.0)])
+    sizes = [features.amplitudes_at(data, value, stable=True).size for value in (0.5, 2.85, 2.95)]
+    assert sizes == [1, 1, 0]
+    assert features.amplitudes_at(branch([0, 1, 2], [0, 1, 2], [1, 1, 1]), 1.25) == pytest.approx([1.25])
 
 
 def test_the_first_fold_is_the_one_of_least_parameter():

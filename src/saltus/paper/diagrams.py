@@ -45,8 +45,8 @@ def undeformed(system: Any, critical: float) -> Any:
 def draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
     """A panel for each frequency; an inset with what happens up to the amplitude `zoomed`, about Hcr."""
     panels = {name: tree for name, tree in data.children.items() if name in frequencies}
-    figure = new_figure(DOUBLE_COLUMN, 100.0)
-    axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    figure = new_figure(DOUBLE_COLUMN, 25.0 + 80.0 * len(panels))
+    axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
     for ax, (name, tree) in zip(axes, panels.items(), strict=True):
         _, high = tree.attrs["bounds"]
         ax.set_xlim(0.0, high)
@@ -54,10 +54,10 @@ def draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
         frame(ax, tree)
         panel_label(ax, name)
         ax.set_title(rf"$\Omega={frequencies[name]:g}$", pad=4)
+        ax.set_ylabel(r"$\max_\tau|\theta|$ (rad)")
         draw_response(ax, tree)
-        inset = draw_zoom(ax, tree, (0.12, 0.60, 0.34, 0.34), (0.0, zoomed, 0.0, 1.1 * highest(tree, 0.0, zoomed)))
+        inset = draw_zoom(ax, tree, (0.06, 0.56, 0.24, 0.39), (0.0, zoomed, 0.0, 1.1 * highest(tree, 0.0, zoomed)))
         draw_critical(inset, tree.attrs["critical"])
-    axes[0].set_ylabel(r"$\max_\tau|\theta|$ (rad)")
     legend(figure, list(panels.values()), critical=True)
     return figure
 

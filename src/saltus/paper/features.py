@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from saltus.plots.response import pieces
+
 PROMINENT = 0.02  # rad by which a peak rises above the valleys beside it
 FREE_ENDS = ("closes", "bound")  # of a branch that hangs on no other
 
@@ -58,28 +60,29 @@ def superharmonic(branch: Any) -> np.ndarray:
 
 
 def amplitudes_at(branch: Any, value: float, stable: bool | None = None) -> np.ndarray:
-    """The amplitudes with which a branch passes a value of the parameter, between points (both stable, or both not)."""
-    x, y, s = branch["parameter"].values, branch["amplitude"].values, branch["stable"].values.astype(bool)
-    passes = (x[:-1] - value) * (x[1:] - value) <= 0
-    passes &= x[:-1] != x[1:]
-    if stable is not None:
-        passes &= (s[:-1] == stable) & (s[1:] == stable)
-    i = np.flatnonzero(passes)
-    share = (value - x[i]) / (x[i + 1] - x[i])
-    return np.asarray(y[i] + share * (y[i + 1] - y[i]))
+    """The amplitudes with which the line of a branch passes a value of the parameter, of (un)stable motions only if said so."""
+    found = []
+    for holds, x, y in pieces(branch):
+        if stable in (None, holds):
+            i = np.flatnonzero(_passes(x, value))
+            found.append(y[i] + (value - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i]))
+    return np.concatenate(found)
 
 
-def stable_motions(spectrum: Any, value: float) -> int:
-    """How many stable periodic motions coexist at a value of the parameter, mirror images counted once."""
-    return sum(len(amplitudes_at(branch, value, stable=True)) for _, branch in named_branches(spectrum))
+def _passes(x: np.ndarray, value: Any) -> np.ndarray:
+    """Which steps from x[i] to x[i + 1] contain a value, or the values (n, 1), their lower ends counted in."""
+    return np.asarray((np.minimum(x[:-1], x[1:]) <= value) & (value < np.maximum(x[:-1], x[1:])))
 
 
-def most_coexisting(spectrum: Any, samples: int = 400) -> tuple[int, float]:
-    """The largest such number over the range, and where it is reached first."""
-    low, high = spectrum.attrs["bounds"]
-    values = low + (high - low) * (np.arange(samples) + 0.5) / samples
-    counts = [stable_motions(spectrum, value) for value in values]
-    return max(counts), float(values[int(np.argmax(counts))])
+def stable_motions(spectrum: Any, values: np.ndarray) -> np.ndarray:
+    """How many stable periodic motions coexist at values of the parameter (n,), mirror images counted once, (n,)."""
+    values = np.asarray(values, dtype=float)
+    number = np.zeros(values.shape, dtype=int)
+    for _, branch in named_branches(spectrum):
+        for stable, x, _ in pieces(branch):
+            if stable:
+                number += _passes(x, values[:, None]).sum(axis=1)
+    return number
 
 
 def first_fold(branch: Any) -> tuple[float, float]:

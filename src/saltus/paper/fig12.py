@@ -21,7 +21,7 @@ def compute(frequencies: Mapping[str, float] = FREQUENCIES, **options: Any) -> A
 
 def draw(data: Any) -> Any:
     """(a) and (b), a panel for each frequency."""
-    return diagrams.draw(data, FREQUENCIES, zoomed=0.2)
+    return diagrams.draw(data, FREQUENCIES, zoomed=0.6)
 
 
 def claims(data: Any) -> list[Claim]:

@@ -16,7 +16,6 @@ from saltus.paper.features import (
     detached,
     first_fold,
     main_branch,
-    most_coexisting,
     named_branches,
     stable_motions,
     superharmonic,
@@ -25,6 +24,7 @@ from saltus.paper.features import (
 CONFIRMED = 1e-8  # distance of a stable motion from itself, by direct simulation
 ON_BRANCH = 2e-2  # rad between a simulated attractor and the line drawn between the points of its branch
 EQUAL = 1e-10  # rad between amplitudes that are equal
+SAMPLES = 600  # values at which motions are counted
 APART = 0.1  # rad: motions or amplitudes that plainly differ
 
 
@@ -288,14 +288,10 @@ def coexistence(name: str, data: Any, panels: dict[str, str]) -> Claim:
     """`panels` by name, each with the words for it."""
     rising, parts = [], []
     for panel, words in panels.items():
-        spectrum = data[panel]
-        low, high = (float(b) for b in spectrum.attrs["bounds"])
-        values = low + (high - low) * (np.arange(600) + 0.5) / 600
-        number = np.array([stable_motions(spectrum, value) for value in values])
-        halves = number[:300].mean(), number[300:].mean()
-        most, where = most_coexisting(spectrum)
-        rising.append(halves[1] > halves[0])
-        parts.append(f"{words}: {halves[0]:.2f} and {halves[1]:.2f}, most {most} at Ĥ = {where:.3f}")
+        values, number = _counts(data[panel])
+        lower, upper = (float(half.mean()) for half in np.split(number, 2))
+        rising.append(upper > lower)
+        parts.append(f"{words}: {lower:.2f} and {upper:.2f}, most {number.max()} at Ĥ = {values[number.argmax()]:.3f}")
     return check(
         f"{name}-coexistence",
         "section 6, last bullet on the diagrams",
@@ -304,6 +300,13 @@ def coexistence(name: str, data: Any, panels: dict[str, str]) -> Claim:
         evidence="stable motions beside rest (mirror images counted once), on average in the lower and the upper half of "
         "the range: " + "; ".join(parts),
     )
+
+
+def _counts(spectrum: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Values spread evenly over the range, an even number, and how many stable motions there are at each."""
+    low, high = (float(bound) for bound in spectrum.attrs["bounds"])
+    values = low + (high - low) * (np.arange(SAMPLES) + 0.5) / SAMPLES
+    return values, stable_motions(spectrum, values)
 
 
 def both_diagram(data: Any) -> list[Claim]:
@@ -316,7 +319,8 @@ def both_diagram(data: Any) -> list[Claim]:
     main = main_branch(spectrum)
     uneven = np.abs(main["highest"].values + main["lowest"].values)
     kinds = {kind: count(spectrum, kind) for kind in ("LP", "PD", "GR")}
-    most, where = most_coexisting(spectrum)
+    values, number = _counts(spectrum)
+    most, where = int(number.max()), float(values[number.argmax()])
     return [
         check(
             "fig13-symmetry",
