@@ -10,6 +10,8 @@ from saltus.errors import ParameterError
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
+from saltus.orbits.releases import load_releases
+from saltus.orbits.resting import resting_orbit
 from saltus.orbits.signature import Signature
 from saltus.systems import System
 
@@ -22,7 +24,8 @@ NEEDED = ("parameter", "unknowns")
 def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     """The orbits along `point` of a dataset that `Branch.to_xarray` or `Locus.to_xarray` made, bit for bit, in order.
 
-    Nothing is solved again: the equations are evaluated at the unknowns as they are kept. `continue_orbit` goes on from any.
+    Nothing is solved again: the equations are evaluated at the unknowns as they are kept, and orbits that rest are flown from
+    their first release. `continue_orbit` goes on from any.
 
     Raises:
         ParameterError: a dataset of something else; a model of one's own that is not registered (`saltus.register`).
@@ -33,6 +36,8 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
             f"orbits_of takes the dataset of a branch or of a curve of special points; this one lacks {missing[0]!r}"
         )
     system, tol = System.from_json(dataset.attrs["system"]), float(dataset.attrs["tol"])
+    if "releases" in dataset:
+        return _resting_orbits(dataset, system)
     paths = tuple(map(str, dataset["path"].values)) if "path" in dataset.coords else (str(dataset.attrs["path"]),)
     values = np.atleast_2d(dataset["parameter"].values.T).T
     problems: dict[Signature, Problem] = {}
@@ -66,3 +71,17 @@ def _orbit(problem: Problem, row: np.ndarray, value: np.ndarray) -> PeriodicOrbi
             f"the motion of the orbit at {problem.paths[0]} = {values[0]:g} cannot be followed: the file is damaged"
         )
     return PeriodicOrbit(problem, Solution(unknowns, values, equations, 0))
+
+
+def _resting_orbits(dataset: xarray.Dataset, system: System) -> list[PeriodicOrbit]:
+    """The orbits of a family that rests for a part of its period: the load's release that they begin with says all."""
+    path, columns = str(dataset.attrs["path"]), ("parameter", "periods")
+    orbits: list[PeriodicOrbit] = []
+    for first, value, periods in zip(dataset["releases"].values[:, 0], *(dataset[name].values for name in columns), strict=True):
+        here = system.with_({path: float(value)})
+        nearest = min(load_releases(here), key=lambda release: abs(release.time - first), default=None)
+        orbit = resting_orbit(Problem(here, Signature((), 1), (path,)), nearest, int(periods)) if nearest else None
+        if orbit is None:
+            raise ParameterError(f"no orbit rests at {path} = {value:g}: the file is damaged, or of another version of saltus")
+        orbits.append(orbit)
+    return orbits

@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.orbits import Branch, Search, defects
+from saltus.orbits import Branch, PeriodicOrbit, Search, defects
+from saltus.orbits.resting import RestingOrbit
 from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
 
 KEPT_ROUNDS = 20  # periods for which a stable orbit must stay where it is
+INSTANTS = 64
 
 
 def diagram_tree(
@@ -46,10 +48,24 @@ def confirmed(branch: Branch) -> xarray.Dataset:
     stable = np.flatnonzero(data["stable"].values)
     kept = np.full(len(orbits), np.nan)
     if stable.size:
-        kept[stable] = defects([orbits[i] for i in stable], KEPT_ROUNDS)
-    data["defect"] = ("point", defects(orbits), {"long_name": "distance after one period, by the event-driven flow"})
+        kept[stable] = _distances([orbits[i] for i in stable], KEPT_ROUNDS)
+    data["defect"] = ("point", _distances(orbits, 1), {"long_name": "distance after one period, by the event-driven flow"})
     data["kept"] = ("point", kept, {"long_name": f"distance after {KEPT_ROUNDS} periods, where stable"})
     return data
+
+
+def _distances(orbits: list[PeriodicOrbit], rounds: int) -> np.ndarray:
+    """Of each orbit from itself after so many of its periods, by the event-driven flow."""
+    resting = [orbit for orbit in orbits if isinstance(orbit, RestingOrbit)]
+    return np.array([_moved(orbit, rounds) for orbit in resting]) if resting else defects(orbits, rounds)
+
+
+def _moved(orbit: RestingOrbit, rounds: int) -> float:
+    """The largest distance at 64 instants of a period: at its release alone every orbit that rests is the same."""
+    motion = orbit.motion((rounds + 1) * orbit.periods)
+    times = motion.start + orbit.duration * (np.arange(INSTANTS) + 0.5) / INSTANTS
+    now, later = motion.at(times), motion.at(times + rounds * orbit.duration)
+    return float(np.abs(np.asarray(now) - np.asarray(later)).max())
 
 
 def _attractors(found: Search) -> xarray.Dataset:
