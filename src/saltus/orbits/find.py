@@ -92,28 +92,30 @@ def _after(system: System, state: dict[str, Any], periods: int) -> dict[str, Any
 
 
 def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
-    """Refuse a motion that stays at the contact for good, or has lost its phase there."""
+    """Refuse a motion that stays at the contact for good, or has lost its phase there, or that a margin ends."""
+    if motion.limit is not None:
+        raise MotionError(f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0: no orbit there")
+    if motion.side != 0 and motion.phase_known:
+        return
     start = ", ".join(f"{name}={value!r}" for name, value in state.items())
     farther = "start farther from it, for instance with a larger coordinate or velocity"
     released = bool(load_releases(system))
     if not motion.phase_known and not released:
         raise MotionError(
-            f"the motion from {start} settles on the undeformed state, which is no orbit to follow: its impacts lose nothing and get "
-            f"ever smaller without end; {farther}"
+            f"the motion from {start} settles on the undeformed state, which is no orbit to follow: its impacts lose nothing "
+            f"and get ever smaller without end; {farther}"
         )
     if not motion.phase_known:
         raise MotionError(
-            f"the impacts of the motion from {start} lose nothing and become too small to be followed before the load pulls again, so "
-            "its phase is lost and no orbit can be read from it; start farther from the contact, or give the impacts a loss "
-            "(an e below 1): then it rests until the load pulls, which is an orbit"
+            f"the impacts of the motion from {start} lose nothing and become too small to be followed before the load pulls "
+            "again, so its phase is lost and no orbit can be read from it; give the impacts a loss (an e below 1), so that it "
+            "rests until the load pulls, which is an orbit, or take a higher frequency"
         )
-    if motion.side == 0 and not released:
+    if not released:
         raise MotionError(
-            f"the motion from {start} comes to rest at contact for good, as the load never pulls it off: it settles on the undeformed "
-            f"state, which is no orbit to follow; {farther}"
+            f"the motion from {start} comes to rest at contact for good, as the load never pulls it off: it settles on the "
+            f"undeformed state, which is no orbit to follow; {farther}"
         )
-    if motion.limit is not None:
-        raise MotionError(f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0: no orbit there")
 
 
 def _state_of(system: System, motion: Motion) -> dict[str, Any]:

@@ -159,9 +159,9 @@ class Problem:
     def fly(
         self, spans: np.ndarray, sides: np.ndarray, states: np.ndarray, values: np.ndarray, look: bool = False
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-        """Smooth segments, as `fly_segments` takes them: its ends, columns and looks, and the signs of the gap's rate on the sides.
+        """Smooth segments, as `fly_segments` takes them; None where one of them cannot be followed.
 
-        None where one of them cannot be followed.
+        Returns its ends, columns and looks, and the signs of the gap's rate on the sides.
         """
         parameters = self._values.copy()
         parameters[self._places] = values

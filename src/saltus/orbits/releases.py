@@ -36,8 +36,8 @@ def contact_pull(system: System, side: int) -> Callable[[Any], Any]:
 def load_releases(system: System) -> tuple[Release, ...]:
     """The releases of one forcing period, by their time; none for a load that always presses, always pulls or has no period.
 
-    For load (i) of the metainterface with equal layers those of side +1 are at sin(Omega t) = Hcr / Hhat, Hcr = abs(V / tan(beta0))
-    (`Hcr`), and those of side -1 half a period later.
+    For load (i) of the metainterface with equal layers those of side +1 are at sin(Omega t) = Hcr / Hhat, with
+    Hcr = abs(V / tan(beta0)), and those of side -1 half a period later.
     """
     if system.load.period is None:
         return ()

@@ -34,8 +34,7 @@ class RestingOrbit(PeriodicOrbit):
     """A periodic orbit with rest: from each release an excursion, impacts that die away, and rest up to the next release.
 
     It has all that a `PeriodicOrbit` has. Its impacts are those that the flow resolves before it jumps to rest; there are
-    infinitely many. Its equations are those of the impacts and of the releases, solved by the event-driven flow: `residual` is what the
-    smooth segments between them and the load's own roots leave.
+    infinitely many. `residual` is by how much the smooth segments from impact to impact miss what the event-driven flow found.
     """
 
     excursions: np.ndarray  # (n, 3) of the (half) period: when released, when at rest again, and the side released to
@@ -80,12 +79,12 @@ class RestingOrbit(PeriodicOrbit):
 
     @cached_property
     def pulls(self) -> np.ndarray:
-        """The largest contact acceleration after each release, (n,): 0 where the load only touches it, and the release is lost."""
+        """The largest contact acceleration after each release, (n,): 0 where the load only touches it, and it is lost."""
         phases = self.releases * self.frequency
         return np.array([peak_near(self.system, int(s), phi) for s, phi in zip(self.release_sides, phases, strict=True)])
 
     @property
-    def multipliers(self) -> np.ndarray:  # type: ignore[override]
+    def multipliers(self) -> np.ndarray:
         """0 and 0: motions beside it come to rest before the next release, and are the same from then on."""
         return np.zeros(2, dtype=complex)
 
@@ -129,8 +128,9 @@ class RestingOrbit(PeriodicOrbit):
     def __repr__(self) -> str:
         kind = "symmetric " if self.symmetric else ""
         return (
-            f"RestingOrbit({kind}period {self.periods}, {len(self.releases)} rests of together {100 * self.rest_share:.3g} % of the time, "
-            f"amplitude={self.amplitude:.9g}, {'stable' if self.stable else 'unstable'}, residual={self.residual:.1g})"
+            f"RestingOrbit({kind}period {self.periods}, {len(self.releases)} rests, "
+            f"together {100 * self.rest_share:.3g} % of the time, amplitude={self.amplitude:.9g}, "
+            f"{'stable' if self.stable else 'unstable'}, residual={self.residual:.1g})"
         )
 
 
@@ -151,11 +151,11 @@ def resting_near(base: Problem, motion: Motion, longest: int) -> RestingOrbit | 
 
 
 def resting_orbit(base: Problem, release: Release, longest: int) -> RestingOrbit | None:
-    """The resting orbit of up to `longest` forcing periods that the motion from a release at rest leads to; None if there is none."""
+    """The resting orbit of up to `longest` forcing periods that the motion from a release leads to; None if there is none."""
     system, period = base.system, base.system.load.period
     assert period is not None
     roots = load_releases(system)
-    motion = _released(system, release, longest + 1)
+    motion = _released(system, release, longest + 1, dense=False)
     chain, times = [release], [release.time]
     for event in motion.events.of(EventKind.RELEASE):
         if event.time - release.time < SAME * period:
@@ -172,9 +172,9 @@ def resting_orbit(base: Problem, release: Release, longest: int) -> RestingOrbit
     return None
 
 
-def _released(system: System, release: Release, periods: float) -> Motion:
-    contact = {system.model.coordinates[0]: float(system.model.contact), "velocity": 0.0}
-    return simulate(system, **contact, time=release.time, side=release.side, periods=periods, tol=ORBIT_TOLERANCE)
+def _released(system: System, release: Release, periods: float, dense: bool = True) -> Motion:
+    contact: dict[str, Any] = {system.model.coordinates[0]: float(system.model.contact), "velocity": 0.0}
+    return simulate(system, **contact, time=release.time, side=release.side, periods=periods, tol=ORBIT_TOLERANCE, dense=dense)
 
 
 def _known(roots: tuple[Release, ...], time: float, side: int, system: System) -> Release | None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,7 +60,7 @@ class RestingPoint(Point):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RestingBranch(Branch):
-    """A family of resting orbits; `special` holds its grazings (GR), the zeros of margins and functions, and its ends RL and CH."""
+    """A family of resting orbits; `special` holds grazings (GR), the zeros of margins and functions, and the ends RL and CH."""
 
     def at(self, value: float) -> list[PeriodicOrbit]:
         """The orbit of the family at a value of the parameter, in a list, which is empty outside the family."""
@@ -89,10 +89,10 @@ def orbit_at(orbit: RestingOrbit, path: str, value: float) -> RestingOrbit | Non
     return found if found is not None and _itinerary(found) == _itinerary(orbit) else None
 
 
-def _followed(orbit: RestingOrbit, path: str, value: float) -> RestingOrbit | None:
-    """The orbit that the motion from the first release leads to at a value of a parameter."""
+def _followed(orbit: RestingOrbit, path: str, value: float, index: int = 0) -> RestingOrbit | None:
+    """The orbit that the motion from one of the releases leads to at a value of a parameter, through that release again."""
     system = orbit.system.with_({path: value})
-    phase, side = orbit.releases[0] * orbit.frequency, int(orbit.release_sides[0])
+    phase, side = orbit.releases[index] * orbit.frequency, int(orbit.release_sides[index])
     frequency = system.load.frequency
     assert frequency is not None
 
@@ -115,6 +115,14 @@ def _change(a: RestingOrbit, b: RestingOrbit) -> float:
     turns = [np.concatenate([o.releases, o.rests]) * o.frequency for o in (a, b)]
     turned = np.abs((turns[1] - turns[0] + math.pi) % (2.0 * math.pi) - math.pi).max()
     return max(float(turned), abs(b.highest - a.highest), abs(b.lowest - a.lowest))
+
+
+def _margin(name: str, orbit: PeriodicOrbit) -> float:
+    return orbit.margins[name]
+
+
+def _keeps_sign(test: UserFunction, value: float, orbit: RestingOrbit | None) -> bool:
+    return orbit is not None and test(orbit) * value > 0.0
 
 
 def continue_resting(
@@ -213,13 +221,20 @@ class _Walk:
                     "GR", few, abs(beyond - float(near.system.get(self.path))), (few.clearance, -many.touching.min(), 0.0)
                 )
             ahead, following = beyond, after
-        tests: dict[str, UserFunction] = {name: lambda o, name=name: o.margins[name] for name in orbit.margins}
+        tests: dict[str, UserFunction] = {name: partial(_margin, name) for name in orbit.margins}
         for name, test in (tests | self.functions).items():
             before, after_ = test(orbit), test(following)
             if before * after_ < 0.0:
-                near, beyond = self._bisect(value, orbit, ahead, lambda o: o is not None and test(o) * before > 0.0)  # noqa: B023
+                near, beyond = self._bisect(value, orbit, ahead, partial(_keeps_sign, test, before))
                 self._special(name, near, abs(beyond - float(near.system.get(self.path))), (before, after_, test(near)))
         return ahead, following
+
+    def _note_touch(self, near: RestingOrbit, after: RestingOrbit) -> None:
+        """A grazing between two orbits hardly apart, if a touch is what tells their impacts apart."""
+        few, many = sorted((near, after), key=lambda o: len(o.touching))
+        speed, width = float(many.touching.min()), abs(float(after.system.get(self.path)) - float(near.system.get(self.path)))
+        if few.clearance < FAINT and speed < FAINT:
+            self._special("GR", few, width, (few.clearance, -speed, few.clearance))
 
     def _bisect(
         self, value: float, orbit: RestingOrbit, ahead: float, holds: Callable[[RestingOrbit | None], bool]
@@ -271,7 +286,8 @@ class _Walk:
         self._add(value, last)
         width, rest = abs(beyond - value), float(last.rest_durations.min() * last.frequency)
         try:
-            other = _followed(last, self.path, beyond)
+            ways = (_followed(last, self.path, beyond, i) for i in range(len(last.releases)))
+            other = next((way for way in ways if way is not None), None)
         except SaltusError as error:
             self.reason = f"beyond {value:.10g} there is no such motion: {error}"
             return
@@ -279,12 +295,14 @@ class _Walk:
         if rest < BRIEF:
             self._special("CH", last, width, (rest, 0.0, rest))
             self.reason = (
-                f"at {value:.10g} a rest has no duration left; beyond, the load pulls before the impacts have died away: find_orbit "
-                "finds the orbit there"
+                f"at {value:.10g} a rest has no duration left; beyond, the load pulls before the impacts have died away: "
+                "find_orbit finds the orbit there"
             )
         elif others < BRIEF:
             self._special("CH", last, width, (0.0, others, 0.0))
-            self.reason = f"at {value:.10g} a further rest begins, its impacts dying away before a release: find_orbit finds the orbit beyond"
+            self.reason = (
+                f"at {value:.10g} a further rest begins, as impacts die away before a release: find_orbit finds the orbit beyond"
+            )
         elif other is None or len(other.releases) == len(last.releases):
             self.reason = f"beyond {value:.10g} no orbit with these rests follows from the release at {last.releases[0]:.6g}"
         else:
