@@ -60,7 +60,12 @@ def states_of(system, n=24):
 
 
 def some_paths(system):
-    """One number of the model, one of a channel, the frequency, and one of the impact law."""
+    """One number of the model, one of a channel, the frequency, and one of the impact law; of several coordinates the frequency.
+
+    Each adds as many columns as there are coordinates, and the compile of TwoLayer's takes a minute with three.
+    """
+    if len(system.model.coordinates) > 1:
+        return ("load.frequency",)
     numbers = [path for path in system.parameters if not path.endswith(".order")]
     chosen = [next(p for p in numbers if p.startswith("model.")), next(p for p in numbers if p.endswith(".amplitude"))]
     return tuple(

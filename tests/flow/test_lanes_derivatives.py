@@ -15,13 +15,13 @@ import saltus
 
 CASES = int(os.environ.get("SALTUS_CASES", "3000"))
 PATHS = {
-    "paper": ("model.damping", "load.frequency", "load.horizontal.amplitude", "load.vertical", "impact.e", "model.beta0"),
-    "every_channel": ("model.mass_ratio", "load.frequency", "load.ground_vertical.amplitude", "load.horizontal.phase"),
-    "wall": ("model.wall", "impact.e", "load.frequency", "load.force.mean"),
+    "paper": ("load.frequency", "load.horizontal.amplitude", "impact.e", "model.beta0"),
+    "every_channel": ("model.mass_ratio", "load.horizontal.phase"),
+    "wall": ("model.wall", "impact.e", "load.frequency"),
     "rocking": ("model.alpha", "load.frequency", "impact.e"),
-    "two_layers": ("model.beta0", "load.frequency"),
+    "two_layers": ("load.frequency",),
     "duffing": ("model.cubic", "load.frequency"),
-    "curved": ("model.power", "load.frequency", "impact.e"),
+    "curved": ("model.power", "impact.e"),
     "records": ("load.horizontal.0.scale", "model.damping"),
     "energy_restitution": ("impact.r", "model.mass_ratio"),
 }
