@@ -283,6 +283,18 @@ def test_a_release_lost_on_one_side_and_born_on_it_is_the_same_point():
     assert one.orbits[-1].amplitude == pytest.approx(both.orbits[0].amplitude, abs=1e-9)
 
 
+def test_a_symmetric_orbit_goes_on_where_the_symmetry_ends():
+    """Along a mean load: as far either way, to where the releases of one side are lost, at Hhat - Hcr."""
+    family = family_of("metainterface", "load.horizontal.mean", (-0.2, 0.2))
+    assert [p.kind for p in family.special] == ["RL", "RL"]
+    assert [p.parameter for p in family.special] == pytest.approx([HCR - 0.15, 0.15 - HCR], abs=1e-10)
+    assert not any(orbit.symmetric for orbit in family.orbits)
+    for mean in (0.01, 0.05):
+        (lower,), (upper,) = family.at(-mean), family.at(mean)
+        assert lower.highest == pytest.approx(-upper.lowest, abs=1e-13)
+        assert lower.amplitude != pytest.approx(orbit_of("metainterface").amplitude, abs=1e-4)
+
+
 def test_ground_motion_releases_a_block_from_tan_alpha_on():
     """zeta Omega^2 = tan(alpha) (West's formula)."""
     family = family_of("rocking block", ZETA, (0.05, 0.2))

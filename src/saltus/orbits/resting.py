@@ -21,7 +21,7 @@ from saltus.orbits.orbit import TOUCH, PeriodicOrbit
 from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
 from saltus.orbits.releases import Release, load_releases, peak_near
 from saltus.orbits.signature import Signature
-from saltus.orbits.symmetry import is_symmetric
+from saltus.orbits.symmetry import is_symmetric, keeps_symmetry
 from saltus.systems import System
 
 SAME = 1e-9  # of a forcing period: releases are isolated, and known to rounding
@@ -190,13 +190,14 @@ def _known(roots: tuple[Release, ...], time: float, side: int, system: System) -
 
 
 def _orbit(base: Problem, chain: tuple[Release, ...], periods: int) -> RestingOrbit | None:
-    """The orbit that goes through a cycle of releases, by half of it where it is its own mirror image."""
+    """The orbit that goes through a cycle of releases, by half of it where it is, and stays, its own mirror image."""
     system, period = base.system, base.system.load.period
     assert period is not None
     first = chain[0]
     opposite = replace(first, time=(first.time + 0.5 * period) % period, side=-first.side)
     image = _known(chain, opposite.time, opposite.side, system)
-    symmetric = periods % 2 == 1 and image is not None and is_symmetric(system)
+    mirrored = keeps_symmetry(system, base.paths[0]) if base.paths else is_symmetric(system)
+    symmetric = periods % 2 == 1 and image is not None and mirrored
     span = 0.5 * periods if symmetric else float(periods)
     motion = _released(system, first, span)
     excursions = _excursions(motion, first, first.time + span * period, SAME * period)

@@ -135,7 +135,7 @@ def continue_resting(
 ) -> RestingBranch:
     """The family of a resting orbit along a parameter, both ways, as `continue_orbit` follows others."""
     value = float(orbit.system.get(path))
-    begin = orbit_at(orbit, path, value)
+    begin = _followed(orbit, path, value)
     assert begin is not None, "an orbit is followed to itself"
     walks = []
     for bound in bounds:
