@@ -7,7 +7,9 @@ from saltus.orbits.find import find_orbit
 from saltus.orbits.loci import continue_special
 from saltus.orbits.locus import Locus
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.releases import Release, load_releases
 from saltus.orbits.reload import orbits_of
+from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.search import Search, same_orbit, search_orbits
 from saltus.orbits.signature import Signature
 from saltus.orbits.special import Evidence, SpecialPoint
@@ -20,6 +22,8 @@ __all__ = [
     "Evidence",
     "Locus",
     "PeriodicOrbit",
+    "Release",
+    "RestingOrbit",
     "Search",
     "Signature",
     "SpecialPoint",
@@ -28,6 +32,7 @@ __all__ = [
     "defects",
     "doubling_cascade",
     "find_orbit",
+    "load_releases",
     "orbits_of",
     "same_orbit",
     "search_orbits",
