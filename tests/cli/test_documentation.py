@@ -166,4 +166,5 @@ def test_the_nodes_and_variables_of_a_diagram_are_all_there():
     nodes, variables = rest.split("| variable of a branch |")
     assert "branch_000" in tree
     assert set(first_cells(nodes)) == set(tree.children)
-    assert set(first_cells(variables)) == set(tree["branch_000"].data_vars)
+    resting = {"releases", "rests", "rest_share"}
+    assert set(first_cells(variables)) - resting == set(tree["branch_000"].data_vars)

@@ -1,4 +1,4 @@
-"""Derivatives in lanes: those of the scalar kernel for every kind of load, and the law of their determinant on 10^4 cases.
+"""Derivatives in lanes: those of the scalar kernel for every kind of load, and the law of their determinant on many cases.
 
 det d(end)/d(start) = product over impacts of (v+/v-)^2 . exp(-C [c T_lower / (1+m) + T_upper]) (numerics.md, section 5); for the
 wall the same with its one side, and for a block without damping the product alone. Free volumes of two coordinates shrink by the
@@ -13,25 +13,20 @@ from lane_cases import FAMILIES, Cases, stop_names
 
 import saltus
 
-CASES = int(os.environ.get("SALTUS_CASES", "3000"))
+CASES = int(os.environ.get("SALTUS_CASES", "1500"))
 PATHS = {
     "paper": ("load.frequency", "load.horizontal.amplitude", "impact.e", "model.beta0"),
     "every_channel": ("model.mass_ratio", "load.horizontal.phase"),
     "wall": ("model.wall", "impact.e", "load.frequency"),
     "rocking": ("model.alpha", "load.frequency", "impact.e"),
-    "two_layers": ("load.frequency",),
-    "duffing": ("model.cubic", "load.frequency"),
-    "curved": ("model.power", "impact.e"),
     "records": ("load.horizontal.0.scale", "model.damping"),
-    "energy_restitution": ("impact.r", "model.mass_ratio"),
+    "energy_restitution": ("impact.r",),
 }
 
 
 @pytest.mark.parametrize("family", PATHS)
 def test_derivatives_in_lanes_are_those_of_the_scalar_kernel(family):
     cases = FAMILIES[family](np.random.default_rng([9, *family.encode()]), 60)
-    if family == "two_layers":  # before a layer closes
-        cases = Cases(cases.system, cases.columns, cases.state, cases.velocity, cases.time, {"duration": 0.15})
     ensemble = cases.in_lanes(tol=1e-14, sensitivities=PATHS[family])
     compared, undefined, wrong = 0, 0, []
     for i in range(len(cases)):

@@ -35,6 +35,7 @@ def test_superharmonic_peaks_are_those_below_two_thirds_of_the_highest_one():
     data = branch(x, y, np.ones(600))
     assert features.peaks(data)[:, 0] == pytest.approx([0.3, 0.9, 2.0], abs=0.01)
     assert features.superharmonic(data)[:, 0] == pytest.approx([0.3], abs=0.01)
+    assert features.superharmonic(data, share=0.5).size == 0
 
 
 def test_coexisting_stable_motions_are_counted_through_folds_and_loops():

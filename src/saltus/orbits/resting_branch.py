@@ -281,7 +281,7 @@ class _Walk:
 
     def _end(self, value: float, orbit: RestingOrbit, ahead: float) -> None:
         """Locate the end of the family between an orbit and a value at which it is no more, and say what lies beyond."""
-        last, beyond = self._bisect(value, orbit, ahead, lambda o: o is not None)
+        last, beyond = self._bisect(value, orbit, ahead, lambda o: o is not None and _change(orbit, o) <= MOST_CHANGE)
         value = float(last.system.get(self.path))
         self._add(value, last)
         width, rest = abs(beyond - value), float(last.rest_durations.min() * last.frequency)
@@ -302,6 +302,10 @@ class _Walk:
             self._special("CH", last, width, (0.0, others, 0.0))
             self.reason = (
                 f"at {value:.10g} a further rest begins, as impacts die away before a release: find_orbit finds the orbit beyond"
+            )
+        elif other is not None and _itinerary(other) == _itinerary(last):
+            self.reason = (
+                f"at {value:.10g} the orbit leaps to one that differs by {_change(last, other):.3g}: find_orbit finds it"
             )
         elif other is None or len(other.releases) == len(last.releases):
             self.reason = f"beyond {value:.10g} no orbit with these rests follows from the release at {last.releases[0]:.6g}"

@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.plots.response import pieces
 
-PROMINENT = 0.02  # rad by which a peak rises above the valleys beside it
+PROMINENT = 0.05  # of the highest amplitude, by which a resonance rises above the valleys beside it
 FREE_ENDS = ("closes", "bound")  # of a branch that hangs on no other
 
 
@@ -43,20 +43,21 @@ def detached(spectrum: Any) -> list[tuple[str, Any]]:
     return found
 
 
-def peaks(branch: Any, below: float = np.inf) -> np.ndarray:
-    """(parameter, amplitude) of the amplitude's maxima along a branch, at parameters under `below` and in their order, (n, 2)."""
+def peaks(branch: Any, share: float = PROMINENT) -> np.ndarray:
+    """(parameter, amplitude, rise) of the maxima along a branch that rise by a share of the highest one, (n, 3)."""
     from scipy.signal import find_peaks
 
     x, y = branch["parameter"].values, branch["amplitude"].values
-    at, _ = find_peaks(y, prominence=PROMINENT)
-    rows = np.stack([x[at], y[at]], axis=1)
-    return np.asarray(rows[rows[:, 0] < below][np.argsort(rows[rows[:, 0] < below, 0])])
+    at, facts = find_peaks(y, prominence=share * y.max())
+    rows = np.stack([x[at], y[at], facts["prominences"]], axis=1)
+    return np.asarray(rows[np.argsort(rows[:, 0])])
 
 
-def superharmonic(branch: Any) -> np.ndarray:
-    """The peaks at frequencies below 2/3 of that of the highest one, (n, 2): primary resonance is one to one, these are not."""
-    top = branch["parameter"].values[int(np.argmax(branch["amplitude"].values))]
-    return peaks(branch, below=2 / 3 * float(top))
+def superharmonic(branch: Any, share: float = PROMINENT) -> np.ndarray:
+    """The peaks at frequencies below 2/3 of that of the highest one, (n, 3): primary resonance is one to one, these are not."""
+    top = float(branch["parameter"].values[int(np.argmax(branch["amplitude"].values))])
+    found = peaks(branch, share)
+    return np.asarray(found[found[:, 0] < 2 / 3 * top])
 
 
 def amplitudes_at(branch: Any, value: float, stable: bool | None = None) -> np.ndarray:
@@ -66,7 +67,7 @@ def amplitudes_at(branch: Any, value: float, stable: bool | None = None) -> np.n
         if stable in (None, holds):
             i = np.flatnonzero(_passes(x, value))
             found.append(y[i] + (value - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i]))
-    return np.concatenate(found)
+    return np.concatenate([np.empty(0), *found])
 
 
 def _passes(x: np.ndarray, value: Any) -> np.ndarray:

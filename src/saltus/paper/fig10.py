@@ -7,10 +7,11 @@ from typing import Any
 
 from saltus.paper import spectra
 from saltus.paper.claim import Claim
+from saltus.paper.features import main_branch
 from saltus.paper.fig09 import FREQUENCIES, draw_panel
 from saltus.paper.figure import PaperFigure
 from saltus.paper.statements_spectra import ground_spectra
-from saltus.plots.response import legend
+from saltus.plots.response import draw_zoom, highest, legend
 from saltus.plots.style import DOUBLE_COLUMN, new_figure, styled
 
 AMPLITUDES = {"a": 0.25, "b": 0.5}  # zetahat
@@ -31,8 +32,16 @@ def draw(data: Any) -> Any:
     for ax, (name, tree) in zip(axes, panels.items(), strict=True):
         draw_panel(ax, tree, name, rf"$\widehat{{\zeta}}={AMPLITUDES[name]:g}$", r"\theta_{\rm eq}")
         ax.set_xlabel(r"frequency $\Omega$")
+        zoom(ax, tree)
     legend(figure, list(panels.values()))
     return figure
+
+
+def zoom(ax: Any, tree: Any) -> None:
+    """An inset with what lies between rest and the steady motions of the main branch."""
+    begin, scale = float(main_branch(tree)["parameter"].min()), tree.attrs["scale"]
+    window = (0.96 * begin, 1.26 * begin)
+    draw_zoom(ax, tree, (0.09, 0.56, 0.34, 0.38), (*window, 0.0, 0.6 * highest(tree, *window) / scale), scale=scale)
 
 
 def claims(data: Any) -> list[Claim]:
@@ -45,7 +54,7 @@ FIGURE = PaperFigure(
     title="Fig. 10: response spectra under load (ii)",
     caption=(
         "As Fig. 9, under the horizontal ground motion ζ = ζ̂ sin Ωτ, in units of θ_eq = arccos(cos β₀ − ζ̂) − β₀. Below the "
-        "frequency at which the main branch begins the ground's acceleration is too small for any motion but rest."
+        "frequency at which the main branch begins the ground's acceleration is too small for any motion but rest; insets: what lies between."
     ),
     compute=compute,
     draw=draw,
