@@ -202,8 +202,11 @@ class _Walk:
         except SaltusError:
             return None
 
-    def _special(self, kind: str, orbit: RestingOrbit, width: float, tests: tuple[float, float, float]) -> None:
-        value = float(orbit.system.get(self.path))
+    def _special(
+        self, kind: str, orbit: RestingOrbit, width: float, tests: tuple[float, float, float], value: float | None = None
+    ) -> None:
+        """Keep a special point, at the parameter of its orbit or at a value next to it."""
+        value = float(orbit.system.get(self.path)) if value is None else value
         curve = Curve(orbit.problem, self.span / 3.0, orbit.symmetric)
         tangent = np.append(np.zeros(orbit.solution.unknowns.size), curve.scale)
         point = RestingPoint(curve, orbit.solution, tangent, orbit)
@@ -272,8 +275,7 @@ class _Walk:
 
     def _lost(self, lost: float, orbit: RestingOrbit, tests: tuple[float, float, float]) -> None:
         side = int(orbit.release_sides[int(np.argmin(orbit.pulls))])
-        self._special("RL", orbit, NARROW * abs(lost), tests)
-        self.special[-1] = SpecialPoint("RL", orbit, lost, self.special[-1].evidence, self.special[-1].point)
+        self._special("RL", orbit, NARROW * abs(lost), tests, lost)
         self.reason = (
             f"shrinks to rest at {lost:.10g}: from there on the load no longer pulls the contact open on side {side:+d}, "
             + ("and rest lasts" if len(orbit.releases) <= 2 else "and the rests on both sides of that release are one")
