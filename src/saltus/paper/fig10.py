@@ -54,7 +54,8 @@ FIGURE = PaperFigure(
     title="Fig. 10: response spectra under load (ii)",
     caption=(
         "As Fig. 9, under the horizontal ground motion ζ = ζ̂ sin Ωτ, in units of θ_eq = arccos(cos β₀ − ζ̂) − β₀. Below the "
-        "frequency at which the main branch begins the ground's acceleration is too small for any motion but rest; insets: what lies between."
+        "frequency at which the main branch begins the ground's acceleration is too small for any motion but rest; insets: what "
+        "lies between."
     ),
     compute=compute,
     draw=draw,
