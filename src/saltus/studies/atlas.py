@@ -10,9 +10,8 @@ FOLLOWED = 20.0  # times the range's upper end: how far families of a longer per
 MOST_BRANCHES = 60
 SAME_PLACE = 1e-6  # between a branch's end and the special point of another one that it is
 BRANCHING = ("PD", "BPC")
-VISIBLE = (
-    0.01  # of the largest amplitude: near rest a branch has endless folds and branch points, each smaller than the one before
-)
+VISIBLE = 0.01  # of the largest amplitude: near rest a branch has endless special points, each smaller than the one before
+BESIDE = 1e-3  # step along a parent's branch from the special point at which its family was met
 
 
 @dataclass
@@ -33,20 +32,34 @@ class Atlas:
         return len(self.branches) >= MOST_BRANCHES
 
     def add(self, orbit: PeriodicOrbit) -> None:
-        """Follow an orbit, and what is born on its branch, unless it lies on a known one."""
-        if self.full or self.knows(orbit):
-            return
-        self.branches.append(continue_orbit(orbit, self.path, self._range(orbit.periods), step=self.step))
-        waiting = self.branches[-1:] if self.switch else []
+        """Follow an orbit, what is born on its branch and what this was born from, unless it lies on a known branch."""
+        waiting = [orbit]
+        while waiting:
+            orbit = waiting.pop(0)
+            if not (self.full or self.knows(orbit)):
+                first = continue_orbit(orbit, self.path, self._range(orbit.periods), step=self.step)
+                waiting += self._grow(first) if self.switch else self._keep(first)
+
+    def _keep(self, *branches: Branch) -> list[PeriodicOrbit]:
+        self.branches += branches
+        return []
+
+    def _grow(self, first: Branch) -> list[PeriodicOrbit]:
+        """Keep a branch and all that are born on it; returns orbits of the branches on which they end."""
+        self._keep(first)
+        waiting, parents = [first], []
         while waiting:
             branch = waiting.pop(0)
             for special in filter(self._begins, branch.special):
                 if special.amplitude < VISIBLE * branch.amplitudes.max():
                     self.left += 1
-                    continue
-                born = self._born_at(special)
-                self.branches += born
-                waiting += born
+                elif _is_parent(special, branch):
+                    parents += _beside(special)
+                else:
+                    born = self._born_at(special)
+                    self._keep(*born)
+                    waiting += born
+        return parents
 
     def knows(self, orbit: PeriodicOrbit) -> bool:
         """Whether an orbit, or its mirror image, lies on a branch."""
@@ -98,3 +111,15 @@ def _meet(end: PeriodicOrbit, special: SpecialPoint) -> bool:
     """Whether the orbit at a branch's end is the special point of another one."""
     near = SAME_PLACE * max(1.0, abs(special.parameter))
     return abs(end.solution.values[0] - special.parameter) < near and abs(end.amplitude - special.amplitude) < near
+
+
+def _is_parent(special: SpecialPoint, branch: Branch) -> bool:
+    """Whether a special point at a branch's end is one of the branch from which its orbits are born."""
+    inner = branch.points[len(branch.points) // 2].orbit
+    return special.orbit.periods < inner.periods or (special.orbit.symmetric and not inner.symmetric)
+
+
+def _beside(special: SpecialPoint) -> list[PeriodicOrbit]:
+    """An orbit next to a special point on its own branch: at the point itself test functions vanish."""
+    point = special.point.curve.solve(special.point.place + BESIDE * special.point.tangent, special.point.tangent)
+    return [] if point is None or not point.orbit.admissible else [point.orbit]
