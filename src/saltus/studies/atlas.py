@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from saltus.orbits import Branch, PeriodicOrbit, SpecialPoint, continue_orbit, same_orbit, switch_branch
 
 FOLLOWED = 20.0  # times the range's upper end: how far families of a longer period are followed
-MOST_BRANCHES = 60
+MOST_BRANCHES = 60  # beyond which nothing more is followed that is born on another branch
+NARROW = 0.01  # of the range: on a narrower branch nothing is followed that is born there
 SAME_PLACE = 1e-6  # between a branch's end and the special point of another one that it is
 BRANCHING = ("PD", "BPC")
 VISIBLE = 0.01  # of the largest amplitude: near rest a branch has endless special points, each smaller than the one before
@@ -24,42 +28,47 @@ class Atlas:
     step: float
     switch: bool
     branches: list[Branch] = field(default_factory=list)
-    left: int = 0  # special points whose families are too small to be followed
+    left: int = 0  # special points at which a family is born that is not followed
 
-    @property
-    def full(self) -> bool:
-        """Whether no more branches are followed."""
-        return len(self.branches) >= MOST_BRANCHES
-
-    def add(self, orbit: PeriodicOrbit) -> None:
-        """Follow an orbit, what is born on its branch and what this was born from, unless it lies on a known branch."""
-        waiting = [orbit]
+    def fill(self, orbits: list[PeriodicOrbit], say: Callable[[float], object]) -> None:
+        """Follow all orbits that do not lie on one another's branches, then what is born on the widest branches first."""
+        waiting = list(orbits)
         while waiting:
-            orbit = waiting.pop(0)
-            if not (self.full or self.knows(orbit)):
-                first = continue_orbit(orbit, self.path, self._range(orbit.periods), step=self.step)
-                waiting += self._grow(first) if self.switch else self._keep(first)
+            waiting += self._follow(waiting.pop(0))
+            say(len(self.branches) / (len(self.branches) + len(waiting) + 1) if waiting else 1.0)
+        grown: set[int] = set()
+        while self.switch:
+            widest = max((b for b in self.branches if id(b) not in grown), key=self._width, default=None)
+            if widest is None:
+                return
+            grown.add(id(widest))
+            self._grow(widest)
+            say(1.0)
 
-    def _keep(self, *branches: Branch) -> list[PeriodicOrbit]:
-        self.branches += branches
-        return []
+    def _follow(self, orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
+        """Follow an orbit unless it lies on a known branch; returns orbits of the branches on which its own ends."""
+        if self.knows(orbit):
+            return []
+        branch = continue_orbit(orbit, self.path, self._range(orbit.periods), step=self.step)
+        self.branches.append(branch)
+        specials = filter(self._begins, branch.special) if self.switch else ()
+        return [beside for special in specials if _is_parent(special, branch) for beside in _beside(special)]
 
-    def _grow(self, first: Branch) -> list[PeriodicOrbit]:
-        """Keep a branch and all that are born on it; returns orbits of the branches on which they end."""
-        self._keep(first)
-        waiting, parents = [first], []
-        while waiting:
-            branch = waiting.pop(0)
-            for special in filter(self._begins, branch.special):
-                if special.amplitude < VISIBLE * branch.amplitudes.max():
-                    self.left += 1
-                elif _is_parent(special, branch):
-                    parents += _beside(special)
-                else:
-                    born = self._born_at(special)
-                    self._keep(*born)
-                    waiting += born
-        return parents
+    def _grow(self, branch: Branch) -> None:
+        """Follow all that is born on a branch."""
+        narrow = self._width(branch) < NARROW * (self.bounds[1] - self.bounds[0])
+        for special in filter(self._begins, branch.special):
+            if _is_parent(special, branch) or self._ends_at(special):
+                continue
+            if narrow or special.amplitude < VISIBLE * branch.amplitudes.max() or len(self.branches) >= MOST_BRANCHES:
+                self.left += 1
+            else:
+                self.branches += self._born_at(special)
+
+    def _width(self, branch: Branch) -> float:
+        """The part of the range that a branch covers."""
+        low, high = np.clip([branch.parameters.min(), branch.parameters.max()], *self.bounds)
+        return float(high - low)
 
     def knows(self, orbit: PeriodicOrbit) -> bool:
         """Whether an orbit, or its mirror image, lies on a branch."""
@@ -77,9 +86,7 @@ class Atlas:
         return inside and special.kind in BRANCHING and _periods_born(special) <= self.max_period
 
     def _born_at(self, special: SpecialPoint) -> list[Branch]:
-        """The branches that begin at a special point, unless they are known."""
-        if self.full or self._ends_at(special):
-            return []
+        """The branches that begin at a special point and are not known."""
         born = switch_branch(special, self._range(_periods_born(special)), step=self.step, both=False)
         return [branch for branch in born if not self.knows(branch.points[len(branch.points) // 2].orbit)]
 

@@ -88,8 +88,10 @@ def diagram(
     Returns:
         A DataTree: the search in the attributes and in `search`; `branch_000`, ... (see `orbits/dataset.py`, with `defect` after
         a period and, for stable orbits, `kept` after 20); `attractors`, what simulation settled on; `bands`, empty until chaos is
-        classified. The attribute `complete` is 0 where there were more branches than are followed; `left` counts the special
-        points at which no branch was followed because its orbits are less than a hundredth of the largest one's size.
+        classified. The attribute `left` counts the special points at which a family is born that was not followed: within the
+        bounds the branch covers less than a hundredth of the range, or the orbits have less than a hundredth of its largest
+        amplitude, or there were 60 branches already. An orbit that its multipliers call stable, but that does not stay where
+        it is for 20 periods, is not called so; `unconfirmed` counts these on each branch.
 
     Raises:
         ParameterError: an argument without meaning.
@@ -113,13 +115,12 @@ def diagram(
         progress=lambda share: say(SEARCHED * share, "searching"),
     )
     atlas = Atlas(path, (low, high), max_period, step, switch)
-    for i, orbit in enumerate(sorted(found.orbits, key=lambda o: (o.periods, not o.stable))):
-        atlas.add(orbit)
-        say(SEARCHED + (FOLLOWED - SEARCHED) * (i + 1) / len(found.orbits), f"following, {len(atlas.branches)} branches")
-    say(FOLLOWED, "confirming")
-    tree = diagram_tree(
-        system, atlas.branches, found, (low, high), max_period=max_period, complete=int(not atlas.full), left=atlas.left
+    atlas.fill(
+        sorted(found.orbits, key=lambda o: (o.periods, not o.stable)),
+        lambda share: say(SEARCHED + (FOLLOWED - SEARCHED) * share, f"following, {len(atlas.branches)} branches"),
     )
+    say(FOLLOWED, "confirming")
+    tree = diagram_tree(system, atlas.branches, found, (low, high), max_period=max_period, left=atlas.left)
     say(1.0, "done")
     return tree
 

@@ -13,6 +13,7 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
+KEPT = 1e-8  # the distance within which
 KEPT_ROUNDS = 20  # periods for which a stable orbit must stay where it is
 INSTANTS = 64
 
@@ -49,6 +50,9 @@ def confirmed(branch: Branch) -> xarray.Dataset:
     kept = np.full(len(orbits), np.nan)
     if stable.size:
         kept[stable] = _distances([orbits[i] for i in stable], KEPT_ROUNDS)
+    lost = ~(kept[stable] < KEPT)
+    data["stable"][stable[lost]] = 0
+    data.attrs["unconfirmed"] = int(lost.sum())
     data["defect"] = ("point", _distances(orbits, 1), {"long_name": "distance after one period, by the event-driven flow"})
     data["kept"] = ("point", kept, {"long_name": f"distance after {KEPT_ROUNDS} periods, where stable"})
     return data
