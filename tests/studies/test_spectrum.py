@@ -109,7 +109,7 @@ def test_the_multipliers_obey_the_law_of_the_determinant(branches):
     for branch in branches:
         values = branch["multiplier_real"].values + 1j * branch["multiplier_imag"].values
         law = np.exp(-0.1 * branch["periods"] * 2 * np.pi / branch["parameter"]).values
-        moderate = largest_multiplier(branch) < 1e4
+        moderate = largest_multiplier(branch) < 100.0  # beside a grazing rounding takes digits of the smaller one
         assert moderate.sum() > 0.9 * moderate.size
         assert values.prod(axis=1)[moderate] == pytest.approx(law[moderate], rel=1e-8)
 
