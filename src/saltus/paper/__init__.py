@@ -3,14 +3,35 @@
 `reproduce` makes every figure, table and claim that is not up to date; `FIGURES` holds them by name, in the paper's order.
 """
 
-from saltus.paper import appendix, fig01c, fig02, fig03, fig04, fig05, fig06, fig07, fig08, statements, table1
+from saltus.paper import (
+    appendix,
+    fig01c,
+    fig02,
+    fig03,
+    fig04,
+    fig05,
+    fig06,
+    fig07,
+    fig08,
+    fig09,
+    fig10,
+    fig11,
+    fig12,
+    fig13,
+    statements,
+    table1,
+)
 from saltus.paper.claim import Claim, Verdict
 from saltus.paper.figure import PaperFigure
 from saltus.paper.reproduce import Result, reproduce
 
 FIGURES: dict[str, PaperFigure] = {
     part.FIGURE.name: part.FIGURE
-    for part in (fig01c, fig02, fig03, fig04, fig05, fig06, fig07, fig08, table1, appendix, statements)
+    for part in (
+        *(fig01c, fig02, fig03, fig04, fig05, fig06, fig07, fig08),
+        *(fig09, fig10, fig11, fig12, fig13),
+        *(table1, appendix, statements),
+    )
 }
 
 __all__ = ["FIGURES", "Claim", "PaperFigure", "Result", "Verdict", "reproduce"]

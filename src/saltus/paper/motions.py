@@ -8,10 +8,12 @@ import numpy as np
 
 from saltus.paper.features import detached, main_branch, turning
 from saltus.paper.provenance import dataset
+from saltus.plots.response import pieces, runs
 
 PHASES = 361  # over one forcing period
 BEYOND = 3e-3  # relative distance past a fold at which a motion is let go: nearer to it motions linger where the orbit was
 APART = 1e-5  # relative: a point of a branch may be the fold itself
+TOLD_APART = 1e-6  # rad: less is one motion found from two points
 SETTLE, LAST = 800, 12  # forcing periods until the motion after a jump is looked at, and for how long
 
 
@@ -33,6 +35,7 @@ def knots(spectrum: Any) -> Any:
     """
     branch = main_branch(spectrum)
     rows = [row for i, j, value in _self_crossings(branch) if (row := _knot(branch, i, j, value)) is not None]
+    rows = [pair for pair in rows if np.abs(pair[0][2] - pair[1][2]).max() > TOLD_APART]
     phase = np.linspace(0.0, 2 * np.pi, PHASES)
     theta = np.array([[row[2] for row in pair] for pair in rows]).reshape(-1, 2, PHASES)
     return dataset(
@@ -49,22 +52,30 @@ def knots(spectrum: Any) -> Any:
 
 
 def _self_crossings(branch: Any) -> list[tuple[int, int, float]]:
-    """(i, j, parameter) of the crossings of stable segments i and j of the amplitude curve."""
-    places = np.stack([branch["parameter"].values, branch["amplitude"].values], axis=1)
-    stable = branch["stable"].values.astype(bool)
-    start, step = places[:-1], np.diff(places, axis=0)
+    """(i, j, parameter) where stable parts of the amplitude curve cross, i and j the points of the branch nearest by."""
+    start, step, near = _stable_steps(branch)
     i, j = np.triu_indices(len(step), 2)
-    good = (stable[:-1] & stable[1:])[[i, j]].all(axis=0)
-    i, j = i[good], j[good]
     det = step[i, 0] * step[j, 1] - step[i, 1] * step[j, 0]
     between = start[j] - start[i]
     with np.errstate(divide="ignore", invalid="ignore"):
         u = (between[:, 0] * step[j, 1] - between[:, 1] * step[j, 0]) / det
         w = (between[:, 0] * step[i, 1] - between[:, 1] * step[i, 0]) / det
-    crossed = (u > 0) & (u < 1) & (w > 0) & (w < 1)
-    return [
-        (int(a), int(b), float(start[a, 0] + t * step[a, 0])) for a, b, t in zip(i[crossed], j[crossed], u[crossed], strict=True)
-    ]
+    crossed = (np.minimum(u, w) > 0) & (np.maximum(u, w) < 1)
+    i, j, u = i[crossed], j[crossed], u[crossed]
+    return [(int(near[a]), int(near[b]), float(start[a, 0] + t * step[a, 0])) for a, b, t in zip(i, j, u, strict=True)]
+
+
+def _stable_steps(branch: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The drawn line where it is stable: starts of its steps, their differences (n, 2), and the nearest points of the branch."""
+    places = np.stack([branch["parameter"].values, branch["amplitude"].values], axis=1)
+    starts, steps, near = [np.empty((0, 2))], [np.empty((0, 2))], [np.empty(0, dtype=int)]
+    for (stable, x, y), (_, points, _) in zip(pieces(branch), runs(branch), strict=True):
+        if stable:
+            line, own = np.stack([x, y], axis=1), places[points.start : points.stop]
+            distance = np.linalg.norm((line[:-1, None] - own) / np.ptp(places, axis=0), axis=2)
+            starts, steps = [*starts, line[:-1]], [*steps, np.diff(line, axis=0)]
+            near.append(points.start + distance.argmin(axis=1))
+    return np.concatenate(starts), np.concatenate(steps), np.concatenate(near)
 
 
 def _knot(branch: Any, i: int, j: int, value: float) -> list[tuple[float, float, np.ndarray]] | None:
@@ -85,6 +96,8 @@ def _knot(branch: Any, i: int, j: int, value: float) -> list[tuple[float, float,
         value = float(newton(difference, value, x1=value * (1 + 1e-4), tol=1e-13, rtol=1e-14))
         orbits = both(value)
     except (ArithmeticError, RuntimeError):
+        return None
+    if not all(orbit.stable and orbit.admissible for orbit in orbits):
         return None
     return [(value, orbit.amplitude, over_a_period(orbit)) for orbit in orbits]
 

@@ -72,8 +72,16 @@ def draw_branches(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: fl
 def pieces(branch: Any, quantity: str = "amplitude") -> Iterator[tuple[bool, np.ndarray, np.ndarray]]:
     """A branch as runs (stable, parameter, quantity) that meet at the special points where the stability changes.
 
-    They are cut at every grazing too, where curves have corners; between their points they are monotone cubics of the length
-    along them, so that a line that is smooth looks it.
+    Between their points they are monotone cubics of the length along them, so that a line that is smooth looks it.
+    """
+    for stable, _, run in runs(branch, quantity):
+        yield stable, *_smooth(run)
+
+
+def runs(branch: Any, quantity: str = "amplitude") -> Iterator[tuple[bool, range, np.ndarray]]:
+    """The runs that `pieces` draws: (stable, which points of the branch, the line's own points (n, 2)).
+
+    They are cut where the stability changes and at every grazing, where curves have corners.
     """
     x, y = np.asarray(branch["parameter"].values), np.asarray(branch[quantity].values)
     stable, impacts = np.asarray(branch["stable"].values, dtype=bool), branch["crossings"].values
@@ -83,8 +91,7 @@ def pieces(branch: Any, quantity: str = "amplitude") -> Iterator[tuple[bool, np.
     for first, last in pairwise([0, *cuts, len(x)]):
         points = [(x[k], y[k]) for k in range(first, last)]
         before = turns.get(first, []) or [(x[first - 1], y[first - 1])] * (first > 0)
-        run = np.array([*before, *points, *turns.get(last, [])])
-        yield bool(stable[first]), *_smooth(run)
+        yield bool(stable[first]), range(first, last), np.array([*before, *points, *turns.get(last, [])])
 
 
 def _smooth(run: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

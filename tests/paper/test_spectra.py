@@ -1,0 +1,57 @@
+"""Figs. 9 to 13 from quick searches: their claims hold, their data say what they are, and their pictures are whole."""
+
+import pytest
+import xarray as xr
+from picture_checks import check_provenance, clipped
+from spectrum_cases import branch, diagram, folded, loop
+
+from saltus.files import write_dataset
+from saltus.paper import FIGURES, Verdict
+from saltus.paper.statements_spectra import coexistence
+
+QUICK = {
+    "fig09": {"amplitudes": {"a": 0.2, "b": 0.5}, "values": [0.5, 2.7], "starts": 16, "max_period": 3, "repelling": 0},
+    "fig10": {"amplitudes": {"b": 0.5}, "values": [0.8, 1.9], "starts": 16, "max_period": 2, "repelling": 0, "switch": False},
+    "fig11": {"values": [0.3, 1.2, 2.9], "starts": 16, "max_period": 1, "repelling": 0, "switch": False},
+    "fig12": {"values": [0.3, 2.0], "starts": 16, "max_period": 1, "repelling": 0, "switch": False},
+    "fig13": {"values": [0.3, 1.2], "starts": 16, "max_period": 1, "repelling": 0, "switch": False},
+}
+ERRATA = {"fig11": {24, 30}}
+NEED_A_WHOLE_SEARCH = {"fig11-coexistence", "fig12-coexistence"}  # how many motions there are: not from a quick one
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_the_claims_hold_also_from_disk_and_the_picture_is_whole(name, tmp_path):
+    figure = FIGURES[name]
+    data = figure.compute(**QUICK[name])
+    check_provenance(name, data)
+    claims = figure.claims(data)
+    assert {claim.id for claim in claims if claim.verdict is Verdict.DISAGREES} <= NEED_A_WHOLE_SEARCH
+    assert {claim.erratum for claim in claims if claim.verdict is Verdict.ERRATUM} == ERRATA.get(name, set())
+    assert len({claim.id for claim in claims}) == len(claims)
+    write_dataset(tmp_path / f"{name}.nc", data)
+    with xr.open_datatree(tmp_path / f"{name}.nc", engine="h5netcdf") as tree:
+        stored = tree.load()
+    assert figure.claims(stored) == claims
+    assert clipped(figure.draw(stored)) == []
+
+
+def test_claims_fail_where_the_data_do_not_bear_them():
+    figure = FIGURES["fig10"]
+    data = figure.compute(amplitudes={"b": 0.5}, values=[0.8], starts=8, max_period=1, repelling=0, switch=False)
+    verdicts = {claim.id: claim.verdict for claim in figure.claims(data)}
+    assert verdicts["fig10-loops"] is Verdict.DISAGREES  # period 1 alone: no loop was looked for
+    assert verdicts["fig10-superharmonic"] is Verdict.AGREES
+    data["b/attractors"]["amplitude"] = data["b/attractors"]["amplitude"] + 0.1  # dots beside the branches
+    assert {c.id: c.verdict for c in figure.claims(data)}["fig10-confirmed"] is Verdict.DISAGREES
+
+
+@pytest.mark.parametrize(("others", "verdict"), [((loop(),), Verdict.AGREES), ((), Verdict.DISAGREES)])
+def test_coexistence_is_judged_by_the_motions_beyond_twice_the_critical_load(others, verdict):
+    single = branch([0.0, 3.0], [0.1, 1.0], [1, 1])
+    tree = diagram(single, *others)
+    tree.attrs["critical"] = 0.25
+    assert coexistence("fig99", {"a": tree}, {"a": "here"}).verdict is verdict
+    leaning = diagram(folded())
+    leaning.attrs["critical"] = 0.25
+    assert "1 at 2 Hcr, 2 at" in coexistence("fig99", {"a": leaning}, {"a": "here"}).evidence
