@@ -154,17 +154,22 @@ def _period_of(system: System, state: dict[str, Any], period: int | None, longes
 
 def _polish(base: Problem, state: dict[str, Any], periods: int, passed: int | None) -> PeriodicOrbit:
     """Solve for the orbit near a motion over one of its periods."""
-    orbit = orbit_near(base, state, periods)
+    orbit = orbit_from(base, state, periods)
     if orbit is not None and orbit.admissible:
         return orbit
-    resting = resting_near(base, simulate(base.system, **state, periods=periods, dense=False), periods)
-    if resting is not None:
-        return resting
     when = "from the start" if passed is None else f"after {passed} forcing periods"
     raise MotionError(
         f"Newton's method finds no orbit of period {periods} near the motion {when}; "
         "try another start, another period=..., or let it settle first (settle=...)"
     )
+
+
+def orbit_from(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
+    """The orbit near a motion over `periods` forcing periods from a state at phase 0, one that rests for a part of them too."""
+    orbit = orbit_near(base, state, periods)
+    if orbit is not None and orbit.admissible:
+        return orbit
+    return resting_near(base, simulate(base.system, **state, periods=periods, dense=False), periods) or orbit
 
 
 def orbit_near(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:

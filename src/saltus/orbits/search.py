@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow import simulate_many
-from saltus.orbits.find import check_whole, orbit_near
+from saltus.orbits.find import check_whole, orbit_from
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
@@ -102,7 +102,7 @@ def search_orbits(
     for i, value in enumerate(grid):
         base = Problem(system.with_({path: float(value)}), Signature((), 1), (path,))
         alive = np.isfinite(late[i]).all(axis=(1, 2))
-        moving = alive & (np.abs(late[i] - _contact(system)).max(axis=(1, 2)) > 1e-6)
+        moving = alive & (np.abs(extrema[i] - _contact(system)[0]).max(axis=(1, 2)) > 1e-6)
         at_rest[i] = int((alive & ~moving).sum())
         here, seen, unsettled[i] = _attracting(base, late[i][moving], extrema[i][moving], longest)
         settled += [(float(value), *row) for row in seen]
@@ -213,7 +213,7 @@ def _newton(base: Problem, state: np.ndarray, period: int) -> PeriodicOrbit | No
 
     name = base.system.model.coordinates[0]
     try:
-        orbit = orbit_near(base, {name: float(state[0]), "velocity": float(state[1])}, period)
+        orbit = orbit_from(base, {name: float(state[0]), "velocity": float(state[1])}, period)
     except MotionError:
         return None
     return orbit if orbit is not None and orbit.admissible and orbit.amplitude > 1e-6 else None
