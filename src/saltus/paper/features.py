@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from saltus.plots.response import pieces
+from saltus.plots.response import pieces, runs
 
 PROMINENT = 0.05  # of the highest amplitude, by which a resonance rises above the valleys beside it
 FREE_ENDS = ("closes", "bound")  # of a branch that hangs on no other
@@ -62,12 +63,17 @@ def superharmonic(branch: Any, share: float = PROMINENT) -> np.ndarray:
 
 def amplitudes_at(branch: Any, value: float, stable: bool | None = None) -> np.ndarray:
     """The amplitudes with which the line of a branch passes a value of the parameter, of (un)stable motions only if said so."""
-    found = []
-    for holds, x, y in pieces(branch):
+    return passing(list(pieces(branch)), value, stable)
+
+
+def passing(lines: list[Any], value: float, stable: bool | None = None) -> np.ndarray:
+    """The same of the lines of one or more branches, as `pieces` gives them."""
+    found = [np.empty(0)]
+    for holds, x, y in lines:
         if stable in (None, holds):
             i = np.flatnonzero(_passes(x, value))
             found.append(y[i] + (value - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i]))
-    return np.concatenate([np.empty(0), *found])
+    return np.concatenate(found)
 
 
 def _passes(x: np.ndarray, value: Any) -> np.ndarray:
@@ -111,7 +117,6 @@ def turning(branch: Any) -> np.ndarray:
     if "kind" not in branch:
         return np.empty(0)
     folds = branch["special_parameter"].values[branch["kind"].values == "LP"]
-    x, s = branch["parameter"].values, branch["stable"].values
-    cuts = np.flatnonzero(s[1:] != s[:-1])
-    width = [abs(x[c + 1] - x[c]) + 1e-2 * np.ptp(x) for c in cuts]
-    return np.array([f for f in folds if any(abs(f - x[c]) <= w for c, w in zip(cuts, width, strict=True))])
+    lines = list(runs(branch))
+    meets = [one[-1, 0] for (before, _, one), (after, _, _) in pairwise(lines) if before != after]
+    return np.array([fold for fold in folds if fold in meets])

@@ -14,7 +14,7 @@ from saltus.plots.style import DOUBLE_COLUMN, new_figure, panel_label, styled
 
 AMPLITUDES = {"a": 0.2, "b": 0.5, "c": 1.0, "d": 1.5, "e": 2.0, "f": 3.0}  # Hhat
 FREQUENCIES = (0.1, 3.0)
-ZOOMED = (0.1, 0.34)  # Omega of the superharmonic resonances
+ZOOMED = {"a": (0.1, 0.46), "b": (0.1, 0.34)}  # Omega of the superharmonic resonances
 
 
 def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any:
@@ -32,8 +32,8 @@ def draw(data: Any) -> Any:
     axes = figure.subplots(rows, 2, squeeze=False)
     for ax, (name, tree) in zip(axes.flat, panels.items(), strict=False):
         draw_panel(ax, tree, name, rf"$\widehat{{\mathcal{{H}}}}={AMPLITUDES[name]:g}$", r"\theta_{\rm st}")
-        if AMPLITUDES[name] <= 0.5:
-            zoom(ax, tree)
+        if name in ZOOMED:
+            zoom(ax, tree, ZOOMED[name])
     for ax in axes[-1]:
         ax.set_xlabel(r"frequency $\Omega$")
     legend(figure, list(panels.values()))
@@ -52,11 +52,11 @@ def draw_panel(ax: Any, tree: Any, name: str, title: str, unit: str) -> None:
     draw_response(ax, tree, scale=scale)
 
 
-def zoom(ax: Any, tree: Any) -> None:
+def zoom(ax: Any, tree: Any, window: tuple[float, float]) -> None:
     """An inset with the superharmonic resonances."""
     scale = tree.attrs["scale"]
-    top = highest(tree, *ZOOMED) / scale
-    draw_zoom(ax, tree, (0.40, 0.50, 0.40, 0.46), (*ZOOMED, 0.6 * top, 1.06 * top), scale=scale)
+    top = highest(tree, *window) / scale
+    draw_zoom(ax, tree, (0.40, 0.50, 0.40, 0.46), (*window, 0.45 * top, 1.06 * top), scale=scale)
 
 
 def claims(data: Any) -> list[Claim]:
