@@ -131,10 +131,7 @@ def located(kind: str, test: Test, a: Point, b: Point) -> SpecialPoint | None:
 
     def at(share: float) -> float:
         if share not in known:
-            left, right = max(x for x in known if x < share), min(x for x in known if x > share)
-            weight = (share - left) / (right - left)
-            guess = known[left].place + weight * (known[right].place - known[left].place)
-            point = a.curve.solve(guess, direction)
+            point = a.curve.solve(a.place + share * chord, direction)
             if point is None:
                 raise ArithmeticError
             known[share] = point
