@@ -25,6 +25,7 @@ from saltus.paper.features import (
 from saltus.plots.response import pieces
 
 CONFIRMED = 1e-8  # distance of a stable motion from itself, by direct simulation
+BESIDE = 1e-9  # relative
 ON_BRANCH = 2e-2  # rad between a simulated attractor and the line drawn between the points of its branch
 EQUAL = 1e-10  # rad between amplitudes that are equal
 RESONANCE = 0.9  # Omega of the primary one, about (Fig. 9)
@@ -42,7 +43,8 @@ def confirmed(name: str, where: str, data: Any) -> Claim:
             number += int(stable.sum())
         places, lines = spectrum["attractors"], [line for _, branch in named_branches(spectrum) for line in pieces(branch)]
         for value, amplitude in zip(places["parameter"].values, places["amplitude"].values, strict=True):
-            known = passing(lines, float(value), stable=True)
+            # on both sides: a branch found at this very value may begin, or close, exactly there
+            known = np.concatenate([passing(lines, float(value) * (1 + side), stable=True) for side in (-BESIDE, BESIDE)])
             off, dots = max(off, float(np.abs(known - amplitude).min(initial=np.inf))), dots + 1
     return check(
         f"{name}-confirmed",
