@@ -9,9 +9,10 @@ import numpy as np
 
 from saltus.orbits import Branch, PeriodicOrbit, SpecialPoint, continue_orbit, same_orbit, switch_branch
 
-FOLLOWED = 20.0  # times the range's upper end: how far families of a longer period are followed
-MOST_BRANCHES = 60  # beyond which nothing more is followed that is born on another branch
-NARROW = 0.01  # of the range: on a narrower branch nothing is followed that is born there
+FOLLOWED = 20.0  # times the range's upper end: how far families of a longer period are followed along a frequency,
+BEYOND = 1.3  # and along anything else, where few of them close
+MOST_BRANCHES = 40  # beyond which nothing more is followed that is born on another branch
+NARROW = 0.02  # of the range: on a narrower branch nothing is followed that is born there
 SAME_PLACE = 1e-6  # between a branch's end and the special point of another one that it is
 BRANCHING = ("PD", "BPC")
 VISIBLE = 0.01  # of the largest amplitude: near rest a branch has endless special points, each smaller than the one before
@@ -106,7 +107,8 @@ class Atlas:
     def _range(self, periods: int) -> tuple[float, float]:
         """How far a family is followed: where the range ends, or beyond for those that may be loops."""
         low, high = self.bounds
-        return (low, high) if periods == 1 else (low, FOLLOWED * high if high > 0 else high)
+        reach = FOLLOWED if self.path == "load.frequency" else BEYOND
+        return (low, high) if periods == 1 else (low, max(high, reach * high))
 
 
 def _periods_born(special: SpecialPoint) -> int:

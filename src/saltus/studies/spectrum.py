@@ -89,8 +89,8 @@ def diagram(
         A DataTree: the search in the attributes and in `search`; `branch_000`, ... (see `orbits/dataset.py`, with `defect` after
         a period and, for stable orbits, `kept` after 20); `attractors`, what simulation settled on; `bands`, empty until chaos is
         classified. The attribute `left` counts the special points at which a family is born that was not followed: within the
-        bounds the branch covers less than a hundredth of the range, or the orbits have less than a hundredth of its largest
-        amplitude, or there were 60 branches already. An orbit that its multipliers call stable, but that does not stay where
+        bounds the branch covers less than a fiftieth of the range, or the orbits have less than a hundredth of its largest
+        amplitude, or there were 40 branches already. An orbit that its multipliers call stable, but that does not stay where
         it is for 20 periods, is not called so; `unconfirmed` counts these on each branch.
 
     Raises:
