@@ -5,11 +5,12 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 BENCH_READY := $(VENV)/.ready-bench
 
-.PHONY: help reproduce test lint bench lock clean
+.PHONY: help reproduce test thorough lint bench lock clean
 
 help:
 	@echo "make reproduce   compute and draw the paper into results/"
-	@echo "make test        lint, type-check and run every test"
+	@echo "make test        lint, type-check and run the tests"
+	@echo "make thorough    run the tests that take minutes each: many structures, many random cases, whole figures"
 	@echo "make bench       measure speed against other integrators, side by side"
 	@echo "make lint        ruff and mypy only"
 	@echo "make lock        renew both locks from pyproject.toml"
@@ -19,6 +20,9 @@ reproduce: $(READY)
 
 test: lint
 	$(BIN)/python -m pytest
+
+thorough: $(READY)
+	$(BIN)/python -m pytest -m thorough
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -84,6 +84,7 @@ def test_lanes_end_where_the_scalar_kernel_does(family):
     assert calm >= 0.3 * total
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("family", FAMILIES)
 def test_lanes_agree_with_themselves_at_another_tolerance(family):
     """Other steps, hence other roots and other polynomials: what goes wrong once in 10^5 impacts shows here."""

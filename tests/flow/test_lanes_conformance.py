@@ -105,6 +105,7 @@ def test_lanes_are_the_scalar_kernel(ready):
         np.testing.assert_allclose(state, motion_state(motion), rtol=0, atol=3e-12)
 
 
+@pytest.mark.thorough
 def test_derivatives_in_lanes_are_those_of_the_scalar_kernel(ready):
     system, states, velocity = ready
     paths, compared, periods = some_paths(system), 0, 0.1 if system.model.stops else 1.4
@@ -122,6 +123,7 @@ def test_derivatives_in_lanes_are_those_of_the_scalar_kernel(ready):
     assert list(ensemble.column.values[-len(paths) :]) == list(paths)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("impact", IMPACTS)
 @pytest.mark.parametrize("model", MODELS)
 def test_every_impact_law_runs_in_lanes_where_the_model_takes_it(model, impact):

@@ -14,6 +14,7 @@ from lane_cases import FAMILIES, Cases, stop_names
 import saltus
 
 CASES = int(os.environ.get("SALTUS_CASES", "1500"))
+pytestmark = pytest.mark.thorough  # a tangent of its own for each family
 PATHS = {
     "paper": ("load.frequency", "load.horizontal.amplitude", "impact.e", "model.beta0"),
     "every_channel": ("model.mass_ratio", "load.horizontal.phase"),

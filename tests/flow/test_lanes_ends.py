@@ -62,6 +62,7 @@ ENDLESS = System(
 )
 
 
+@pytest.mark.thorough
 def test_impacts_that_shrink_as_one_over_their_number_end_in_both_kernels():
     """Where the ground moves, T+ = T- takes from two impacts a share of the speed in proportion to the speed."""
     with pytest.raises(MotionError, match="accumulate too slowly"):

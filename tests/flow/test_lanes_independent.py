@@ -102,6 +102,7 @@ def run_with_width(width, folder):
     return np.load(file)
 
 
+@pytest.mark.thorough
 def test_every_width_of_register_gives_the_same_bits(tmp_path):
     """The host's own and one other; all of them with SALTUS_WIDTHS=all, as each compiles the lanes anew."""
     widths = (1, 2, 4, 8) if os.environ.get("SALTUS_WIDTHS") == "all" else (WIDTH, 2 if WIDTH != 2 else 1)

@@ -9,6 +9,7 @@ from saltus.files import write_dataset
 from saltus.paper import FIGURES, Verdict
 from saltus.paper.statements_spectra import coexistence
 
+pytestmark = pytest.mark.thorough  # searches and branches for five figures
 QUICK = {
     "fig09": {"amplitudes": {"a": 0.2, "b": 0.5}, "values": [0.5, 2.7], "starts": 16, "max_period": 3, "repelling": 0},
     "fig10": {"amplitudes": {"b": 0.5}, "values": [0.8, 1.9], "starts": 16, "max_period": 2, "repelling": 0, "switch": False},

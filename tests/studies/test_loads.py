@@ -11,6 +11,8 @@ from saltus.orbits import orbits_of
 from saltus.studies import bifurcation_diagram, response_spectrum
 from saltus.systems import Harmonic, Load, Metainterface, System
 
+pytestmark = pytest.mark.thorough  # structures of their own for each load
+
 
 def loaded(**channels):
     return System(model=Metainterface(beta0=math.radians(80), damping=0.1), load=Load(frequency=1.0, **channels))
