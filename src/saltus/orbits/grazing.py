@@ -51,6 +51,7 @@ def _turns_round(problem: Problem, side: int) -> bool:
 
 
 def inserted(point: Point) -> tuple[Problem, np.ndarray] | str:
+    """The problem and its unknowns with impacts of no speed where the gap touches zero, or why there is none."""
     problem, signature = point.curve.problem, point.curve.problem.signature
     looks = point.solution.equations.looks
     segment = int(np.argmin(looks[:, at.HUMP]))
@@ -67,6 +68,7 @@ def inserted(point: Point) -> tuple[Problem, np.ndarray] | str:
 
 
 def removed(point: Point) -> tuple[Problem, np.ndarray] | str:
+    """The problem and its unknowns without the impacts that have lost their speed, or why there is none."""
     problem, signature = point.curve.problem, point.curve.problem.signature
     n = len(signature.sides)
     phases, speeds = point.solution.unknowns[::2], point.solution.unknowns[1::2]
