@@ -7,6 +7,8 @@ from lane_cases import stop_names
 import saltus
 from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
 
+pytestmark = pytest.mark.thorough  # many structures of their own
+
 STEP = 2e-4
 STATES = np.array([[0.3, 0.1], [-0.5, 0.2], [0.6, -0.1]])
 

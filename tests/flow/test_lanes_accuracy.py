@@ -12,6 +12,8 @@ from flow_references import BETA80, driven
 import saltus
 from saltus.systems import Load, Model, System
 
+pytestmark = pytest.mark.thorough  # many structures of their own
+
 
 @dataclass(frozen=True, kw_only=True)
 class Odd(Model):

@@ -23,6 +23,8 @@ from saltus.systems import (
     WallOscillator,
 )
 
+pytestmark = pytest.mark.thorough  # many structures of their own
+
 WEIGHTS = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # central differences of order 8
 
 

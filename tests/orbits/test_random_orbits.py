@@ -10,6 +10,8 @@ from orbit_cases import FREQUENCY, forced, walled
 
 from saltus import MotionError, ParameterError, Record, System, find_orbit, simulate
 
+pytestmark = pytest.mark.thorough  # many structures of their own
+
 FEW = settings(max_examples=10, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 numbers = {
     "beta0": st.floats(0.5, 2.2),
