@@ -10,6 +10,8 @@ from flow_references import BETA80, SHARED_PATHS, PreciseSystem, driven
 import saltus
 from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscillator
 
+pytestmark = pytest.mark.thorough  # many structures of their own
+
 STEP = mp.mpf(10) ** -7  # of differences of second order, of motions to 22 digits
 PATHS = {
     "H": "load.horizontal.amplitude",
