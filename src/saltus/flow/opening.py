@@ -88,4 +88,5 @@ def _rates(root: Expr, order: int) -> list[Expr]:
 
 
 def reads(root: Expr, *ops: str) -> bool:
+    """Whether an expression contains one of the given operations."""
     return any(node.op in ops for node in ordered([root]))

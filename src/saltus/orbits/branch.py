@@ -33,6 +33,7 @@ class Branch:
     special: tuple[SpecialPoint, ...]
     ends: tuple[str, str]
     origin: str = "start"  # what it was begun from: a start, or the special point of another branch
+    missed: tuple[str, ...] = ()  # special points whose test function changed its sign where no zero was found
 
     @property
     def orbits(self) -> list[PeriodicOrbit]:
@@ -85,7 +86,9 @@ class Branch:
     def __repr__(self) -> str:
         kinds = ", ".join(f"{p.kind} {p.parameter:.6g}" for p in self.special)
         span = f"{self.path} from {self.parameters.min():.6g} to {self.parameters.max():.6g}" if len(self.points) else self.path
-        return f"Branch({span}, {len(self.points)} points, special: {kinds or 'none'}; ends: {self.ends[0]} | {self.ends[1]})"
+        missed = f"; not located: {', '.join(self.missed)}" if self.missed else ""
+        ends = f"ends: {self.ends[0]} | {self.ends[1]}"
+        return f"Branch({span}, {len(self.points)} points, special: {kinds or 'none'}; {ends}{missed})"
 
 
 def continue_orbit(
@@ -136,10 +139,16 @@ def continue_orbit(
             walk.follow(first)
         walks.append(walk)
         if walk.reason == CLOSED:
-            return Branch(path, tuple(walk.points), tuple(walk.special), (CLOSED, CLOSED))
+            return Branch(path, tuple(walk.points), tuple(walk.special), (CLOSED, CLOSED), missed=tuple(walk.missed))
     back, ahead = walks
     points = [point.turned() for point in reversed(back.points[1:])] + ahead.points
-    return Branch(path, tuple(points), (*reversed(back.special), *ahead.special), (back.reason, ahead.reason))
+    return Branch(
+        path,
+        tuple(points),
+        (*reversed(back.special), *ahead.special),
+        (back.reason, ahead.reason),
+        missed=(*back.missed, *ahead.missed),
+    )
 
 
 def follow_from(
@@ -154,7 +163,7 @@ def follow_from(
     """The branch that begins at a special point of another one, in the direction of its tangent."""
     walk = Walk(bounds, functions or {}, step, None, until)
     walk.follow(first, born=True)
-    return Branch(path, tuple(walk.points), tuple(walk.special), (origin, walk.reason), origin)
+    return Branch(path, tuple(walk.points), tuple(walk.special), (origin, walk.reason), origin, tuple(walk.missed))
 
 
 def check_bounds(bounds: Any) -> tuple[float, float]:

@@ -37,6 +37,7 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
         "ends": list(branch.ends),
         "origin": branch.origin,
         "closed": int(branch.closed),
+        "missed": "; ".join(branch.missed),
         "system": system.to_json(),
         "saltus": saltus.__version__,
         "tol": orbits[0].problem.tol,

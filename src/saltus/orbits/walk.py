@@ -44,6 +44,7 @@ class Walk:
     until: str | None = None  # the kind of special point at which to stop
     points: list[Point] = field(default_factory=list)
     special: list[SpecialPoint] = field(default_factory=list)
+    missed: list[str] = field(default_factory=list)  # test functions that changed their sign where no zero was found
     reason: str = ""
 
     def follow(self, first: Point, born: bool = False) -> None:
@@ -161,9 +162,13 @@ class Walk:
 
     def _note(self, a: Point, b: Point) -> None:
         """Locate the special points of a step, in order."""
-        found = [
-            special for kind, test in tests_between(a, b, self.functions) if (special := located(kind, test, a, b)) is not None
-        ]
+        found = []
+        for kind, test in tests_between(a, b, self.functions):
+            special = located(kind, test, a, b)
+            if special is not None:
+                found.append(special)
+            else:
+                self.missed.append(f"{kind} between {a.parameter:.9g} and {b.parameter:.9g}")
         folds = [s.parameter for s in found if s.kind == "LP"]
         found = [
             s

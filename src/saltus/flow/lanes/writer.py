@@ -96,14 +96,17 @@ MIRRORED = str.maketrans("<>", "><")
 
 
 def add(a: Any, b: Any) -> Any:
+    """a + b, where None is zero."""
     return b if a is None else a if b is None else a + b
 
 
 def subtract(a: Any, b: Any) -> Any:
+    """a - b, where None is zero."""
     return a if b is None else -b if a is None else a - b
 
 
 def multiply(a: Any, b: Any) -> Any:
+    """a b, where None is zero and a factor of one costs nothing."""
     if a is None or b is None:
         return None
     for x, y in ((a, b), (b, a)):
