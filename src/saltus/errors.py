@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import Any
 
 
 class SaltusError(Exception):
@@ -20,6 +21,17 @@ class TraceError(SaltusError, TypeError):
 
 class MotionError(SaltusError, RuntimeError):
     """A motion cannot be continued: it is not unique, an impact has no solution, or the numbers overflow."""
+
+
+class SweepError(SaltusError, RuntimeError):
+    """A sweep that cannot go on, or that ended without some of its chunks; what was computed is kept.
+
+    `failures` are the chunks that failed (`saltus.sweep.Failure`); `dataset` is what there is where no store keeps it, else None.
+    """
+
+    def __init__(self, message: str, failures: Iterable[Any] = (), dataset: Any = None) -> None:
+        super().__init__(message)
+        self.failures, self.dataset = tuple(failures), dataset
 
 
 def near(name: str, known: Iterable[str]) -> str:

@@ -1,0 +1,103 @@
+"""One chunk: the function that computes it, what goes wrong in it, and what is asked of its result."""
+
+from __future__ import annotations
+
+import importlib
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.errors import ParameterError, near
+from saltus.sweep.layout import Index
+
+if TYPE_CHECKING:
+    from saltus.sweep.plan import Plan
+
+Arrays = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A chunk that failed: which, where in the grid, why, and how often it was tried."""
+
+    index: Index
+    place: str
+    error: str
+    attempts: int
+
+    def __str__(self) -> str:
+        return f"chunk {'/'.join(map(str, self.index))} ({self.place}): {self.error}"
+
+
+@dataclass(frozen=True)
+class Raised:
+    """What a function raised, as text: not every error can travel between processes."""
+
+    error: str
+    traceback: str = ""
+
+
+def resolve(function: str) -> Callable[[dict[str, Any], dict[str, np.ndarray]], Mapping[str, Any]]:
+    """The function that `function`, "package.module:name", names.
+
+    Raises:
+        ParameterError: it is not of this form, there is no such module or name, or it is not a function.
+    """
+    module, colon, name = function.partition(":") if isinstance(function, str) else ("", "", "")
+    if not (module and colon and name):
+        raise ParameterError(f"function must be 'package.module:name', got {function!r}")
+    if module == "__main__":
+        raise ParameterError(f"function {function!r} is in a script; other processes need it in a module that they can import")
+    try:
+        found = importlib.import_module(module)
+    except ImportError as error:
+        raise ParameterError(f"function {function!r}: the module {module!r} cannot be imported ({error})") from error
+    if not hasattr(found, name):
+        raise ParameterError(f"function {function!r}: {module!r} has no {name!r}; {near(name, vars(found))}")
+    if not callable(getattr(found, name)):
+        raise ParameterError(f"function {function!r} is of type {type(getattr(found, name)).__name__}, not a function")
+    return getattr(found, name)
+
+
+def attempt(function: str, arguments: dict[str, Any], block: dict[str, np.ndarray]) -> Any:
+    """What the function makes of a chunk, or what it raised. Runs in whichever process computes."""
+    try:
+        return resolve(function)(arguments, block)
+    except Exception as error:
+        lines = traceback.format_exception_only(error)
+        return Raised(lines[-1].strip(), traceback.format_exc())
+
+
+def checked(plan: Plan, index: Index, result: Any) -> Arrays:
+    """The arrays that a function returned for a chunk, of the types of the plan's variables; NaN is a value as any other.
+
+    Raises:
+        ParameterError: no mapping, a variable missing or too many, a wrong shape, or values that the variable's type cannot hold.
+    """
+    where = f"{plan.function} returned for chunk {'/'.join(map(str, index))} ({plan.place(index)})"
+    if not isinstance(result, Mapping):
+        raise ParameterError(f"{where} a {type(result).__name__}; a dict of arrays is expected")
+    for name in plan.variables:
+        if name not in result:
+            raise ParameterError(f"{where} no {name!r}; {near(name, map(str, result))}")
+    for name in result:
+        if name not in plan.variables:
+            raise ParameterError(f"{where} {name!r}, which is no variable of the plan; {near(str(name), plan.variables)}")
+    return {name: _array(plan, index, name, result[name], where) for name in plan.variables}
+
+
+def _array(plan: Plan, index: Index, name: str, values: Any, where: str) -> np.ndarray:
+    array, expected = np.asarray(values), plan.shape(name, index)
+    if array.shape != expected:
+        axes = ", ".join(plan.dimensions(name))
+        raise ParameterError(f"{where} {name!r} of shape {array.shape}; expected is {expected}, along {axes}")
+    dtype = np.dtype(plan.variables[name].dtype)
+    if not np.can_cast(array.dtype, dtype, "same_kind"):
+        raise ParameterError(f"{where} {name!r} of type {array.dtype}; the plan says {dtype}, which does not hold it")
+    cast = array.astype(dtype)
+    if dtype.kind in "iu" and not np.array_equal(cast, array):
+        raise ParameterError(f"{where} {name!r} with values from {array.min()} to {array.max()}, too large for {dtype}")
+    return cast

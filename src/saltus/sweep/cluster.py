@@ -1,0 +1,80 @@
+"""Chunks computed by the workers of a Dask cluster.
+
+Results travel to this process, which writes them: the machines need no disk in common, and only one process ever writes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import deque
+from collections.abc import Iterator
+from typing import Any
+
+from saltus.errors import SweepError
+from saltus.sweep.chunk import Raised, attempt
+from saltus.sweep.layout import Index
+from saltus.sweep.plan import Plan
+
+PATIENCE = 5.0  # s, for the scheduler to answer, and for it to have a worker
+AHEAD = 2  # chunks for each of the cluster's threads: one in work, one waiting; more would only fill memory
+
+
+def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[Index, Any]]:
+    """Compute the chunks in the queue on the cluster at `address`, and give what became of each as it comes.
+
+    A chunk whose worker dies is given to another by the scheduler. The workers need saltus and the plan's function, in the same
+    versions as here.
+
+    Raises:
+        SweepError: `distributed` is not installed, the scheduler does not answer or goes away, or it has no workers.
+    """
+    client = _connect(address)
+    try:
+        from distributed import as_completed
+
+        done = as_completed(with_results=True, raise_errors=False)
+        flying: dict[str, Index] = {}
+        while queue or flying:
+            while queue and len(flying) < max(AHEAD, AHEAD * sum(client.nthreads().values())):
+                index = queue.popleft()
+                # Not pure: Dask would keep what a failed chunk raised, and not try it again.
+                future = client.submit(attempt, plan.function, dict(plan.arguments), plan.block(index), pure=False)
+                flying[future.key] = index
+                done.add(future)
+            future, result = next(done)
+            if future.status in ("cancelled", "lost"):
+                raise SweepError(f"the Dask scheduler at {address} has gone away; run the same again to go on")
+            yield flying.pop(future.key), Raised(_said(result)) if future.status == "error" else result
+            del future, result  # so that the cluster forgets them
+    finally:
+        with contextlib.suppress(Exception):
+            client.close(timeout=1)
+
+
+def _connect(address: str) -> Any:
+    try:
+        from distributed import Client
+    except ImportError:
+        raise SweepError('a Dask cluster needs the package distributed: pip install "saltus[cluster]"') from None
+    try:
+        client = Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise SweepError(
+            f"no Dask scheduler answers at {address} ({_first_line(error)}); is it running, and reachable?"
+        ) from error
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except TimeoutError:
+        client.close(timeout=1)
+        raise SweepError(f"the Dask scheduler at {address} has no workers; start some with `dask worker {address}`") from None
+    return client
+
+
+def _said(result: Any) -> str:
+    """What went wrong on the cluster itself, such as a chunk whose workers died again and again."""
+    error = result[1] if isinstance(result, tuple) else result
+    return f"{type(error).__name__}: {_first_line(error)}"
+
+
+def _first_line(error: Any) -> str:
+    return next(iter(str(error).splitlines()), type(error).__name__)

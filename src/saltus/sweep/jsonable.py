@@ -1,0 +1,72 @@
+"""What is kept as JSON: checked before it is, and compared when it is read."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from saltus.errors import ParameterError
+
+LONGEST = 60  # characters of a value quoted in a sentence
+
+
+def plain(value: Any, place: str) -> Any:
+    """`value` as JSON gives it back: mappings to dicts, tuples to lists, numbers that are subclasses to plain ones.
+
+    Raises:
+        ParameterError: something that JSON does not have; `place` and the keys below it say where.
+    """
+    if value is None or isinstance(value, bool | str):
+        return value
+    if isinstance(value, int):
+        return int(value)
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ParameterError(f"{place} is {value!r}, which JSON does not have; write None or a word for it")
+        return float(value)
+    if isinstance(value, list | tuple):
+        return [plain(item, f"{place}[{i}]") for i, item in enumerate(value)]
+    if not isinstance(value, Mapping):
+        kind = type(value).__name__
+        raise ParameterError(f"{place} is of type {kind}, which JSON does not have; numbers, texts, lists and dicts can be kept")
+    for key in value:
+        if not isinstance(key, str):
+            raise ParameterError(f"{place} has the key {key!r}; keys are texts in JSON")
+    return {key: plain(item, f"{place}[{key!r}]") for key, item in value.items()}
+
+
+def text(value: Any) -> str:
+    """`value` as one line of JSON, the same for the same value."""
+    return json.dumps(value, sort_keys=True, allow_nan=False)
+
+
+def differences(there: Any, here: Any, place: str = "") -> Iterator[str]:
+    """What differs between two JSON values, entry by entry; texts that are JSON themselves are looked into."""
+    there, here = _parsed(there), _parsed(here)
+    if isinstance(there, dict) and isinstance(here, dict):
+        for key in dict.fromkeys([*there, *here]):
+            below = f"{place}.{key}" if place else key
+            if key not in here:
+                yield f"{below} is {_short(there[key])} there and not given here"
+            elif key not in there:
+                yield f"{below} is {_short(here[key])} here and not given there"
+            else:
+                yield from differences(there[key], here[key], below)
+    elif there != here or isinstance(there, bool) != isinstance(here, bool):
+        yield f"{place} is {_short(there)} there and {_short(here)} here"
+
+
+def _parsed(value: Any) -> Any:
+    if isinstance(value, str) and value.startswith("{"):
+        try:
+            return json.loads(value)
+        except ValueError:
+            return value
+    return value
+
+
+def _short(value: Any) -> str:
+    said = repr(value)
+    return said if len(said) <= LONGEST else said[: LONGEST - 3] + "..."

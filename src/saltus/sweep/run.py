@@ -1,0 +1,173 @@
+"""Running a plan: what is missing is computed, somewhere, and written here."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from saltus.errors import ParameterError, SweepError
+from saltus.sweep.chunk import Failure, Raised, attempt, checked
+from saltus.sweep.layout import Index
+from saltus.sweep.plan import Plan
+from saltus.sweep.store import Store, opened
+
+if TYPE_CHECKING:
+    import xarray
+
+Progress = Callable[[int, int, float | None], object]
+Outcomes = Iterator[tuple[Index, Any]]
+
+log = logging.getLogger("saltus.sweep")
+
+
+class SweepInterrupted(KeyboardInterrupt):
+    """Ctrl-C during a sweep; the message says what is kept and how to go on."""
+
+
+def run(
+    plan: Plan,
+    store: Path | str | None = None,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    retries: int = 1,
+) -> xarray.Dataset:
+    """Compute what is missing of a sweep.
+
+    A chunk whose function raises is reported through `logging` and tried again after the others. Results are written by this
+    process alone, wherever they are computed: a cluster's machines need not share its disk.
+
+    Args:
+        plan: what is computed.
+        store: a folder for a Zarr v3 store; it is made, or gone on with if it is of the same plan. None keeps all in memory.
+        workers: how many processes compute chunks at once; None computes one chunk after the other in this one, which is right
+            for functions that use all cores themselves. Scripts need `if __name__ == "__main__":` around a run with workers.
+        scheduler: the address of a Dask scheduler, such as "tcp://host:8786", whose workers compute the chunks.
+        progress: called as `progress(done, total, seconds_left)` before the first chunk and after each; None: not known yet.
+        retries: how often a failed chunk is tried again.
+
+    Returns:
+        The complete dataset, with the plan's variables, coordinates and attributes: in memory, or read from the store when it
+        is needed.
+
+    Raises:
+        ParameterError: bad arguments, the store of another plan, or a function that returns something else than planned.
+        SweepError: chunks failed for good, the store cannot be written, another run writes to it, or the cluster does not answer.
+        SweepInterrupted: Ctrl-C. In all these cases the chunks written before are kept.
+    """
+    path = _check(plan, store, workers, scheduler, progress, retries)
+    with opened(plan, path) as sheets:
+        sweep = _Sweep(plan, sheets, progress, retries)
+        try:
+            sweep.fill(workers, scheduler)
+        except KeyboardInterrupt:
+            kept = "nothing is kept without a store" if path is None else f"{path} keeps them: run the same again to go on"
+            raise SweepInterrupted(f"interrupted after {sweep.done} of {sweep.total} chunks; {kept}") from None
+        sweep.conclude()
+        return sheets.dataset()
+
+
+class _Sweep:
+    """One run: the queue of missing chunks, the failures, the clock."""
+
+    def __init__(self, plan: Plan, sheets: Store, progress: Progress | None, retries: int) -> None:
+        self.plan, self.sheets, self.progress, self.retries = plan, sheets, progress, retries
+        self.queue = deque(sheets.missing())
+        self.total = plan.layout.total
+        self.done = self.before = self.total - len(self.queue)
+        self.failures: dict[Index, Failure] = {}
+
+    def fill(self, workers: int | None, scheduler: str | None) -> None:
+        """Compute and write until nothing is left that may be tried."""
+        self.start = time.monotonic()
+        self._tell()
+        if not self.queue:
+            return
+        with closing(_outcomes(self.plan, self.queue, workers, scheduler)) as outcomes:
+            for index, outcome in outcomes:
+                if isinstance(outcome, Raised):
+                    self._fail(index, outcome)
+                    continue
+                self.sheets.write(index, checked(self.plan, index, outcome))
+                self.done += 1
+                if self.failures.pop(index, None):
+                    self.sheets.note(self.failures.values())
+                self._tell()
+
+    def conclude(self) -> None:
+        """Raise if chunks are missing."""
+        self.sheets.note(self.failures.values())
+        if not self.failures:
+            return
+        first, *others = sorted(self.failures.values(), key=lambda failure: failure.index)
+        more = f", and {len(others)} more" if others else ""
+        keeps = "the chunks that are done" if self.sheets.path is None else f"{self.sheets.path} keeps the others"
+        go_on = (
+            "are in the error's `dataset`" if self.sheets.path is None else "and the same run again computes only what is missing"
+        )
+        dataset = self.sheets.dataset() if self.sheets.path is None else None
+        raise SweepError(
+            f"{len(self.failures)} of {self.total} chunks failed: {first}{more}; {keeps} {go_on}", (first, *others), dataset
+        )
+
+    def _fail(self, index: Index, raised: Raised) -> None:
+        attempts = self.failures[index].attempts + 1 if index in self.failures else 1
+        failure = self.failures[index] = Failure(index, self.plan.place(index), raised.error, attempts)
+        again = attempts <= self.retries
+        log.warning("%s; %s", failure, "it is tried again" if again else f"given up after {attempts} attempts")
+        log.debug("%s", raised.traceback)
+        if again:
+            self.queue.append(index)
+        self.sheets.note(self.failures.values())
+
+    def _tell(self) -> None:
+        if self.progress is None:
+            return
+        computed, elapsed = self.done - self.before, time.monotonic() - self.start
+        left = elapsed / computed * (self.total - self.done) if computed else None
+        self.progress(self.done, self.total, 0.0 if self.done == self.total else left)
+
+
+def _outcomes(plan: Plan, queue: deque[Index], workers: int | None, scheduler: str | None) -> Any:
+    """Take chunks from the queue until it is empty, and give what became of each, in any order."""
+    if scheduler is not None:
+        from saltus.sweep.cluster import on_cluster
+
+        return on_cluster(plan, queue, scheduler)
+    if workers is not None:
+        from saltus.sweep.workers import in_processes
+
+        return in_processes(plan, queue, workers)
+    return _here(plan, queue)
+
+
+def _here(plan: Plan, queue: deque[Index]) -> Outcomes:
+    while queue:
+        index = queue.popleft()
+        yield index, attempt(plan.function, dict(plan.arguments), plan.block(index))
+
+
+def _check(plan: Any, store: Any, workers: Any, scheduler: Any, progress: Any, retries: Any) -> Path | None:
+    """The store's path, if the arguments have a meaning."""
+    if not isinstance(plan, Plan):
+        raise ParameterError(f"plan must be a Plan, got {plan!r:.80}")
+    for name, value, least in (("workers", workers, 1), ("retries", retries, 0)):
+        if not (name == "workers" and value is None) and (isinstance(value, bool) or not isinstance(value, int) or value < least):
+            raise ParameterError(f"{name} must be a whole number of at least {least}, got {value!r}")
+    if scheduler is not None and (not isinstance(scheduler, str) or "://" not in scheduler):
+        raise ParameterError(f"scheduler must be an address such as 'tcp://host:8786', got {scheduler!r}")
+    if scheduler is not None and workers is not None:
+        raise ParameterError("workers and scheduler are given both; a cluster has workers of its own")
+    if not (progress is None or callable(progress)):
+        raise ParameterError(f"progress must be a function of the chunks done, of all and of the seconds left, got {progress!r}")
+    if store is not None and not isinstance(store, str | Path):
+        raise ParameterError(f"store must be the path of a folder, or None, got {store!r:.80}")
+    if isinstance(store, str) and "://" in store:
+        raise ParameterError(f"store must be a folder on this machine, got the address {store!r}")
+    return None if store is None else Path(store)

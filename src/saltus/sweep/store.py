@@ -1,0 +1,183 @@
+"""The Zarr store of a sweep: made in one step, written chunk by chunk, readable by any reader of Zarr v3 at any time."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import shutil
+import warnings
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.errors import ParameterError, SweepError
+from saltus.sweep import files
+from saltus.sweep.chunk import Arrays, Failure
+from saltus.sweep.jsonable import differences, text
+from saltus.sweep.layout import Index
+from saltus.sweep.plan import Plan
+from saltus.sweep.status import read_plan, status
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class Store:
+    """The arrays of a plan, in a folder or, where `path` is None, in memory.
+
+    A chunk is done when the file of every variable is there. A file is written once and whole, so that it is there or not,
+    and its bytes are those of the computed numbers alone: a store does not show who wrote it, when, or in what order.
+    """
+
+    def __init__(self, plan: Plan, path: Path | None) -> None:
+        import zarr
+
+        self.plan, self.path = plan, path
+        self.zarr: Any = zarr.storage.MemoryStore() if path is None else files.zarr_store(path)
+        if path is None:
+            _make(plan, self.zarr)
+        # Otherwise a chunk of nothing but fill values has no file, and would never be done.
+        with zarr.config.set({"array.write_empty_chunks": True}):
+            group: Any = zarr.open_group(self.zarr, mode="r+")
+            self.arrays = {name: group[name] for name in plan.variables}
+
+    def missing(self) -> list[Index]:
+        """The chunks that are not done."""
+        return [i for i in self.plan.layout.indices() if not all(self._has(name, i) for name in self.plan.variables)]
+
+    def write(self, index: Index, values: Arrays) -> None:
+        """Keep a chunk: the files that are not there yet, if an earlier run was killed among them.
+
+        Raises:
+            SweepError: the store cannot be written to.
+        """
+        cut = self.plan.layout.slices(index)
+        try:
+            for name, array in self.arrays.items():
+                if not self._has(name, index):
+                    array[cut] = values[name]
+        except OSError as error:
+            raise SweepError(
+                f"chunk {'/'.join(map(str, index))} cannot be written to {self.path} ({reason(error)}); the chunks before it "
+                "are kept whole: when that is put right, run the same again and it goes on from there"
+            ) from error
+
+    def note(self, failures: Iterable[Failure]) -> None:
+        """Keep a list of the chunks that failed beside the arrays, for `status`; without any, the file is gone."""
+        if self.path is None:
+            return
+        entries = [{"index": f.index, "place": f.place, "error": f.error, "attempts": f.attempts} for f in failures]
+        file = self.path / files.FAILURES
+        with contextlib.suppress(OSError):  # a full disk is told where a chunk is written
+            if entries:
+                files.write_whole(file, json.dumps(entries).encode())
+            else:
+                file.unlink(missing_ok=True)
+
+    def dataset(self) -> xarray.Dataset:
+        """What there is: in memory, or read from the folder as it is needed."""
+        dataset = _dataset(self.zarr)
+        return dataset.load() if self.path is None else dataset
+
+    def _has(self, name: str, index: Index) -> bool:
+        extra = len(self.plan.variables[name].extra)
+        return self.path is not None and files.chunk_file(self.path, name, index, extra).exists()
+
+
+@contextlib.contextmanager
+def opened(plan: Plan, path: Path | None) -> Iterator[Store]:
+    """The store of `plan` at `path`, made if it is not there, and locked; or one in memory.
+
+    Raises:
+        ParameterError: there is something else at `path`, or the store of another plan.
+        SweepError: it cannot be made, or another run is writing to it.
+    """
+    if path is None:
+        yield Store(plan, None)
+        return
+    if not (path / files.METADATA).is_file():
+        _create(plan, path)
+    there = read_plan(path)
+    differ = list(differences(there, plan.describe()))
+    if differ:
+        more = f"; and {len(differ) - 3} more" if len(differ) > 3 else ""
+        raise ParameterError(f"{path} is the store of another plan: {'; '.join(differ[:3])}{more}; name another store")
+    with files.locked(path) as got:
+        if got is False:
+            raise SweepError(f"another run is writing to {path}; wait for it, or stop it, and run again")
+        if got:
+            files.sweep_up(path)
+        yield Store(plan, path)
+
+
+def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
+    """The dataset of a sweep's store, read as it is needed; `load()` reads it all.
+
+    Args:
+        path: the store.
+        partial: whether it may be incomplete; where nothing is computed yet stands each variable's fill value, NaN for reals.
+
+    Raises:
+        ParameterError: no store of a sweep.
+        SweepError: it is incomplete.
+    """
+    found = status(path)
+    if not (found.complete or partial):
+        raise SweepError(
+            f"{path} has {found.done} of {found.total} chunks; run the sweep again to complete it, or give partial=True"
+        )
+    return _dataset(files.zarr_store(Path(path)))
+
+
+def reason(error: OSError) -> str:
+    """What the system says, as part of a sentence."""
+    return (error.strerror or str(error)).lower()
+
+
+def _dataset(store: Any) -> xarray.Dataset:
+    import xarray
+
+    # Nothing is decoded: a variable in seconds is no time difference, and a fill value is a value.
+    return xarray.open_zarr(store, chunks=None, consolidated=True, zarr_format=3, decode_cf=False)
+
+
+def _create(plan: Plan, path: Path) -> None:
+    """Make the store of `plan`, without any chunk, at `path`, in one step."""
+    if path.is_file() or (path.is_dir() and any(path.iterdir())):
+        kind = "a file" if path.is_file() else "a folder with something else in it"
+        raise ParameterError(f"{path} is {kind}; name a store that does not exist yet, or one of this plan")
+    try:
+        part = files.begin(path)
+        try:
+            _make(plan, files.zarr_store(part))
+        except BaseException:
+            shutil.rmtree(part, ignore_errors=True)
+            raise
+        files.finish(part, path)
+    except OSError as error:
+        raise SweepError(f"the store {path} cannot be made ({reason(error)}); name another") from error
+
+
+def _make(plan: Plan, store: Any) -> None:
+    """Write the metadata and the coordinates; nothing of it is ever written again."""
+    import zarr
+
+    group = zarr.create_group(store, zarr_format=3, attributes={**plan.attrs, "plan": text(plan.describe())})
+    for name, values in plan.axes.items():
+        coordinate = group.create_array(name, shape=values.shape, chunks=values.shape, dtype=values.dtype, dimension_names=[name])
+        coordinate[:] = values
+    for name, variable in plan.variables.items():
+        group.create_array(
+            name,
+            shape=plan.shape(name),
+            chunks=(*plan.layout.chunk.values(), *(size for _, size in variable.extra)),
+            dtype=np.dtype(variable.dtype),
+            dimension_names=list(plan.dimensions(name)),
+            fill_value=variable.fill,
+            attributes=dict(variable.attrs),
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that Zarr's specification does not have consolidated metadata yet; xarray reads it
+        zarr.consolidate_metadata(store)

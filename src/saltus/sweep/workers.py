@@ -1,0 +1,103 @@
+"""Chunks computed in processes of their own."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import signal
+from collections import deque
+from collections.abc import Iterator
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from saltus.errors import SweepError
+from saltus.sweep.chunk import Raised, attempt
+from saltus.sweep.layout import Index
+from saltus.sweep.plan import Plan
+
+READY = "ready"
+
+
+def in_processes(plan: Plan, queue: deque[Index], workers: int) -> Iterator[tuple[Index, Any]]:
+    """Compute the chunks in the queue in `workers` processes, and give what became of each as it comes.
+
+    A process that dies (killed, out of memory) fails its own chunk alone, and another takes its place.
+
+    Raises:
+        SweepError: a process ends before it can compute.
+    """
+    pool = [_Worker() for _ in range(min(workers, len(queue)))]
+    try:
+        while queue or any(worker.index is not None for worker in pool):
+            for worker in pool:
+                if worker.index is None and queue:
+                    worker.take(plan, queue.popleft())
+            busy = {worker.connection: worker for worker in pool if worker.index is not None}
+            for connection in wait(list(busy)):
+                worker = busy[connection]  # type: ignore[index]
+                outcome = worker.receive()
+                if outcome == READY:
+                    worker.ready = True
+                    continue
+                index, worker.index = worker.index, None
+                if worker.dead:
+                    pool[pool.index(worker)] = _Worker()
+                assert index is not None
+                yield index, outcome
+    finally:
+        for worker in pool:
+            worker.stop()
+
+
+class _Worker:
+    """A process, the pipe to it, and the chunk that it has."""
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("spawn")  # a fork would copy threads' locks in whatever state they are
+        self.connection, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(theirs,), daemon=True)
+        self.process.start()
+        theirs.close()
+        self.index: Index | None = None
+        self.ready = self.dead = False
+
+    def take(self, plan: Plan, index: Index) -> None:
+        self.index = index
+        with contextlib.suppress(OSError):  # it died: `receive` sees that
+            self.connection.send((plan.function, dict(plan.arguments), plan.block(index)))
+
+    def receive(self) -> Any:
+        """What it sent; if it has died, what is known of that."""
+        try:
+            outcome = self.connection.recv()
+        except (EOFError, OSError):
+            self.process.join()
+            if not self.ready:
+                raise SweepError(
+                    f"a worker process ended with exit code {self.process.exitcode} before it could compute; in a script, "
+                    'call the sweep below `if __name__ == "__main__":`'
+                ) from None
+            self.dead = True
+            return Raised(_death(self.process.exitcode or 0))
+        return outcome
+
+    def stop(self) -> None:
+        self.process.kill()  # it writes no files
+        self.process.join()
+        self.connection.close()
+
+
+def _death(code: int) -> str:
+    if code >= 0:
+        return f"its process ended with exit code {code}"
+    memory = ", perhaps for want of memory" if code == -9 else ""
+    return f"its process was ended by signal {-code}{memory}"
+
+
+def _work(connection: Connection) -> None:
+    """Compute what comes, until nothing more can come."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the process that writes decides
+    with contextlib.suppress(EOFError, OSError):  # that process has ended
+        connection.send(READY)
+        while True:
+            connection.send(attempt(*connection.recv()))
