@@ -18,13 +18,15 @@ MAY_IMPORT = {
     "theory": {"systems"},
     "flow": {"systems"},
     "orbits": {"systems", "flow"},
-    "studies": {"systems", "flow", "orbits"},
+    "attractors": {"systems", "flow", "orbits"},
+    "sweep": set(),
+    "studies": {"systems", "theory", "flow", "orbits", "attractors", "sweep"},
     "plots": set(),
     "config": {"systems", "flow"},
-    "paper": {"systems", "theory", "flow", "orbits", "studies", "plots", "files"},
-    "cli": {"systems", "theory", "flow", "orbits", "studies", "plots", "config", "paper", "files"},
+    "paper": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots", "files"},
+    "cli": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots", "config", "paper", "files"},
 }
-HEAVY = ("scipy", "numba", "xarray", "matplotlib", "pydantic", "h5netcdf", "saltus.flow", "saltus.paper")
+HEAVY = ("scipy", "numba", "xarray", "matplotlib", "pydantic", "h5netcdf", "zarr", "distributed", "saltus.flow", "saltus.paper")
 
 
 def imported_rooms(path: Path) -> set[str]:

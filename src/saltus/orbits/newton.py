@@ -9,7 +9,7 @@ import numpy as np
 from saltus.orbits.problem import Equations, Problem
 
 ITERATIONS = 12
-CONVERGED = 3e-13  # residual, relative to the unknowns: a few hundred roundings of a motion over a period
+CONVERGED = 5e-14  # residual, relative to the unknowns: a few dozen roundings of a motion over a period
 STALLED = 1e-10  # what Newton's last step may leave where rounding keeps the residual above that
 
 
@@ -50,13 +50,13 @@ def solve_along(
     size, before = unknowns.size, np.inf
     for iteration in range(iterations + 1):
         at = np.append(y[size:], values[1:]) if normal is not None else values
-        equations = problem.evaluate(y[:size], at, look=iteration > 1)
+        equations = problem.evaluate(y[:size], at, look=iteration > 0)
         if equations is None:
             return None
         error, scale = np.abs(equations.residual).max(), max(1.0, np.abs(y).max())
         converged = error <= CONVERGED * scale
         if converged or (error <= STALLED * scale and error > 0.3 * before):
-            looked = equations if iteration > 1 else problem.evaluate(y[:size], at, look=True)
+            looked = equations if iteration > 0 else problem.evaluate(y[:size], at, look=True)
             return None if looked is None else Solution(y[:size].copy(), at.copy(), looked, iteration)
         if not error < 1e6:
             return None

@@ -11,6 +11,7 @@ from saltus.orbits.newton import Solution, solve, solve_along
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 
+MOST_STRETCHED = 3.0  # times the last step, beyond which its curvature says nothing about the next one
 
 @dataclass(frozen=True, eq=False)
 class Curve:
@@ -79,6 +80,25 @@ class Point:
     def turned(self) -> Point:
         """The same point, followed the other way."""
         return Point(self.curve, self.solution, -self.tangent)
+
+
+def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
+    """Where the curve is expected to be a step further: on the cubic through the last two points with their tangents.
+
+    Its error is of fourth order in the step, the tangent's, which is all there is at a curve's first point, of second.
+    """
+    straight = point.place + step * point.tangent
+    if before is None or before.curve is not point.curve:
+        return straight
+    curve, chord = point.curve, point.place - before.place
+    turn = float(curve.norm(point.tangent - before.tangent))
+    length = curve.norm(chord) * (1.0 + turn**2 / 24.0)  # of the arc, to the order that the cubic needs
+    if not 0.0 < step <= MOST_STRETCHED * length:
+        return straight
+    u = step / length
+    bend = point.tangent * length - chord  # the cubic is the tangent and what bends it: of second and of third order
+    twist = before.tangent * length - chord
+    return np.asarray(straight + u**2 * (2.0 * bend + twist) + u**3 * (bend + twist))
 
 
 def start(orbit: PeriodicOrbit, scale: float, symmetric: bool, upwards: bool) -> Point:

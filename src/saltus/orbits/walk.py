@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.orbits.grazing import other_side
 from saltus.orbits.orbit import TOUCH
-from saltus.orbits.path import Point
+from saltus.orbits.path import Point, predicted
 from saltus.orbits.problem import Problem
 from saltus.orbits.special import SpecialPoint, UserFunction, asymmetry, grazing, located, parent_point, tests_between
 
@@ -45,6 +45,7 @@ class Walk:
     points: list[Point] = field(default_factory=list)
     special: list[SpecialPoint] = field(default_factory=list)
     missed: list[str] = field(default_factory=list)  # test functions that changed their sign where no zero was found
+    before: Point | None = None  # from which the last step was made
     reason: str = ""
 
     def follow(self, first: Point, born: bool = False) -> None:
@@ -57,7 +58,7 @@ class Walk:
             if ahead is None:
                 break
             grown = self._take(point, ahead, at_birth)
-            at_birth = False
+            self.before, at_birth = point, False
             if grown is not None:  # through a grazing, or cut short: begin again with care
                 step = min(FIRST_STEP, 0.1 * step) if grown else step
             if len(self.points) > MOST_POINTS:
@@ -66,7 +67,7 @@ class Walk:
     def _step(self, point: Point, step: float) -> tuple[Point | None, float]:
         """The next point, and the length of the step after it."""
         while step > LEAST_STEP:
-            ahead = point.curve.solve(point.place + step * point.tangent, point.tangent)
+            ahead = point.curve.solve(predicted(self.before, point, step), point.tangent)
             if ahead is not None and self._on_curve(point, ahead, step):
                 cosine = float(ahead.tangent @ (point.curve.weights**2 * point.tangent))
                 angle = math.acos(min(1.0, max(-1.0, cosine)))
