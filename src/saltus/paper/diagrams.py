@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.paper import spectra
+from saltus.paper.panels import each
 from saltus.paper.provenance import dataset
 from saltus.plots.response import draw_critical, draw_limits, draw_response, draw_zoom, highest, legend
 from saltus.plots.style import DOUBLE_COLUMN, new_figure, panel_label, styled
@@ -19,12 +20,13 @@ WAIT, LAST = 300, 10  # forcing periods
 
 def compute(frequencies: Mapping[str, float], largest: float, **options: Any) -> Any:
     """One diagram under load (i) for each frequency, with the fate of the undeformed state on both sides of Hcr."""
-    panels = {}
-    for name, frequency in frequencies.items():
-        system = spectra.under_force(frequency=frequency)
-        tree = spectra.diagram(system, (LEAST, largest), **options)
-        panels[name] = spectra.with_groups(tree, {"undeformed": undeformed(system, tree.attrs["critical"])})
-    return spectra.together(panels, what="bifurcation diagram under load (i)")
+    return spectra.together(each(_panel, frequencies, largest=largest, **options), what="bifurcation diagram under load (i)")
+
+
+def _panel(frequency: float, largest: float, **options: Any) -> Any:
+    system = spectra.under_force(frequency=frequency)
+    tree = spectra.diagram(system, (LEAST, largest), **options)
+    return spectra.with_groups(tree, {"undeformed": undeformed(system, tree.attrs["critical"])})
 
 
 def undeformed(system: Any, critical: float) -> Any:

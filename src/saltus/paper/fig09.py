@@ -8,6 +8,7 @@ from typing import Any
 from saltus.paper import spectra
 from saltus.paper.claim import Claim
 from saltus.paper.figure import PaperFigure
+from saltus.paper.panels import each
 from saltus.paper.statements_spectra import force_spectra
 from saltus.plots.response import draw_limits, draw_response, draw_zoom, highest, legend
 from saltus.plots.style import DOUBLE_COLUMN, new_figure, panel_label, styled
@@ -19,8 +20,11 @@ ZOOMED = {"a": (0.1, 0.46), "b": (0.1, 0.34)}  # Omega of the superharmonic reso
 
 def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any:
     """One spectrum for each amplitude; options are those of `response_spectrum`."""
-    panels = {name: spectra.spectrum(spectra.under_force(amplitude=h), FREQUENCIES, **options) for name, h in amplitudes.items()}
-    return spectra.together(panels, what="response spectrum under load (i)")
+    return spectra.together(each(_panel, amplitudes, **options), what="response spectrum under load (i)")
+
+
+def _panel(amplitude: float, **options: Any) -> Any:
+    return spectra.spectrum(spectra.under_force(amplitude=amplitude), FREQUENCIES, **options)
 
 
 @styled

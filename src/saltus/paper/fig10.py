@@ -10,6 +10,7 @@ from saltus.paper.claim import Claim
 from saltus.paper.features import main_branch
 from saltus.paper.fig09 import FREQUENCIES, draw_panel
 from saltus.paper.figure import PaperFigure
+from saltus.paper.panels import each
 from saltus.paper.statements_spectra import ground_spectra
 from saltus.plots.response import draw_zoom, highest, legend
 from saltus.plots.style import DOUBLE_COLUMN, new_figure, styled
@@ -19,8 +20,11 @@ AMPLITUDES = {"a": 0.25, "b": 0.5}  # zetahat
 
 def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any:
     """One spectrum for each amplitude; options are those of `response_spectrum`."""
-    panels = {name: spectra.spectrum(spectra.on_ground(amplitude=z), FREQUENCIES, **options) for name, z in amplitudes.items()}
-    return spectra.together(panels, what="response spectrum under load (ii)")
+    return spectra.together(each(_panel, amplitudes, **options), what="response spectrum under load (ii)")
+
+
+def _panel(amplitude: float, **options: Any) -> Any:
+    return spectra.spectrum(spectra.on_ground(amplitude=amplitude), FREQUENCIES, **options)
 
 
 @styled
