@@ -177,6 +177,11 @@ def _variables(variables: Mapping[str, Variable], axes: Mapping[str, np.ndarray]
     for name in (*variables, *sizes):
         if name in axes or (name in variables and name in sizes):
             raise ParameterError(f"{name!r} names two things; an axis, a dimension and a variable need names of their own")
+    folders = [name.casefold() for name in (*axes, *variables)]
+    if len(set(folders)) < len(folders):
+        raise ParameterError(
+            "two axes or variables have names that differ in their capitals alone; not all disks tell these apart"
+        )
     repeated = [name for name, v in variables.items() if len(dict(v.extra)) < len(v.extra)]
     if repeated:
         raise ParameterError(f"variable {repeated[0]!r} has a dimension twice")

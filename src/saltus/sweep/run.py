@@ -120,7 +120,9 @@ class _Sweep:
         attempts = self.failures[index].attempts + 1 if index in self.failures else 1
         failure = self.failures[index] = Failure(index, self.plan.place(index), raised.error, attempts)
         again = attempts <= self.retries
-        log.warning("%s; %s", failure, "it is tried again" if again else f"given up after {attempts} attempts")
+        log.warning(
+            "%s; %s", failure, "it is tried again" if again else f"given up after {attempts} attempt{'s' * (attempts > 1)}"
+        )
         log.debug("%s", raised.traceback)
         if again:
             self.queue.append(index)

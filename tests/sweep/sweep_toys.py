@@ -39,10 +39,11 @@ def fails_once(arguments, block):
 
 
 def dies(arguments, block):
-    """Ends its process, once, where x holds `bad`."""
+    """Ends its process where x holds `bad`, once or always."""
     mark = Path(arguments["mark"])
     if arguments["bad"] in block["x"].tolist() and not mark.exists():
-        mark.touch()
+        if not arguments.get("always"):
+            mark.touch()
         os._exit(9)
     return waves(arguments, block)
 
