@@ -1,0 +1,177 @@
+"""An attractor of the stroboscopic map: what it is, where it lies, and how many motions end there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.orbits import PeriodicOrbit
+from saltus.systems import System
+
+if TYPE_CHECKING:
+    import xarray
+
+UNDECIDED = -1  # the label of what ends on no known attractor
+REST = 0  # the label of rest at the contact, always
+NEAR = 1e-6  # two strobe points that count as one, relative to their size or to 1
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Where an attractor meets the stroboscopic section, phase 0 of the load: all points of a cycle, many of a chaotic set."""
+
+    label: int
+    kind: str  # "rest", "periodic", "quasi-periodic" or "chaotic"
+    strobes: np.ndarray  # (n, 2), coordinate and velocity
+
+    @property
+    def dense(self) -> bool:
+        """Whether the points are a sample of infinitely many."""
+        return self.kind not in ("rest", "periodic")
+
+    @cached_property
+    def _tree(self) -> Any:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.strobes)
+
+    @cached_property
+    def grain(self) -> float:
+        """The distance within which a point counts as one of a sampled set: twice what 95 % of its own keep to."""
+        if not self.dense:
+            return 0.0
+        apart, _ = self._tree.query(self.strobes, k=2, p=np.inf)
+        return float(2.0 * np.quantile(apart[:, 1], 0.95))
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """How far states (..., 2) are from the nearest of its points, in the larger of the two coordinates, (...)."""
+        if self.dense:
+            finite = np.isfinite(points).all(axis=-1)
+            apart, _ = self._tree.query(np.where(finite[..., None], points, 0.0), p=np.inf)
+            return np.where(finite, apart, np.inf)
+        distance = np.full(points.shape[:-1], np.inf)
+        for strobe in self.strobes:
+            distance = np.fmin(distance, np.abs(points - strobe).max(axis=-1))
+        return distance
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON takes it."""
+        return {"label": self.label, "kind": self.kind, "strobes": self.strobes.tolist()}
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Target:
+        """The inverse of `to_dict`."""
+        return cls(int(data["label"]), str(data["kind"]), np.asarray(data["strobes"], dtype=float).reshape(-1, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Attractor:
+    """One attractor, with its evidence."""
+
+    target: Target
+    highest: float  # of the coordinate
+    lowest: float
+    orbit: PeriodicOrbit | None  # of a periodic one: solved by its own equations, and stable by its multipliers
+    starts: int  # how many of the initial states end there
+    of: int  # out of so many
+    mirror: int  # label of its mirror image: its own where it is symmetric, UNDECIDED where the system has no mirror
+    evidence: str
+
+    @property
+    def label(self) -> int:
+        """Its number: 0 for rest, from 1 on for all others."""
+        return self.target.label
+
+    @property
+    def kind(self) -> str:
+        """rest, periodic, quasi-periodic or chaotic."""
+        return self.target.kind
+
+    @property
+    def strobes(self) -> np.ndarray:
+        """Its points at phase 0 of the load, (n, 2)."""
+        return self.target.strobes
+
+    @property
+    def periods(self) -> int:
+        """Forcing periods after which it repeats; 0 for rest and for what does not repeat."""
+        return 0 if self.orbit is None else self.orbit.periods
+
+    @property
+    def amplitude(self) -> float:
+        """max abs of the coordinate."""
+        return max(abs(self.highest), abs(self.lowest))
+
+    @property
+    def fraction(self) -> float:
+        """p, the share of the initial states that end there; nan where none were sampled."""
+        return self.starts / self.of if self.of else math.nan
+
+    @property
+    def error(self) -> float:
+        """The binomial standard error of the fraction, sqrt(p (1 - p) / n).
+
+        It is 0 where none or all of n starts end there; the share is then within 3 / n of it with a probability of 95 %.
+        """
+        return math.sqrt(self.fraction * (1.0 - self.fraction) / self.of) if self.of else math.nan
+
+    def __repr__(self) -> str:
+        what = f"period {self.periods}" if self.orbit is not None else self.kind
+        share = f", {100 * self.fraction:.3g} +- {100 * self.error:.2g} % of the starts" if self.of else ""
+        return f"Attractor({self.label}: {what}, amplitude={self.amplitude:.9g}{share})"
+
+
+@dataclass(frozen=True, eq=False)
+class Attractors:
+    """The attractors that were found, by their labels, and what was searched."""
+
+    system: System
+    members: tuple[Attractor, ...]
+    states: np.ndarray  # (n, 2): the initial states that were sampled
+    assigned: np.ndarray  # (n,): the label of the attractor on which each ends, or UNDECIDED
+    region: tuple[float, float]
+    seed: int
+    tol: float
+    reasons: tuple[str, ...]  # why motions are undecided
+
+    def __len__(self) -> int:
+        return len(self.members)
+
+    def __iter__(self) -> Iterator[Attractor]:
+        return iter(self.members)
+
+    def of(self, label: int) -> Attractor:
+        """The attractor of a label.
+
+        Raises:
+            KeyError: there is none.
+        """
+        for member in self.members:
+            if member.label == label:
+                return member
+        raise KeyError(f"no attractor {label}; there are {[member.label for member in self.members]}")
+
+    @property
+    def undecided(self) -> int:
+        """How many of the initial states end on none of them, as far as they were followed."""
+        return int((self.assigned == UNDECIDED).sum())
+
+    @property
+    def targets(self) -> tuple[Target, ...]:
+        """Where they meet the stroboscopic section."""
+        return tuple(member.target for member in self.members)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A row for each attractor: kind, periods, fraction and its error, extrema, multipliers, points at phase 0."""
+        from saltus.attractors.dataset import attractors_dataset
+
+        return attractors_dataset(self)
+
+    def __repr__(self) -> str:
+        lines = "".join(f"\n  {member!r}" for member in self.members)
+        return f"Attractors({len(self.members)} from {len(self.states)} states, {self.undecided} of them undecided{lines})"

@@ -1,0 +1,164 @@
+"""Separatrices of the phase plane under a constant load: the stable manifolds of its saddles, by the exact backward flow.
+
+At an equilibrium (theta*, 0) on a side the flow is theta'' = a_theta (theta - theta*) + a_v theta', with the rates
+lambda^2 - a_v lambda - a_theta = 0: a saddle where a_theta > 0, left and approached along (1, lambda).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.attractors.grow import Window
+from saltus.attractors.manifolds import check_window
+from saltus.attractors.settling import clocked
+from saltus.errors import ParameterError
+from saltus.flow import Motion, simulate
+from saltus.systems import Constant, System, VelocityReduction
+from saltus.systems.checks import check_number
+from saltus.systems.reversed import reversed_system
+
+OFFSET = 1e-6  # from the saddle; the curve leaves its tangent by the square of this
+CLOSE = 1e-4  # distance at which a separatrix is said to end at a saddle
+PIECE = 2.0  # of time that is followed at once
+GRID = 2001  # points of the window between which equilibria are looked for
+SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # of a derivative by central differences
+DIFFERENCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Saddle:
+    """A saddle equilibrium under a constant load."""
+
+    theta: float
+    side: int
+    rates: tuple[float, float]  # the eigenvalues, the positive one first
+
+
+@dataclass(frozen=True, eq=False)
+class Separatrix:
+    """A branch of the stable manifold of a saddle, followed back in time from it; nan where an impact makes the velocity jump."""
+
+    saddle: float
+    time: np.ndarray  # (n,), from 0 to negative times
+    theta: np.ndarray  # (n,)
+    velocity: np.ndarray  # (n,)
+    crossings: (
+        np.ndarray
+    )  # (m, 2): the times and velocities, just before each, of the impacts of the forward motion, latest first
+    ends: str  # "window", "saddle" or "span"
+
+
+def saddles(system: System, window: Any = ((-3.0, 3.0), (-3.0, 3.0))) -> tuple[Saddle, ...]:
+    """The saddle equilibria in a window of the phase plane, by their coordinate.
+
+    Raises:
+        ParameterError: a load that is not constant; a window without meaning.
+    """
+    from scipy.optimize import brentq
+
+    frame = check_window(window, 0.1)
+    _check_constant(system)
+    model = system.model
+    found = []
+    for side in model.sides or (1,):
+        grid = frame.centre[0] + frame.half[0] * np.linspace(-1.0, 1.0, GRID)
+        grid = grid[np.asarray(model.gap(grid, side)) > 0.0] if model.sides else grid
+
+        def pull(theta: float, side: int = side) -> float:
+            return float(model.acceleration(0.0, theta, 0.0, float(side), system.load))
+
+        values = np.array([pull(theta) for theta in grid])
+        for i in np.flatnonzero(values[:-1] * values[1:] < 0.0):
+            theta = float(brentq(pull, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-15))
+            rates = _rates(system, theta, side)
+            found += [] if rates is None else [Saddle(theta, side, rates)]
+    return tuple(sorted(found, key=lambda saddle: saddle.theta))
+
+
+def separatrices(
+    system: System, window: Any = ((-3.0, 3.0), (-3.0, 3.0)), *, span: float = 60.0, step: float = 0.02
+) -> tuple[Separatrix, ...]:
+    """The stable manifolds of all saddles in a window: the curves that part the basins of a constant load.
+
+    Each branch is followed back for at most `span` of time, until it leaves the window for good (three half widths) or comes to
+    a saddle, and given every `step` of time.
+
+    Raises:
+        ParameterError: a load that is not constant, an impact law without an inverse, numbers without meaning.
+    """
+    frame = check_window(window, 0.1)
+    check_number("span", span, above=0.0)
+    check_number("step", step, above=0.0)
+    points = saddles(system, window)
+    backward = reversed_system(system)
+    return tuple(_branch(backward, saddle, away, points, frame, span, step) for saddle in points for away in (1.0, -1.0))
+
+
+def _check_constant(system: System) -> None:
+    clocked(system)
+    for name, signal in system.load.channels.items():
+        if not isinstance(signal, Constant):
+            raise ParameterError(f"load.{name} varies, so there is no phase plane; use stable_manifold of its saddle orbits")
+
+
+def _rates(system: System, theta: float, side: int) -> tuple[float, float] | None:
+    """The eigenvalues of a saddle, None of any other equilibrium."""
+
+    def pull(q: float, v: float) -> float:
+        return float(system.model.acceleration(0.0, q, v, float(side), system.load))
+
+    h = DIFFERENCE
+    slope = sum(w * (pull(theta + j * h, 0.0) - pull(theta - j * h, 0.0)) for j, w in SIXTH_ORDER) / h
+    loss = sum(w * (pull(theta, j * h) - pull(theta, -j * h)) for j, w in SIXTH_ORDER) / h
+    if slope <= 0.0:
+        return None
+    root = math.sqrt(0.25 * loss * loss + slope)
+    return 0.5 * loss + root, 0.5 * loss - root
+
+
+def _branch(
+    backward: System, saddle: Saddle, away: float, points: tuple[Saddle, ...], frame: Window, span: float, step: float
+) -> Separatrix:
+    """The branch to one side of a saddle."""
+    name = backward.model.coordinates[0]
+    theta, velocity = saddle.theta + away * OFFSET, -away * OFFSET * saddle.rates[1]
+    now, ends, left = 0.0, "span", False
+    pieces: list[np.ndarray] = []
+    impacts: list[np.ndarray] = []
+    while now < span and ends == "span":
+        start: dict[str, Any] = {name: theta, "velocity": velocity}
+        motion = simulate(backward, **start, duration=PIECE, tol=1e-13)
+        piece = _sampled(motion, now, step)
+        apart = np.min([np.hypot(piece[1] - p.theta, piece[2]) for p in points], axis=0)
+        back = np.flatnonzero(apart < CLOSE)
+        if left and back.size:
+            piece, ends = piece[:, : back[0] + 1], "saddle"
+        elif frame.far(piece[1:, -1:].T)[0]:
+            ends = "window"
+        left = left or bool(apart[-1] > 10.0 * CLOSE)
+        within = motion.crossings.time < piece[0, -1] - now + step
+        impacts.append(np.stack([now + motion.crossings.time, -motion.crossings.velocity_after], axis=1)[within])
+        pieces.append(piece)
+        now, theta, velocity = now + PIECE, motion.position, motion.velocity
+    time, thetas, velocities = np.concatenate(pieces, axis=1)
+    crossings = np.concatenate(impacts) * np.array([-1.0, 1.0])
+    return Separatrix(saddle.theta, -time, thetas, -velocities, crossings, ends)
+
+
+def _sampled(motion: Motion, begin: float, step: float) -> np.ndarray:
+    """Rows (time, coordinate, velocity) of a motion, with both sides of every impact, and nan between them where they differ."""
+    times = np.linspace(0.0, PIECE, round(PIECE / step) + 1)
+    theta, velocity = motion.at(times)
+    crossings, contact = motion.crossings, float(motion.system.model.contact)
+    rows = [np.stack([times, theta, velocity])]
+    jump = not (isinstance(motion.system.impact, VelocityReduction) and len(motion.system.model.sides) == 2)
+    for values in (crossings.velocity_before, np.full(len(crossings), np.nan), crossings.velocity_after)[:: 1 if jump else 2]:
+        at = np.full(len(crossings), contact)
+        rows.append(np.stack([crossings.time, np.where(np.isnan(values), np.nan, at), values]))
+    joined = np.concatenate(rows, axis=1)
+    joined = joined[:, np.argsort(joined[0], kind="stable")]
+    return joined + np.array([[begin], [0.0], [0.0]])
