@@ -32,7 +32,7 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
     try:
         from distributed import as_completed
 
-        done = as_completed(with_results=True, raise_errors=False)
+        done = as_completed(loop=client.loop, with_results=True, raise_errors=False)
         flying: dict[str, Index] = {}
         while queue or flying:
             while queue and len(flying) < max(AHEAD, AHEAD * sum(client.nthreads().values())):
@@ -43,9 +43,13 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
                 done.add(future)
             future, result = next(done)
             if future.status in ("cancelled", "lost"):
-                raise SweepError(f"the Dask scheduler at {address} has gone away; run the same again to go on")
+                raise OSError("the task was given up")
             yield flying.pop(future.key), Raised(_said(result)) if future.status == "error" else result
             del future, result  # so that the cluster forgets them
+    except OSError as error:
+        raise SweepError(
+            f"the Dask scheduler at {address} has gone away ({_first_line(error)}); run the same again to go on"
+        ) from error
     finally:
         with contextlib.suppress(Exception):
             client.close(timeout=1)
