@@ -1,0 +1,62 @@
+"""Averages along a motion: what a long run says of the mean of a correlated series, and how well."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+BATCHES = 16  # at least, of which a standard error is taken
+STUDENT = 2.131449545559323  # the two-sided 95 % point of Student's t with BATCHES - 1 degrees of freedom
+
+
+def weights(count: int) -> np.ndarray:
+    """(count,): exp(-1 / (u (1 - u))) at the middles u of equal shares of the run, scaled to the sum 1.
+
+    With these weights the average of a periodic or quasi-periodic series converges faster than any power of the length (Das,
+    Saiki, Sander and Yorke, Nonlinearity 30 (2017) 4111), where the plain mean has an error of 1 / length; and what a run has
+    kept of its beginning counts nothing. The price, in chaos, is a standard error that is larger by a quarter.
+    """
+    u = (np.arange(count) + 0.5) / count
+    bump = np.exp(4.0 - 1.0 / (u * (1.0 - u)))
+    result: np.ndarray = bump / bump.sum()
+    return result
+
+
+def average(series: np.ndarray) -> np.ndarray:
+    """The weighted average along the first axis, (periods, ...) -> (...); -inf where an entry is."""
+    lost = np.isneginf(series).any(axis=0)
+    mean = np.tensordot(weights(len(series)), np.where(np.isneginf(series), 0.0, series), axes=1)
+    return np.where(lost, -np.inf, mean)
+
+
+def uncertainty(series: np.ndarray) -> np.ndarray:
+    """Half the width of the 95 % interval of `average`, (periods, ...) -> (...); 0 where an entry is -inf.
+
+    Entries of a series follow from those before, so that their scatter says little. The means of batches of 1, 2, 4, ... entries
+    are ever less correlated, and where entries follow their like the standard error from them grows until the batches outlast
+    the correlation. The largest of those from 16 to 127 batches is taken, times the factor of Student's t for as few. It is
+    honest as long as the correlation dies out within a sixteenth of the run; for regular motion, whose averages converge faster
+    than any scatter tells, it is far too large.
+
+    Raises:
+        ValueError: fewer than 16 entries.
+    """
+    if len(series) < BATCHES:
+        raise ValueError(f"an error bar takes a series of at least {BATCHES} entries, got {len(series)}")
+    lost = np.isneginf(series).any(axis=0)
+    finite = np.where(np.isneginf(series), 0.0, series)
+    widening = np.sqrt(len(series) * np.sum(weights(len(series)) ** 2))
+    return np.where(lost, 0.0, STUDENT * widening * _largest_standard_error(finite))
+
+
+def _largest_standard_error(series: np.ndarray) -> Any:
+    result, length = np.zeros(series.shape[1:]), 1
+    while len(series) // length >= 8 * BATCHES:
+        length *= 2
+    while len(series) // length >= BATCHES:
+        count = len(series) // length
+        means = series[: count * length].reshape(count, length, *series.shape[1:]).mean(axis=1)
+        result = np.maximum(result, means.std(axis=0, ddof=1) / np.sqrt(count))
+        length *= 2
+    return result
