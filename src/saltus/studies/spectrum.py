@@ -13,6 +13,7 @@ from saltus.orbits.branch import STEP, check_bounds
 from saltus.orbits.find import check_whole
 from saltus.orbits.search import REGION
 from saltus.studies.atlas import Atlas
+from saltus.studies.bands import chaotic_bands
 from saltus.studies.tree import diagram_tree
 from saltus.systems import System
 from saltus.systems.checks import check_number
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
 
 VALUES = 25  # of the parameter at which is searched
 STARTS = 48  # initial states at each
-SEARCHED, FOLLOWED = 0.4, 0.9  # shares of the work done when the search, and when all branches are
+BANDS = 121  # values at which chaos is looked for
+SEARCHED, FOLLOWED, CONFIRMED = 0.3, 0.7, 0.9  # shares of the work done after the search, the branches, the bands
 
 
 def response_spectrum(
@@ -64,6 +66,7 @@ def diagram(
     repelling: int = 1,
     switch: bool = True,
     step: float = STEP,
+    bands: int = BANDS,
     progress: Callable[[float, str], object] | None = None,
 ) -> xarray.DataTree:
     """Search, follow, switch and confirm.
@@ -83,20 +86,22 @@ def diagram(
         repelling: up to which period repelling orbits are searched for.
         switch: whether branches are followed that are born at special points.
         step: the longest step along a branch.
+        bands: at how many values, from the first to the last, chaos is looked for (0: nowhere), see `chaotic_bands`.
         progress: called with the fraction done and what is being done.
 
     Returns:
         A DataTree: the search in the attributes and in `search`; `branch_000`, ... (see `orbits/dataset.py`, with `defect` after
-        a period and, for stable orbits, `kept` after 20); `attractors`, what simulation settled on; `bands`, empty until chaos is
-        classified. The attribute `left` counts the special points at which a family is born that was not followed: within the
-        bounds the branch covers less than a fiftieth of the range, or the orbits have less than a hundredth of its largest
-        amplitude, or there were 40 branches already. An orbit that its multipliers call stable, but that does not stay where
-        it is for 20 periods, is not called so; `unconfirmed` counts these on each branch.
+        a period and, for stable orbits, `kept` after 20); `attractors`, what simulation settled on; `bands` of chaos with
+        brackets of their edges and the special points there, `exponents` and `strobes` (the stroboscopic points of what was
+        simulated to find them: the brute-force diagram). The attribute `left` counts the special points at which a family is born
+        that was not followed: within the bounds the branch covers less than a fiftieth of the range, or the orbits have less than
+        a hundredth of its largest amplitude, or there were 40 branches already. An orbit that its multipliers call stable, but
+        that does not stay where it is for 20 periods, is not called so; `unconfirmed` counts these on each branch.
 
     Raises:
         ParameterError: an argument without meaning.
     """
-    low, high = _checked(system, path, bounds, max_period=max_period, starts=starts, seed=seed, repelling=repelling)
+    low, high = _checked(system, path, bounds, max_period=max_period, starts=starts, seed=seed, repelling=repelling, bands=bands)
     check_number("step", step, above=0.0)
     grid, region = _values((low, high), values), _region(region)
     if not (progress is None or callable(progress)):
@@ -119,8 +124,10 @@ def diagram(
         sorted(found.orbits, key=lambda o: (o.periods, not o.stable)),
         lambda share: say(SEARCHED + (FOLLOWED - SEARCHED) * share, f"following, {len(atlas.branches)} branches"),
     )
-    say(FOLLOWED, "confirming")
-    tree = diagram_tree(system, atlas.branches, found, (low, high), max_period=max_period, left=atlas.left)
+    say(FOLLOWED, "looking for chaos")
+    chaos = chaotic_bands(system, path, (low, high), count=bands, region=region, seed=seed) if bands else None
+    say(CONFIRMED, "confirming")
+    tree = diagram_tree(system, atlas.branches, found, (low, high), chaos, max_period=max_period, left=atlas.left)
     say(1.0, "done")
     return tree
 

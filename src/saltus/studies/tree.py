@@ -8,6 +8,7 @@ import numpy as np
 
 from saltus.orbits import Branch, PeriodicOrbit, Search, defects
 from saltus.orbits.resting import RestingOrbit
+from saltus.studies.bands import Bands, band_dataset
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ INSTANTS = 64
 
 
 def diagram_tree(
-    system: System, branches: list[Branch], found: Search, bounds: tuple[float, float], **facts: Any
+    system: System, branches: list[Branch], found: Search, bounds: tuple[float, float], chaos: Bands | None, **facts: Any
 ) -> xarray.DataTree:
     """The DataTree that `diagram` returns; `facts` are further attributes."""
     import xarray
@@ -40,7 +41,21 @@ def diagram_tree(
     nodes = {"/": xarray.Dataset(attrs=attributes)}
     by_length = sorted(branches, key=lambda b: (b.points[0].orbit.periods, -len(b.points)))
     nodes |= {f"branch_{i:03d}": confirmed(branch) for i, branch in enumerate(by_length)}
-    return xarray.DataTree.from_dict({**nodes, "attractors": _attractors(found), "bands": _bands(), "search": _search(found)})
+    bands = {"bands": band_dataset()} if chaos is None else chaos.marked(turning_points(branches)).to_datasets()
+    return xarray.DataTree.from_dict({**nodes, "attractors": _attractors(found), **bands, "search": _search(found)})
+
+
+def turning_points(branches: list[Branch]) -> list[tuple[str, float]]:
+    """The special points at which motions lose their stability or end: kind and parameter."""
+    found = []
+    for branch in branches:
+        places = {id(point): i for i, point in enumerate(branch.points)}
+        for special in branch.special:
+            i = places.get(id(special.point))
+            beside = [] if i is None else [branch.points[j].orbit.stable for j in (i - 1, i + 1) if 0 <= j < len(branch.points)]
+            if any(beside) and not (len(beside) == 2 and all(beside)):
+                found.append((special.kind, special.parameter))
+    return found
 
 
 def confirmed(branch: Branch) -> xarray.Dataset:
@@ -85,13 +100,6 @@ def _attractors(found: Search) -> xarray.Dataset:
         "periods": ("dot", dots.periods, {"long_name": "forcing periods after which it repeats"}),
     }
     return xarray.Dataset(columns)
-
-
-def _bands() -> xarray.Dataset:
-    """The place of the bands of chaos, which are not classified yet."""
-    import xarray
-
-    return xarray.Dataset({"low": ("band", np.empty(0)), "high": ("band", np.empty(0)), "kind": ("band", np.empty(0, "U2"))})
 
 
 def _search(found: Search) -> xarray.Dataset:
