@@ -26,11 +26,12 @@ def rows_plan(rows):
     return Plan(function="sweep_toys:rows", axes=axes, chunk={"start": 1000, "row": 25}, variables=variables)
 
 
-def go_on(store, workers, pause):
-    """Run, saying when."""
+def go_on(store, where, pause):
+    """Run, saying when: with so many workers, 0 for none, or on the cluster at an address."""
     plan = long_plan(pause=float(pause))
     print("go", flush=True)
-    run(plan, store, workers=int(workers) or None, progress=lambda done, total, left: print(done, flush=True))
+    place = {"scheduler": where} if "://" in where else {"workers": int(where) or None}
+    run(plan, store, progress=lambda done, total, left: print(done, flush=True), **place)
 
 
 def measure(store, rows):

@@ -67,6 +67,13 @@ def returns(arguments, block):
     return result
 
 
+def greedy(arguments, block):
+    """Spoils its arguments and its block."""
+    result = waves({"hole": arguments["list"].pop()}, block)
+    block["x"][:] = 0.0
+    return result
+
+
 def rows(arguments, block):
     """Eight numbers for each of many rows."""
     start, row = np.meshgrid(block["start"], block["row"], indexing="ij")

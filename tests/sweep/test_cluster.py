@@ -54,6 +54,17 @@ def test_a_chunk_that_fails_on_a_cluster_is_tried_again_and_told(cluster, waves_
     assert status(tmp_path / "s").done == 6
 
 
+def test_an_interrupt_ends_a_run_on_a_cluster_at_once(cluster, script, tmp_path):
+    process = script("go_on", tmp_path / "store", cluster.scheduler_address, 0.3)
+    while process.stdout.readline() not in ("1\n", ""):
+        pass
+    start = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    assert time.monotonic() - start < 3.0
+    assert err.strip().endswith(f"{tmp_path / 'store'} keeps them: run the same again to go on")
+
+
 def test_a_chunk_that_kills_every_worker_is_told_and_the_rest_goes_on(cluster, waves_plan, tmp_path):
     arguments = {"bad": float(np.linspace(0.0, 1.0, 7)[6]), "mark": str(tmp_path / "no folder" / "mark"), "always": True}
     with distributed.Client(cluster, set_as_default=False) as client:

@@ -87,6 +87,22 @@ def test_what_a_kill_left_half_written_is_removed(tree, tmp_path):
     assert fresh.exists()
 
 
+def test_the_workers_of_a_killed_run_end_too(script, tmp_path):
+    process = script("go_on", tmp_path / "store", 2, 0.1)
+    while process.stdout.readline() not in ("1\n", ""):
+        pass
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(process.pid, 0)
+        except ProcessLookupError:  # the group has nobody left
+            return
+        time.sleep(0.02)
+    pytest.fail("a worker outlives its run")
+
+
 @pytest.mark.parametrize("workers", [0, 2])
 def test_an_interrupt_ends_a_run_at_once_and_says_how_to_go_on(script, tmp_path, workers):
     store = tmp_path / "store"

@@ -65,6 +65,10 @@ def test_random_numbers_are_those_of_the_chunk(waves_plan, tree, tmp_path):
     assert tree(tmp_path / "a") == tree(tmp_path / "b")
 
 
+def test_a_function_that_spoils_its_arguments_spoils_no_other_chunk(waves_plan):
+    assert run(waves_plan("greedy", {"list": [0.1]}))["height"].equals(run(waves_plan())["height"])
+
+
 def test_each_file_is_written_once(waves_plan, monkeypatch, tmp_path):
     from saltus.sweep import whole as whole_module
 

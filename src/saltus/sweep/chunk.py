@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import importlib
 import traceback
 from collections.abc import Callable, Mapping
@@ -40,7 +41,7 @@ class Raised:
     traceback: str = ""
 
 
-def resolve(function: str) -> Callable[[dict[str, Any], dict[str, np.ndarray]], Mapping[str, Any]]:
+def resolve(function: str) -> Callable[[Any, dict[str, np.ndarray]], Mapping[str, Any]]:
     """The function that `function`, "package.module:name", names.
 
     Raises:
@@ -62,13 +63,13 @@ def resolve(function: str) -> Callable[[dict[str, Any], dict[str, np.ndarray]], 
     return getattr(found, name)
 
 
-def attempt(function: str, arguments: dict[str, Any], block: dict[str, np.ndarray]) -> Any:
+def attempt(function: str, arguments: Mapping[str, Any], block: dict[str, np.ndarray]) -> Any:
     """What the function makes of a chunk, or what it raised. Runs in whichever process computes."""
     try:
-        return resolve(function)(arguments, block)
+        # A function that changes its arguments must not change those of the next chunk.
+        return resolve(function)(copy.deepcopy(arguments), block)
     except Exception as error:
-        lines = traceback.format_exception_only(error)
-        return Raised(lines[-1].strip(), traceback.format_exc())
+        return Raised(f"{type(error).__name__}: {' '.join(str(error).split())}", traceback.format_exc())
 
 
 def checked(plan: Plan, index: Index, result: Any) -> Arrays:

@@ -38,7 +38,7 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
             while queue and len(flying) < max(AHEAD, AHEAD * sum(client.nthreads().values())):
                 index = queue.popleft()
                 # Not pure: Dask would keep what a failed chunk raised, and not try it again.
-                future = client.submit(attempt, plan.function, dict(plan.arguments), plan.block(index), pure=False)
+                future = client.submit(attempt, plan.function, plan.arguments, plan.block(index), pure=False)
                 flying[future.key] = index
                 done.add(future)
             future, result = next(done)

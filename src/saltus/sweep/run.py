@@ -152,7 +152,7 @@ def _outcomes(plan: Plan, queue: deque[Index], workers: int | None, scheduler: s
 def _here(plan: Plan, queue: deque[Index]) -> Outcomes:
     while queue:
         index = queue.popleft()
-        yield index, attempt(plan.function, dict(plan.arguments), plan.block(index))
+        yield index, attempt(plan.function, plan.arguments, plan.block(index))
 
 
 def _check(plan: Any, store: Any, workers: Any, scheduler: Any, progress: Any, retries: Any) -> Path | None:

@@ -64,7 +64,7 @@ class _Worker:
     def take(self, plan: Plan, index: Index) -> None:
         self.index = index
         with contextlib.suppress(OSError):  # it died: `receive` sees that
-            self.connection.send((plan.function, dict(plan.arguments), plan.block(index)))
+            self.connection.send((plan.function, plan.arguments, plan.block(index)))
 
     def receive(self) -> Any:
         """What it sent; if it has died, what is known of that."""
