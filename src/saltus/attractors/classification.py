@@ -34,9 +34,9 @@ def classify(
     * `periodic`: it repeats itself, and the orbit solves its own equations, has all multipliers inside the unit circle, repeats
       in direct simulation, and is met by the motion. Under constant loads an equilibrium is such an orbit, of period 1.
     * `chaotic`: not settled after transient + periods; then a largest Lyapunov exponent above 0 by more than its error and the
-      growth of regular motions, in both halves of runs of 500, 1000, 2000, ... periods, as far as `periods` go; and none of 32
+      growth of regular motions, in both halves of runs of 500, 1000, 2000, ... periods, as far as `periods` go; and none of 128
       motions from states beside the last one settles within as many periods. Chaotic transients, which end at random, are
-      told by that with a probability of 95 % while they last less than 11 `periods` in the mean. The 0-1 test is recorded beside
+      told by that with a probability of 95 % while they last less than 43 `periods` in the mean. The 0-1 test is recorded beside
       it, and must not contradict.
     * `quasi-periodic`: only where `excludes_tori` knows no reason against it: exponents of 0 within their error and resolution,
       and a 0-1 test that sees order.

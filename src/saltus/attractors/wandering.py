@@ -17,7 +17,7 @@ from saltus.attractors.zero_one import SHORTEST, ZeroOne, zero_one_test
 FIRST_STAGE = 500  # forcing periods of the first estimate of the exponents; each later one takes twice as many
 STROBES = 2000  # states at phase 0 that the 0-1 test looks at
 CHAOS, ORDER = 0.8, 0.2  # values of K above and below which the 0-1 test has an opinion
-COMPANIONS = 32  # motions from states beside the last one, to see whether the chaos has a way out
+COMPANIONS = 128  # motions from states beside the last one, to see whether the chaos has a way out
 ASIDE = 1e-6  # how far: a chaotic motion of exponent 0.03 forgets it within 500 units of time
 
 

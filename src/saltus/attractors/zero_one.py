@@ -52,20 +52,27 @@ def zero_one_test(series: Any, *, seed: int = 0, count: int = 100) -> ZeroOne:
     if np.ptp(values) <= STILL * max(1.0, float(np.abs(values).max())):
         return ZeroOne(0.0, 0.0, values.size)
     lags = np.arange(1, values.size // 10 + 1)
-    found = [
-        _correlation(lags, _displacement(values, c, lags) - values.mean() ** 2 * (1 - np.cos(lags * c)) / (1 - np.cos(c)))
-        for c in np.random.default_rng(seed).uniform(np.pi / 5, 4 * np.pi / 5, int(count))
-    ]
+    c = np.random.default_rng(seed).uniform(np.pi / 5, 4 * np.pi / 5, (int(count), 1))
+    bounded = values.mean() ** 2 * (1 - np.cos(lags * c)) / (1 - np.cos(c))
+    found = [_correlation(lags, row) for row in _displacement(values, c, lags.size) - bounded]
     low, middle, high = np.quantile(found, [0.25, 0.5, 0.75])
     return ZeroOne(float(middle), float(high - low) / 2, values.size)
 
 
-def _displacement(values: np.ndarray, c: float, lags: np.ndarray) -> np.ndarray:
-    """M(n): the mean of abs(z_{j+n} - z_j)^2 over the first nine tenths of the j, (lags,)."""
-    steps = np.arange(1, values.size + 1)
-    path = np.cumsum(values * np.exp(1j * c * steps))
-    base = path[: values.size - lags[-1]]
-    return np.array([np.mean(np.abs(path[n : n + base.size] - base) ** 2) for n in lags])
+def _displacement(values: np.ndarray, c: np.ndarray, longest: int) -> np.ndarray:
+    """M(n) for n = 1, ..., longest: the mean of abs(z_{j+n} - z_j)^2 over all j with j + longest <= samples, (frequencies, lags).
+
+    The squares are summed by cumulative sums, the products by Fourier transforms.
+    """
+    path = np.cumsum(values * np.exp(1j * c * np.arange(1, values.size + 1)), axis=1)
+    base = values.size - longest
+    size = 1 << (values.size + base - 1).bit_length()
+    spectrum = np.fft.fft(path, size) * np.conj(np.fft.fft(path[:, :base], size))
+    products = np.fft.ifft(spectrum)[:, 1 : longest + 1].real
+    squares = np.cumsum(np.pad(np.abs(path) ** 2, ((0, 0), (1, 0))), axis=1)
+    later = squares[:, base + 1 : base + longest + 1] - squares[:, 1 : longest + 1]
+    result: np.ndarray = (later + squares[:, base : base + 1] - 2.0 * products) / base
+    return result
 
 
 def _correlation(lags: np.ndarray, displacement: np.ndarray) -> float:
