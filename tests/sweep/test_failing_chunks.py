@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from saltus.errors import SweepError
-from saltus.sweep import run, status
+from saltus.sweep import SweepInterrupted, run, status
 
 BAD = float(np.linspace(0.0, 1.0, 7)[3])  # in the chunks 1/0 and 1/1
 
@@ -21,7 +21,7 @@ def test_the_rest_goes_on_and_the_same_run_completes_it(waves_plan, tree, tmp_pa
         "2 of 8 chunks failed: chunk 1/0 (x 0.333333 to 0.5, y 0 to 1): ValueError: no wave at 0.3333333333333333, and 1 more; "
     )
     assert str(told.value).startswith(sentence)
-    assert str(told.value).endswith(f"{store} keeps the others and the same run again computes only what is missing")
+    assert str(told.value).endswith(f"{store} keeps the others, and the same run again computes only what is missing")
     assert [failure.index for failure in told.value.failures] == [(1, 0), (1, 1)]
     assert {failure.attempts for failure in told.value.failures} == {2}
     found = status(store)
@@ -55,6 +55,16 @@ def test_without_retries_it_is_not(waves_plan, tmp_path, caplog):
     with pytest.raises(SweepError, match="8 of 8 chunks failed"):
         run(plan, tmp_path / "store", retries=0)
     assert all(r.getMessage().endswith("given up after 1 attempt") for r in caplog.records)
+
+
+def test_an_interrupted_run_keeps_its_list_of_failures(waves_plan, tmp_path):
+    def interrupt(done, total, left):
+        if done == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(SweepInterrupted, match=r"interrupted after 5 of 8 chunks; .* keeps them"):
+        run(waves_plan("fails", {"bad": [BAD]}), tmp_path / "s", progress=interrupt)
+    assert [failure.index for failure in status(tmp_path / "s").failures] == [(1, 0), (1, 1)]
 
 
 def test_in_memory_the_error_holds_what_there_is(waves_plan):

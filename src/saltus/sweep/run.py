@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 Progress = Callable[[int, int, float | None], object]
 Outcomes = Iterator[tuple[Index, Any]]
 
+LOOK = 1.0  # s
+
 log = logging.getLogger("saltus.sweep")
 
 
@@ -66,7 +68,11 @@ def run(
         sweep = _Sweep(plan, sheets, progress, retries)
         try:
             sweep.fill(workers, scheduler)
-        except KeyboardInterrupt:
+        except BaseException as error:
+            if sweep.failures:
+                sheets.note(sweep.failures.values())
+            if not isinstance(error, KeyboardInterrupt):
+                raise
             kept = "nothing is kept without a store" if path is None else f"{path} keeps them: run the same again to go on"
             raise SweepInterrupted(f"interrupted after {sweep.done} of {sweep.total} chunks; {kept}") from None
         sweep.conclude()
@@ -82,6 +88,7 @@ class _Sweep:
         self.total = plan.layout.total
         self.done = self.before = self.total - len(self.queue)
         self.failures: dict[Index, Failure] = {}
+        self.noted = -LOOK
 
     def fill(self, workers: int | None, scheduler: str | None) -> None:
         """Compute and write until nothing is left that may be tried."""
@@ -97,7 +104,7 @@ class _Sweep:
                 self.sheets.write(index, checked(self.plan, index, outcome))
                 self.done += 1
                 if self.failures.pop(index, None):
-                    self.sheets.note(self.failures.values())
+                    self._note()
                 self._tell()
 
     def conclude(self) -> None:
@@ -107,26 +114,29 @@ class _Sweep:
             return
         first, *others = sorted(self.failures.values(), key=lambda failure: failure.index)
         more = f", and {len(others)} more" if others else ""
-        keeps = "the chunks that are done" if self.sheets.path is None else f"{self.sheets.path} keeps the others"
-        go_on = (
-            "are in the error's `dataset`" if self.sheets.path is None else "and the same run again computes only what is missing"
-        )
-        dataset = self.sheets.dataset() if self.sheets.path is None else None
-        raise SweepError(
-            f"{len(self.failures)} of {self.total} chunks failed: {first}{more}; {keeps} {go_on}", (first, *others), dataset
-        )
+        if self.sheets.path is None:
+            dataset, kept = self.sheets.dataset(), "the others are in the error's `dataset`"
+        else:
+            dataset, kept = None, f"{self.sheets.path} keeps the others, and the same run again computes only what is missing"
+        sentence = f"{len(self.failures)} of {self.total} chunks failed: {first}{more}; {kept}"
+        raise SweepError(sentence, (first, *others), dataset)
 
     def _fail(self, index: Index, raised: Raised) -> None:
         attempts = self.failures[index].attempts + 1 if index in self.failures else 1
         failure = self.failures[index] = Failure(index, self.plan.place(index), raised.error, attempts)
         again = attempts <= self.retries
-        log.warning(
-            "%s; %s", failure, "it is tried again" if again else f"given up after {attempts} attempt{'s' * (attempts > 1)}"
-        )
-        log.debug("%s", raised.traceback)
         if again:
             self.queue.append(index)
-        self.sheets.note(self.failures.values())
+        given_up = f"given up after {attempts} attempt{'s' * (attempts > 1)}"
+        log.warning("%s; %s", failure, "it is tried again" if again else given_up)
+        log.debug("%s", raised.traceback)
+        self._note()
+
+    def _note(self) -> None:
+        """Keep the list of failures, which may be long, but not more often than someone would look."""
+        if time.monotonic() - self.noted > LOOK:
+            self.sheets.note(self.failures.values())
+            self.noted = time.monotonic()
 
     def _tell(self) -> None:
         if self.progress is None:

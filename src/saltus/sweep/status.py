@@ -19,8 +19,8 @@ from saltus.sweep.layout import Layout
 class Status:
     """How far a sweep is.
 
-    `done` and `failed` count chunks, of `total`; a failed chunk is one that an earlier run gave up. `bytes` is the size of the
-    store's files. `started` is when the store was made, `updated` when the last chunk was written (None: none yet).
+    `done` and `failed` count chunks, of `total`; a failed chunk is one that raised when it was last tried. `bytes` is the size of
+    the store's files. `started` is when the store was made, `updated` when the last chunk was written (None: none yet).
     `running` is whether a run on this machine is writing to it, None where the file system does not tell.
     """
 
@@ -38,7 +38,7 @@ class Status:
 
     @property
     def failed(self) -> int:
-        """The number of chunks that were given up."""
+        """The number of chunks that failed."""
         return len(self.failures)
 
     @property
@@ -114,7 +114,8 @@ def _failures(path: Path) -> tuple[Failure, ...]:
         entries = json.loads((path / files.FAILURES).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return ()
-    return tuple(Failure(tuple(e["index"]), e["place"], e["error"], e["attempts"]) for e in entries)
+    failures = (Failure(tuple(e["index"]), e["place"], e["error"], e["attempts"]) for e in entries)
+    return tuple(sorted(failures, key=lambda failure: failure.index))  # workers fail in any order
 
 
 def _size(path: Path) -> int:
