@@ -133,10 +133,10 @@ def test_chunks_cover_every_point_once(sizes):
 
 
 def test_arguments_reach_the_function_as_json_gives_them_back():
-    given_ = {"pair": (1, 2.5), "flag": True, "none": None, "number": np.float64(0.1)}
+    given_ = {"pair": (1, 2.5), "flag": True, "none": None, "number": np.float64(0.1), "count": np.int64(3), "on": np.bool_(True)}
     there = plain(given_, "arguments")
-    assert there == {"pair": [1, 2.5], "flag": True, "none": None, "number": 0.1}
-    assert type(there["number"]) is float
+    assert there == {"pair": [1, 2.5], "flag": True, "none": None, "number": 0.1, "count": 3, "on": True}
+    assert [type(there[name]) for name in ("number", "count", "on")] == [float, int, bool]
 
 
 def test_differences_look_into_texts_that_are_json():

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console, Group
+from rich.console import Console
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
@@ -31,8 +31,8 @@ def print_status(path: Path) -> None:
     console = Console(highlight=False)
     console.print(f"[bold]{found.kind.capitalize().replace('_', ' ')}[/] ", end="")
     console.print(f"in {path}", markup=False, soft_wrap=True)
-    bar = ProgressBar(total=found.total, completed=found.done, width=WIDTH)
-    console.print(bar if console.is_terminal else Group(), end="\n" if console.is_terminal else "")
+    if console.is_terminal:
+        console.print(ProgressBar(total=found.total, completed=found.done, width=WIDTH))
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")

@@ -7,17 +7,21 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from saltus.errors import ParameterError
 
 LONGEST = 60  # characters of a value quoted in a sentence
 
 
 def plain(value: Any, place: str) -> Any:
-    """`value` as JSON gives it back: mappings to dicts, tuples to lists, numbers that are subclasses to plain ones.
+    """`value` as JSON gives it back: mappings to dicts, tuples to lists, NumPy's numbers to Python's.
 
     Raises:
         ParameterError: something that JSON does not have; `place` and the keys below it say where.
     """
+    if isinstance(value, np.generic):
+        value = value.item()
     if value is None or isinstance(value, bool | str):
         return value
     if isinstance(value, int):
