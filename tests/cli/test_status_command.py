@@ -45,7 +45,7 @@ def test_a_complete_sweep(plan, told, tmp_path):
     lines = told(tmp_path / "store")
     assert lines[0] == f"Stability chart in {tmp_path / 'store'}"
     assert "chunks 6 of 6 done (100 %)" in lines
-    assert "grid 6 a x 4 b" in lines
+    assert "grid 6 along a, 4 along b" in lines
     assert lines[-1] == "The sweep is complete."
     assert any(line.startswith("size ") and line.endswith(" kB") for line in lines)
 

@@ -67,6 +67,11 @@ def returns(arguments, block):
     return result
 
 
+def kinds(arguments, block):
+    """A value of x as every kind of number."""
+    return {kind: block["x"].astype(kind) for kind in arguments["kinds"]}
+
+
 def greedy(arguments, block):
     """Spoils its arguments and its block."""
     result = waves({"hole": arguments["list"].pop()}, block)

@@ -10,7 +10,7 @@ import sweep_toys
 import xarray as xr
 
 from saltus.errors import ParameterError, SweepError
-from saltus.sweep import files, open_store, run
+from saltus.sweep import Plan, Variable, files, open_store, run
 from saltus.sweep.store import Store, opened
 
 
@@ -148,9 +148,22 @@ def test_an_incomplete_store_is_read_when_asked_for(waves_plan, tmp_path):
     assert (partial["count"][2:] >= 0).all()
 
 
-def test_an_interval_is_no_time_difference(waves_plan, tmp_path):
-    from saltus.sweep import Variable
+def test_every_kind_of_number_comes_back_as_it_was(tmp_path):
+    x, kinds = np.linspace(-3.0, 100.0, 5), ["bool", "i1", "i8", "f2", "f4", "c8", "c16"]
+    variables = {kind: Variable(dtype=kind) for kind in kinds}
+    plan = Plan(function="sweep_toys:kinds", arguments={"kinds": kinds}, axes={"x": x}, chunk={"x": 2}, variables=variables)
+    for dataset in (run(plan), run(plan, tmp_path / "s")):
+        for kind in kinds:
+            assert dataset[kind].dtype == np.dtype(kind)
+            np.testing.assert_array_equal(dataset[kind], x.astype(kind))
+    for kind in kinds:
+        files.chunk_file(tmp_path / "s", kind, (1,), 0).unlink()
+    partial = open_store(tmp_path / "s", partial=True)
+    for kind in kinds:
+        assert np.isnan(partial[kind][2]) if kind[0] in "fc" else partial[kind][2] == 0
 
+
+def test_an_interval_is_no_time_difference(waves_plan, tmp_path):
     variables = {
         "height": Variable(attrs={"units": "s"}),
         "count": Variable(dtype="i4", extra=(("k", 3),), attrs={"units": "days"}),

@@ -32,7 +32,7 @@ def print_status(path: Path) -> None:
     console.print(f"[bold]{found.kind.capitalize().replace('_', ' ')}[/] ", end="")
     console.print(f"in {path}", markup=False, soft_wrap=True)
     if console.is_terminal:
-        console.print(ProgressBar(total=found.total, completed=found.done, width=WIDTH))
+        console.print(ProgressBar(total=found.total, completed=found.done, width=WIDTH), "", sep="\n")
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
@@ -45,7 +45,7 @@ def print_status(path: Path) -> None:
 def rows(found: Status) -> Iterator[tuple[str, str]]:
     """What there is to say, line by line."""
     yield "chunks", f"{found.done} of {found.total} done ({100 * found.done // found.total} %)"
-    yield "grid", " x ".join(f"{size} {name}" for name, size in found.sizes.items())
+    yield "grid", ", ".join(f"{size} along {name}" for name, size in found.sizes.items())
     yield "size", size(found.bytes)
     yield "begun", moment(found.started)
     yield "last written", moment(found.updated) if found.updated else "nothing yet"
