@@ -57,6 +57,7 @@ def saltus(
 
     [cyan]saltus reproduce[/]             the paper's figures, tables and claims
     [cyan]saltus simulate study.toml[/]   the motion of a system of your own
+    [cyan]saltus run study.toml[/]        its spectra, diagrams, basins and charts
     [cyan]saltus info study.toml[/]       what is known of it in closed form
     """
 
@@ -81,6 +82,61 @@ def simulate(
         from saltus.cli.simulate import simulate_study
 
         simulate_study(study, output, plot)
+
+
+@app.command()
+def run(
+    study: Study,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The folder to write to.", show_default="results/<name of the study>")
+    ] = None,
+    plot: Annotated[bool, typer.Option(help="Draw what is computed.")] = True,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786, whose workers compute charts."),
+    ] = None,
+) -> None:
+    r"""Answer all that a study asks: a motion, a diagram, a chart, basins, ...
+
+    The study's tables say what: \[simulate], \[phase_portrait],
+    \[response_spectrum], \[bifurcation_diagram], \[attractors], \[basins],
+    \[stability_chart]. A chart that was stopped goes on where it was.
+
+    Example: [cyan]saltus run study.toml --output runs/first[/]
+    """
+    with guarded():
+        from saltus.cli.run import run_study
+
+        run_study(study, output, plot, scheduler)
+
+
+@app.command()
+def plot(
+    store: Annotated[Path, typer.Argument(metavar="STORE", help="A .nc file or .zarr folder that saltus has written.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The folder to write to.", show_default="beside it")
+    ] = None,
+) -> None:
+    """Draw a result again.
+
+    Example: [cyan]saltus plot results/study/stability_chart.zarr[/]
+    """
+    with guarded():
+        from saltus.cli.plot import plot_store
+
+        plot_store(store, output)
+
+
+@app.command()
+def status(store: Annotated[Path, typer.Argument(metavar="STORE", help="The .zarr folder of a sweep.")]) -> None:
+    """Say how far a sweep is: running, stopped or complete, and what has failed.
+
+    Example: [cyan]saltus status results/study/stability_chart.zarr[/]
+    """
+    with guarded():
+        from saltus.cli.status import print_status
+
+        print_status(store)
 
 
 @app.command()

@@ -1,25 +1,28 @@
-"""A study: a system and how to simulate it."""
+"""A study: a system, how to simulate it, and what else is asked of it."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from saltus.config.asks import ASKS, Ask, read_ask
 from saltus.config.fields import call
 from saltus.config.loads import read_load
 from saltus.config.settings import Settings, read_settings
 from saltus.config.source import Source, read_source
 from saltus.config.types import read_part
-from saltus.errors import MotionError, TraceError, near
+from saltus.errors import MotionError, ParameterError, SweepError, TraceError, near
 from saltus.systems import Load, System, VelocityReduction
 
-PARTS = ("model", "load", "impact", "simulate")
+PARTS = ("model", "load", "impact", "simulate", *ASKS)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A system and how to simulate it, as a TOML file gives them.
+    """A system, how to simulate it and what else is asked of it, as a TOML file gives them.
 
     `load_study("study.toml").run()` is `saltus.simulate` with the file's settings.
     """
@@ -27,6 +30,7 @@ class Study:
     name: str
     system: System
     simulate: Settings | None = None  # None where the file has no [simulate]
+    asks: tuple[Ask, ...] = ()  # the other questions, in the order of the file
     source: Source
 
     def settings(self) -> Settings:
@@ -55,6 +59,22 @@ class Study:
         except (MotionError, TraceError) as error:
             raise type(error)(f"{self.source.path}: {error}") from error
 
+    def answer(self, ask: Ask, function: Callable[..., Any], **more: Any) -> Any:
+        """`function(system, ...)` with the arguments of a question, and `more`.
+
+        Raises:
+            ParameterError: the function refuses an argument, told at its place in the file.
+            MotionError, TraceError, SweepError: as the function raises them, with the file's name.
+        """
+        try:
+            return function(self.system, **ask.options, **more)
+        except ParameterError as error:
+            named = re.findall(r"\w+", str(error))
+            key = next((name for name in named if name in ask.options), None)
+            self.source.refuse((ask.kind,) if key is None else (ask.kind, key), f"{ask.kind}: {error}")
+        except (MotionError, TraceError, SweepError) as error:
+            raise type(error)(f"{self.source.path}, {ask.kind}: {error}") from error
+
 
 def load_study(path: Path | str) -> Study:
     """The study in the TOML file at `path`, checked in full.
@@ -73,4 +93,5 @@ def load_study(path: Path | str) -> Study:
     impact = read_part(source, "impact", tables["impact"]) if "impact" in tables else VelocityReduction()
     system: System = call(source, System, model=model, load=load, impact=impact)
     settings = read_settings(source, system, tables["simulate"]) if "simulate" in tables else None
-    return Study(name=source.path.stem, system=system, simulate=settings, source=source)
+    asks = tuple(read_ask(source, system, name, tables[name]) for name in tables if name in ASKS)
+    return Study(name=source.path.stem, system=system, simulate=settings, asks=asks, source=source)

@@ -1,5 +1,8 @@
-"""What one asks: response spectra and bifurcation diagrams."""
+"""What one asks: phase portraits, response spectra, bifurcation diagrams with their bands of chaos, stability charts."""
 
+from saltus.studies.bands import chaotic_bands
+from saltus.studies.chart import stability_chart
+from saltus.studies.portrait import phase_portrait
 from saltus.studies.spectrum import bifurcation_diagram, response_spectrum
 
-__all__ = ["bifurcation_diagram", "response_spectrum"]
+__all__ = ["bifurcation_diagram", "chaotic_bands", "phase_portrait", "response_spectrum", "stability_chart"]

@@ -184,8 +184,11 @@ class _Search:
         stop = np.array(result["stop"].attrs["flag_meanings"].split())[result["stop"].values]
         strobes = np.stack([result[f"sampled_{name}"].values, result["sampled_velocity"].values], axis=-1)
         peaks = np.maximum(np.abs(result[f"largest_{name}"].values), np.abs(result[f"smallest_{name}"].values))
-        at_contact = result["side"].values == 0
-        return _Ends((stop == "horizon") & ~at_contact, strobes, peaks)
+        moving = (stop == "horizon") & (result["side"].values != 0)
+        shown = np.where(moving, KEPT, np.maximum(result["cycle"].values, 1))  # of what has settled its cycle alone
+        early = np.arange(strobes.shape[2]) < strobes.shape[2] - shown[..., None]
+        strobes[early], peaks[early] = np.nan, np.nan
+        return _Ends(moving, strobes, peaks)
 
     def spread(self, tried: Tried) -> Tried:
         """Carry chaos on to neighbouring values of the grid: motions begun on it, as long as they find more."""

@@ -1,0 +1,110 @@
+"""What a study asks for besides a motion: a table for each question, whose keys are the arguments of its function."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, create_model
+
+from saltus.config.fields import Number, Switch, Table, Text, Whole, check_table, read_angle, read_number, show
+from saltus.config.source import Source
+from saltus.systems import System
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ask:
+    """One question: its kind, which is the name of its table, and the arguments given in it."""
+
+    kind: str
+    options: dict[str, Any]
+
+
+def read_grid(value: Any) -> np.ndarray:
+    """Numbers (or angles) from a list, or from a table such as { from = 0, to = 0.5, count = 101 }."""
+    if isinstance(value, list) and value:
+        return np.array([read_angle(item) for item in value])
+    if isinstance(value, dict):
+        if sorted(value) != ["count", "from", "to"]:
+            raise ValueError(f"needs from, to and count, and has {', '.join(map(str, value)) or 'none of them'}")
+        count = read_number(value["count"])
+        if count != int(count) or not 2 <= count <= 100_000:
+            raise ValueError(f"needs a whole count from 2 to 100000, got {show(value['count'])}")
+        return np.linspace(read_angle(value["from"]), read_angle(value["to"]), int(count))
+    raise ValueError(f"must be a list of numbers or a table such as {{ from = 0, to = 0.5, count = 101 }}, got {show(value)}")
+
+
+def read_pair(value: Any) -> tuple[float, float]:
+    """Two numbers."""
+    if not isinstance(value, list) or len(value) != 2:
+        raise ValueError(f"must be a list of two numbers, got {show(value)}")
+    return read_angle(value[0]), read_angle(value[1])
+
+
+def read_pairs(value: Any) -> list[tuple[float, float]]:
+    """A list of pairs of numbers."""
+    if not isinstance(value, list) or not value:
+        raise ValueError(f"must be a list of pairs of numbers, got {show(value)}")
+    return [read_pair(item) for item in value]
+
+
+def read_paths(value: Any) -> tuple[str, str]:
+    """Two dotted paths."""
+    if not isinstance(value, list) or len(value) != 2 or not all(isinstance(item, str) for item in value):
+        raise ValueError(f'must be two dotted paths, such as ["load.horizontal.amplitude", "load.vertical"], got {show(value)}')
+    return value[0], value[1]
+
+
+Grid = Annotated[Any, BeforeValidator(read_grid)]
+Pair = Annotated[Any, BeforeValidator(read_pair)]
+Pairs = Annotated[Any, BeforeValidator(read_pairs)]
+Paths = Annotated[Any, BeforeValidator(read_paths)]
+
+DIAGRAM: dict[str, Any] = {
+    "path": Text,
+    "bounds": Pair,
+    "max_period": Whole,
+    "values": Grid,
+    "starts": Whole,
+    "region": Pair,
+    "seed": Whole,
+    "repelling": Whole,
+    "switch": Switch,
+    "step": Number,
+    "bands": Whole,
+}
+ASKS: dict[str, dict[str, Any]] = {
+    "phase_portrait": {"window": Pairs, "starts": Pairs, "duration": Number, "samples": Whole, "seed": Whole},
+    "response_spectrum": DIAGRAM,
+    "bifurcation_diagram": DIAGRAM,
+    "attractors": {"region": Pair, "starts": Whole, "longest": Whole, "seed": Whole, "tol": Number},
+    "basins": {"velocity": Grid, "periods": Whole, "within": Number, "tol": Number},
+    "stability_chart": {
+        "horizontal": Grid,
+        "vertical": Grid,
+        "paths": Paths,
+        "longest": Whole,
+        "starts": Whole,
+        "region": Pair,
+        "least": Number,
+        "periods": Whole,
+        "tol": Number,
+        "seed": Whole,
+        "rows": Whole,
+    },
+}
+
+
+def read_ask(source: Source, system: System, kind: str, data: Any) -> Ask:
+    """The question in a table.
+
+    Raises:
+        ParameterError: with the place of what is wrong.
+    """
+    fields = dict(ASKS[kind])
+    if kind == "basins":
+        fields |= dict.fromkeys(system.model.coordinates, Grid)
+    entries: dict[str, Any] = {name: (value, None) for name, value in fields.items()}
+    table = create_model(kind, __base__=Table, **entries)
+    return Ask(kind=kind, options=check_table(source, (kind,), data, table))
