@@ -75,7 +75,8 @@ def stability_chart(
         A Dataset over (vertical, horizontal): `amplitude` of the largest motion (rad, NaN where there is none), its `period`,
         `smallest_amplitude`, the `count` of motions (mirror images count once), whether some start was captured at `rest`,
         and how many starts ended on `tiny` motions, or `unsettled`; with `motion` up to 8 motions by falling amplitude:
-        `motion_amplitude`, `motion_period`, `motion_crossings` (impacts in a period of the motion), and the state at phase 0,
+        `motion_amplitude`, `motion_other` (the extremum on the other side, counted positive there; that of a symmetric motion is
+        its amplitude), `motion_period`, `motion_crossings` (impacts in a period of the motion), and the state at phase 0,
         `motion_theta` and `motion_velocity`. For the metainterface also `beyond_line` and `beyond_kinematic`: whether the largest
         motion goes beyond pi - beta0, or 2 (pi - beta0) (erratum 20).
 
@@ -146,6 +147,7 @@ def _variables() -> dict[str, Any]:
         "tiny": variable("i2", "1", "starts that end on motions too small to count"),
         "unsettled": variable("i2", "1", "starts that do not settle"),
         "motion_amplitude": variable("f8", "rad", "amplitude of each motion", each),
+        "motion_other": variable("f8", "rad", "extremum of each motion on the other side, as its amplitude if symmetric", each),
         "motion_period": variable("i2", "1", "forcing periods of each motion", each),
         "motion_crossings": variable("i4", "1", "impacts in a period of each motion", each),
         "motion_theta": variable("f8", "rad", "theta of each motion at phase 0", each),

@@ -19,6 +19,7 @@ from saltus.systems import System
 MOTIONS = 8  # kept of each cell, the largest ones
 INNERMOST = 1e-2  # every other start lies in a smaller copy of the region, down to this part of it
 STAGES = (1 / 12, 1 / 12, 1 / 6, 2 / 3)  # of the forcing periods, after which motions that have come together go on as one
+PATIENCE, FEW = 4, 3  # times the periods for what is left of a cell, if no more than so many: slow, and not chaotic
 TOGETHER = 1e-3  # of their amplitude: motions so near to one another at the same phase become one
 EQUAL = 1e-4  # of the amplitude: settled motions with the same extrema, or the mirror images of these, are one
 ALIKE = 0.1  # of the amplitude: where a cell has such a motion already a neighbour's is no news
@@ -112,7 +113,11 @@ def settle(task: Task, cell: np.ndarray, states: np.ndarray) -> Found:
     tracks = Tracks(cell, states, np.ones(len(cell), dtype=np.int64), np.full(len(cell), np.inf))
     ended = {name: np.zeros(task.size, dtype=np.int64) for name in ("captured", "tiny", "unsettled")}
     motions = [np.empty(0, MOTION)]
-    for share in STAGES:
+    for share in (*STAGES, PATIENCE):
+        if share == PATIENCE:
+            many = np.bincount(tracks.cell, minlength=task.size)[tracks.cell] > FEW
+            _count(ended["unsettled"], tracks.only(many))
+            tracks = tracks.only(~many)
         tracks, settled, captured = _follow(task, tracks, math.ceil(share * task.periods), motions)
         small = settled & (tracks.amplitude < task.least)
         _count(ended["captured"], tracks.only(captured))
@@ -246,7 +251,7 @@ def table(found: Found, motions: np.ndarray, size: int) -> dict[str, np.ndarray]
     kept = rank < MOTIONS
     place = motions["cell"][kept], rank[kept]
     columns = {}
-    for name, empty in (("amplitude", np.nan), ("period", 0), ("crossings", 0)):
+    for name, empty in (("amplitude", np.nan), ("other", np.nan), ("period", 0), ("crossings", 0)):
         columns[name] = np.full((size, MOTIONS), empty)
         columns[name][place] = motions[name][kept]
     for i, name in enumerate(("theta", "velocity")):
