@@ -152,6 +152,7 @@ def _create(plan: Plan, path: Path) -> None:
         part = files.begin(path)
         try:
             _make(plan, files.zarr_store(part))
+            _sort(part / files.METADATA)
         except BaseException:
             shutil.rmtree(part, ignore_errors=True)
             raise
@@ -181,3 +182,10 @@ def _make(plan: Plan, store: Any) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that Zarr's specification does not have consolidated metadata yet; xarray reads it
         zarr.consolidate_metadata(store)
+
+
+def _sort(metadata: Path) -> None:
+    """Give the arrays' metadata an order: Zarr before 3.1.3 takes them as the disk lists them, which is another each time."""
+    group = json.loads(metadata.read_text(encoding="utf-8"))
+    group["consolidated_metadata"]["metadata"] = dict(sorted(group["consolidated_metadata"]["metadata"].items()))
+    files.write_whole(metadata, json.dumps(group, indent=2).encode())
