@@ -26,8 +26,9 @@ def weights(count: int) -> np.ndarray:
 def average(series: np.ndarray) -> np.ndarray:
     """The weighted average along the first axis, (periods, ...) -> (...); -inf where an entry is."""
     lost = np.isneginf(series).any(axis=0)
-    mean = np.tensordot(weights(len(series)), np.where(np.isneginf(series), 0.0, series), axes=1)
-    return np.where(lost, -np.inf, mean)
+    share = weights(len(series)).reshape(-1, *[1] * (series.ndim - 1))
+    terms = share * np.where(np.isneginf(series), 0.0, series)
+    return np.where(lost, -np.inf, np.cumsum(terms, axis=0)[-1])  # added one by one, whatever else is in the array
 
 
 def uncertainty(series: np.ndarray) -> np.ndarray:

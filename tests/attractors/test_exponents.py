@@ -1,0 +1,242 @@
+"""Lyapunov exponents against linear theory, the multipliers of orbits, the mean divergence, and each other's methods."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from verdict_cases import spread, under_force, wall
+
+import saltus
+from saltus import ParameterError
+from saltus.attractors import lyapunov_many, lyapunov_spectrum
+from saltus.attractors.divergence import Contraction, impact_factor
+from saltus.attractors.pieces import LONGEST, piece_count
+from saltus.theory import equilibria
+
+
+@pytest.mark.parametrize(("damping", "stiffness"), [(0.1, 1.0), (0.3, 4.0), (3.0, 1.0)])
+def test_they_are_exact_below_the_wall_of_a_piecewise_linear_oscillator(damping, stiffness):
+    """The real parts of the roots of s^2 + c s + k, a pair in two of the cases."""
+    expected = np.sort(np.roots([1.0, damping, stiffness]).real)[::-1]
+    found = lyapunov_spectrum(wall(damping, stiffness), x=0.1, periods=400, transient=10)
+    np.testing.assert_allclose(found.values, expected, rtol=0, atol=5e-9)
+    assert (np.abs(found.values - expected) <= found.errors + 5e-9).all()
+    assert found.stroboscopic == pytest.approx(expected[0], abs=1e-7)
+    assert found.agrees
+    assert found.divergence == pytest.approx(-damping, abs=1e-12)
+    assert found.note is None
+
+
+@pytest.mark.parametrize("frequency", [None, 1.3])
+def test_they_are_the_eigenvalues_of_a_damped_pendulum_at_rest(frequency):
+    """At the deformed equilibrium under constant loads, whose eigenvalues `theory` has; with and without a clock."""
+    model = saltus.Metainterface(beta0=math.radians(80), damping=0.1)
+    constant = saltus.System(model=model, load=saltus.Load(vertical=0.5))
+    system = constant if frequency is None else under_force(frequency, 0.0, vertical=0.5)
+    equilibrium = next(q for q in equilibria(constant) if q.stable and q.theta > 0)
+    found = lyapunov_spectrum(system, theta=equilibrium.theta, periods=300, transient=0)
+    np.testing.assert_allclose(found.values, np.real(equilibrium.eigenvalues), rtol=0, atol=1e-8)
+    assert found.duration == pytest.approx(300 * (1.0 if frequency is None else 2 * math.pi / frequency))
+
+
+def test_on_an_orbit_they_are_the_logarithms_of_its_multipliers():
+    """Near the fold at Hhat = 0.02199 the multipliers are real and unequal; they come from the orbit's own equations."""
+    near = saltus.find_orbit(under_force(1.0, 0.0225), theta=-2.5, velocity=-0.5).state
+    orbit = saltus.find_orbit(under_force(1.0, 0.0221), theta=near[0], velocity=near[1])
+    theta, velocity = orbit.state
+    found = lyapunov_spectrum(orbit.system, theta=theta, velocity=velocity, periods=200, transient=0)
+    expected = np.log(np.abs(orbit.multipliers)) / (2 * math.pi)
+    assert expected[0] - expected[1] > 0.05
+    np.testing.assert_allclose(found.values, expected, rtol=0, atol=1e-7)
+    assert found.stroboscopic == pytest.approx(expected[0], abs=1e-5)
+
+
+@pytest.mark.parametrize(("frequency", "amplitude"), [(1.6, 3.0), (0.38, 0.2)])
+def test_in_chaos_they_add_up_to_minus_the_damping_and_the_map_has_the_same_largest_one(frequency, amplitude):
+    found = lyapunov_spectrum(under_force(frequency, amplitude), theta=0.3, periods=300, transient=100)
+    assert found.values.sum() == pytest.approx(-0.1, abs=1e-8)
+    assert found.sum_defect < 1e-8
+    assert found.largest_condition < 1e6
+    assert found.positive
+    assert found.agrees
+    assert abs(found.stroboscopic - found.values[0]) < 0.25 * found.values[0]  # and the bars are not endless
+
+
+def test_with_unequal_layers_and_losses_they_add_up_to_the_mean_divergence():
+    """The divergence is that of the crossings: 2 ln e an impact, -C c / (1 + m) on the lower side, -C on the upper one."""
+    system = under_force(1.6, 3.0, e=0.95, mass_ratio=0.3, stiffness_ratio=1.4, dissipation_ratio=2.0)
+    found = lyapunov_spectrum(system, theta=0.5, periods=64, transient=50)
+    assert found.sum_defect < 1e-8
+    assert found.divergence < -0.11
+    motion = saltus.simulate(system, theta=0.5, duration=40.0)
+    crossings = motion.crossings
+    bounds = np.concatenate([[0.0], crossings.time, [40.0]])
+    sides = np.append(crossings.side, motion.side)
+    lower, upper = (np.diff(bounds)[sides == s].sum() for s in (1, -1))
+    expected = 2 * len(crossings) * math.log(0.95) - 0.1 * (2.0 / 1.3 * lower + upper)
+    assert Contraction(system).along(motion) == pytest.approx(expected, abs=1e-12)
+
+
+def test_the_contraction_of_an_impact_that_depends_on_the_ground_is_that_of_its_slope():
+    """T+ = r T-, with a moving ground: (v+ dv+/dv-) / v- by differences of the law itself."""
+    system = saltus.System(
+        model=saltus.Metainterface(beta0=math.radians(80), damping=0.1),
+        load=saltus.Load(frequency=1.0, ground_horizontal=saltus.Harmonic(amplitude=0.1), vertical=-0.5),
+        impact=saltus.EnergyRestitution(0.9),
+    )
+    motion = saltus.simulate(system, theta=0.6, duration=8.0)
+    law, model, load = system.impact, system.model, system.load
+    expected = -0.1 * 8.0
+    for t, s, v, after in zip(
+        *(getattr(motion.crossings, n) for n in ("time", "side", "velocity_before", "velocity_after")), strict=True
+    ):
+        step = 1e-5
+        ends = [float(law.velocity_after(model, t, v + d, s, -s, load)) for d in (-step, step)]
+        expected += math.log((ends[1] - ends[0]) / (2 * step) * after / v)
+    assert len(motion.crossings) > 1
+    assert Contraction(system).along(motion) == pytest.approx(expected, abs=1e-7)
+
+
+def test_the_lanes_have_the_same_exponents_as_the_single_motion():
+    """A settled motion, one in the transient and one with a period in many pieces, under losses and unequal layers."""
+    systems = [under_force(w, 0.5, e=0.95, mass_ratio=0.3) for w in (0.15, 0.7, 1.0)]
+    assert [piece_count(s.load.period) for s in systems] == [7, 2, 1]
+    many = lyapunov_many(systems[0], {"load.frequency": [0.15, 0.7, 1.0]}, theta=0.9, periods=40, transient=10, tol=1e-12)
+    for i, system in enumerate(systems):
+        one = lyapunov_spectrum(system, theta=0.9, periods=40, transient=10, shadow=False)
+        np.testing.assert_allclose(many.exponent[i], one.values, rtol=0, atol=1e-7)
+        np.testing.assert_allclose(many.error[i], one.errors, rtol=1e-4, atol=1e-9)
+        np.testing.assert_allclose([many.at_half[i], many.later_half[i]], one.halves, rtol=0, atol=1e-7)
+
+
+def test_the_values_that_are_known_of_the_three_chaotic_motions():
+    """Issue text: about +0.03, +0.12 and +0.2 per unit of time."""
+    where = {"load.frequency": [0.38, 1.2, 1.6], "load.horizontal.amplitude": [0.2, 2.0, 3.0]}
+    found = lyapunov_many(under_force(1.0, 1.0), where, theta=0.3, periods=600)
+    assert found.positive.all()
+    assert (found.cycle == 0).all()
+    known = np.array([0.03, 0.12, 0.2])
+    assert (np.abs(found.exponent[:, 0] - known) < 0.15 * known + found.error[:, 0]).all()
+    np.testing.assert_allclose(found.exponent.sum("index"), -0.1, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("frequency", [1.0, 1.1])
+def test_chaos_and_a_periodic_motion_coexist_at_large_amplitude(frequency):
+    """Hhat = 3, as the paper's piercing of the chaotic band says; after 1200 periods, from 24 states."""
+    states = spread(24)
+    found = lyapunov_many(
+        under_force(frequency, 3.0), theta=states[:, 0], velocity=states[:, 1], periods=200, transient=1000, tol=1e-10
+    )
+    chaotic = found.positive & (found.cycle == 0)
+    assert chaotic.sum() >= 3
+    assert (found.cycle > 0).sum() >= 3
+    assert (found.exponent[:, 0].where(found.cycle > 0, -1.0) < -0.01).all()
+
+
+def test_error_bars_hold_between_independent_motions_on_one_attractor():
+    """The exponents of 64 motions scatter about their common mean within their bars in 95 of 100 cases; 85 at the least here."""
+    states = spread(64, 1.0)
+    found = lyapunov_many(under_force(1.6, 3.0), theta=states[:, 0], velocity=states[:, 1], periods=200, transient=100, tol=1e-10)
+    apart = np.abs(found.exponent[:, 0] - found.exponent[:, 0].mean())
+    assert (apart < found.error[:, 0]).mean() > 0.85
+    scatter = float(found.exponent[:, 0].std())
+    assert 1.0 < float(found.error[:, 0].mean()) / scatter < 4.0
+
+
+def test_growth_by_shear_alone_is_not_taken_for_chaos():
+    """Without damping, on a torus, derivatives grow in proportion to the time; in a longer run the exponent falls."""
+    system = under_force(1.3, 0.05, damping=0.0)
+    short, long = (lyapunov_spectrum(system, theta=0.5, periods=n, transient=100, shadow=False) for n in (64, 400))
+    assert short.values[0] > 0.0
+    assert long.values[0] < 0.5 * short.values[0]
+    assert not short.positive
+    assert not long.positive
+    assert long.values.sum() == pytest.approx(0.0, abs=1e-8)
+
+
+def test_rest_with_a_loss_at_impacts_leaves_nothing():
+    found = lyapunov_spectrum(under_force(0.5, 0.05, e=0.5), theta=0.1, periods=32, transient=20)
+    assert np.isneginf(found.values).all()
+    assert (found.errors == 0.0).all()
+    assert "rests at contact" in found.note
+    many = lyapunov_many(under_force(0.5, 0.05), {"impact.e": [0.5, 1.0]}, theta=0.1, periods=32, transient=100)
+    assert np.isneginf(many.exponent[0]).all()
+    assert (many.ending == 1).all()
+
+
+def test_impacts_that_lose_nothing_have_no_exponents_at_rest():
+    """The motion nears rest as exp(-C t / 3), but its phase is lost, and rest itself has no derivative."""
+    for theta in (0.1, 0.0):
+        found = lyapunov_spectrum(under_force(0.5, 0.05), theta=theta, periods=32, transient=150)
+        assert np.isnan(found.values).all()
+        assert "lose nothing" in found.note
+        assert math.isnan(found.sum_defect)
+    many = lyapunov_many(under_force(0.5, 0.05), theta=[0.1, 0.05], periods=32, transient=100)
+    assert np.isnan(many.exponent).all()
+
+
+def test_a_periodic_rest_has_exponents_of_minus_infinity():
+    """A loss at impacts, and a load that pulls the system off its contact once in a while: it has rested before each release."""
+    found = lyapunov_spectrum(under_force(0.05, 0.12, e=0.3), theta=0.05, periods=32, transient=2)
+    assert np.isneginf(found.values).all()
+
+
+def test_results_are_labelled_and_do_not_depend_on_what_else_is_computed():
+    amplitudes = xr.DataArray([0.4, 0.5, 3.0], dims="amplitude")
+    starts = xr.DataArray([0.3, 0.9], dims="theta0")
+    found = lyapunov_many(under_force(1.0, 1.0), {"load.horizontal.amplitude": amplitudes}, theta=starts, periods=32, transient=5)
+    assert found.exponent.dims == ("theta0", "amplitude", "index")
+    assert all("units" in variable.attrs for variable in found.data_vars.values())
+    assert saltus.System.from_json(found.attrs["system"]) == under_force(1.0, 1.0)
+    alone = lyapunov_many(under_force(1.0, 3.0), theta=[0.9], periods=32, transient=5)
+    np.testing.assert_array_equal(found.exponent[1, 2], alone.exponent[0])
+
+
+def test_progress_goes_from_nothing_to_all():
+    for follow in (lyapunov_many, lyapunov_spectrum):
+        told = []
+        follow(under_force(1.0, 0.5), theta=0.3, periods=64, transient=5, progress=told.append)
+        assert told == sorted(told)
+        assert told[-1] == 1.0
+
+
+def test_the_factor_of_impacts_is_that_of_the_law():
+    arrays = {"impact.e": np.array([0.5, 1.0])}
+    np.testing.assert_allclose(impact_factor(under_force(1.0, 0.5), arrays), [0.25, 1.0])
+    inelastic = under_force(1.0, 0.5).with_({"impact": saltus.InelasticImpact(), "model.mass_ratio": 0.3})
+    assert float(impact_factor(inelastic, {})) == pytest.approx(math.cos(math.radians(160)) ** 2 / 1.3)
+
+
+def test_pieces_are_short():
+    for length in (0.5, 6.4, 6.6, 63.0):
+        assert length / piece_count(length) <= LONGEST
+
+
+RECORD = saltus.Record([0.0, 1.0], [0.0, 1.0])
+
+
+@pytest.mark.parametrize("follow", [lyapunov_spectrum, lyapunov_many])
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        ({"periods": 31}, "periods must"),
+        ({"periods": 40.5}, "periods must be a whole number"),
+        ({"transient": -1}, "transient must"),
+        ({"system": "a system"}, "takes a System"),
+        ({"system": saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(horizontal=RECORD))}, "is a record"),
+        ({"theta": math.nan}, "theta must be"),
+        ({"phi": 0.3}, "no coordinate 'phi'"),
+        ({"tol": 1.0}, "tol must"),
+    ],
+)
+def test_they_refuse_what_has_no_meaning(follow, changes, match):
+    arguments = {"system": under_force(1.0, 0.5), "theta": 0.3} | changes
+    with pytest.raises(ParameterError, match=match):
+        follow(arguments.pop("system"), **arguments)
+
+
+def test_lanes_refuse_two_coordinates():
+    system = saltus.System(model=saltus.TwoLayer(beta0=1.4), load=saltus.Load(vertical=-0.5))
+    with pytest.raises(ParameterError, match="one coordinate"):
+        lyapunov_many(system, theta_1=0.1, theta_2=-0.1, velocity=(0.0, 0.0))
