@@ -56,7 +56,8 @@ class Target:
             return np.where(finite, apart, np.inf)
         distance = np.full(points.shape[:-1], np.inf)
         for strobe in self.strobes:
-            distance = np.fmin(distance, np.abs(points - strobe).max(axis=-1))
+            apart = np.maximum(np.abs(points[..., 0] - strobe[0]), np.abs(points[..., 1] - strobe[1]))
+            np.fmin(distance, apart, out=distance)
         return distance
 
     def to_dict(self) -> dict[str, Any]:
@@ -134,6 +135,7 @@ class Attractors:
     members: tuple[Attractor, ...]
     states: np.ndarray  # (n, 2): the initial states that were sampled
     assigned: np.ndarray  # (n,): the label of the attractor on which each ends, or UNDECIDED
+    carried: np.ndarray  # (k,): the same of the further states that were given
     region: tuple[float, float]
     seed: int
     tol: float

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,7 @@ PERIODS = 500
 WITHIN = 1e-2
 MOST_NEW = 64  # states of cells that end nowhere known from which new attractors are looked for, at a time
 ROUNDS = 3
+SOON = 96  # forcing periods of the first stage; each later one doubles what has passed
 LAST = 64  # strobes of a motion that does not settle which must lie on a sampled set
 
 Grid = tuple[np.ndarray, np.ndarray]  # velocities, coordinates
@@ -111,41 +113,67 @@ def label_states(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The labels of states (n, 2), UNDECIDED where none is borne out, and the times to reach the attractors, (n,) each."""
     targets = tuple(targets)
-    ends = settle(system, states, periods, tol=tol)
-    label = np.full(len(states), UNDECIDED, dtype=np.int16)
-    if any(target.kind == "rest" for target in targets):
-        label[ends.rest] = REST
-    last = ends.strobes[:, -1]
-    for target in targets:
-        if target.kind == "periodic":
-            here = (ends.cycle > 0) & (target.distance(last) < NEAR * np.maximum(1.0, np.abs(last).max(axis=1)))
-        elif target.dense:
-            rows = np.flatnonzero(ends.moving & (label == UNDECIDED))
-            here = np.zeros(len(states), dtype=bool)
-            here[rows] = np.median(target.distance(ends.strobes[rows, -LAST:]), axis=1) < target.grain if rows.size else False
-        else:
-            continue
-        label[here] = target.label
-    time = np.full(len(states), np.nan)
-    for target in targets:
-        rows = np.flatnonzero(label == target.label)
-        if rows.size:
-            time[rows] = _time_to(target, states[rows], ends, rows, within)
+    label, time = np.empty(len(states), dtype=np.int16), np.empty(len(states))
+    size = max(256, MOST_STATES // periods)
+    for start in range(0, len(states), size):
+        part = slice(start, start + size)
+        label[part], time[part] = _block(system, targets, states[part], periods, within, tol)
     return label, time
 
 
-def _time_to(target: Target, states: np.ndarray, ends: Ends, rows: np.ndarray, within: float) -> np.ndarray:
-    """Forcing periods after which each motion stays near its attractor, up to its end."""
-    strobes, periods = ends.strobes[rows], ends.periods[rows]
-    done = np.isfinite(strobes[:, :, 0]).sum(axis=1)
-    apart = np.column_stack([target.distance(states), target.distance(strobes)])
-    near = max(within, target.grain)
-    kept = strobes.shape[1]
-    out = (apart > near) & np.isfinite(apart)
-    out[:, 1:] &= np.arange(kept) >= (kept - done)[:, None]
-    after = kept - np.argmax(out[:, ::-1], axis=1)  # the last column that is far, as a count of strobes kept until then
-    since = np.where(out.any(axis=1), np.maximum(after - (kept - done) + 1, 1), 0).astype(float)
-    return np.minimum(since, periods)
+def _block(
+    system: System, targets: tuple[Target, ...], states: np.ndarray, periods: int, within: float, tol: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same for as many states as fit into the memory, in stages: those that have settled go no further."""
+    label, time = np.full(len(states), UNDECIDED, dtype=np.int16), np.full(len(states), np.nan)
+    rows, history, done = np.arange(len(states)), states[:, None], 0
+    while rows.size and done < periods:
+        span = min(max(SOON, done), periods - done)
+        stage = settle(system, history[:, -1], span, tol=tol)
+        history = np.concatenate([history, stage.strobes], axis=1)
+        ends = replace(stage, strobes=history, periods=stage.periods + done)
+        done += span
+        label[rows] = _labelled(targets, ends, sampled=done == periods)
+        time[rows] = _times(targets, label[rows], ends, within)
+        rows, history = rows[ends.moving], history[ends.moving]
+    return label, time
+
+
+def _labelled(targets: tuple[Target, ...], ends: Ends, sampled: bool) -> np.ndarray:
+    """The labels of motions by their ends; with `sampled`, those that do not settle may lie on a set known by its points."""
+    label = np.full(len(ends.cycle), UNDECIDED, dtype=np.int16)
+    last = ends.strobes[:, -1]
+    for target in targets:
+        if target.kind == "rest":
+            label[ends.rest] = REST
+        elif target.kind == "periodic":
+            near = NEAR * np.maximum(1.0, np.abs(last).max(axis=1))
+            label[(ends.cycle > 0) & (target.distance(last) < near)] = target.label
+        elif sampled:
+            rows = np.flatnonzero(ends.moving & (label == UNDECIDED))
+            if rows.size:
+                apart = np.median(target.distance(ends.strobes[rows, -LAST:]), axis=1)
+                label[rows[apart < target.grain]] = target.label
+    return label
+
+
+def _times(targets: tuple[Target, ...], label: np.ndarray, ends: Ends, within: float) -> np.ndarray:
+    """Forcing periods after which each motion stays near its attractor, up to its end; nan where undecided.
+
+    The strobes begin with the initial state; nan stands for periods that were not needed.
+    """
+    time = np.full(len(label), np.nan)
+    for target in targets:
+        rows = np.flatnonzero(label == target.label)
+        if not rows.size:
+            continue
+        strobes = ends.strobes[rows]
+        known = np.isfinite(strobes[:, :, 0])
+        far = known & (target.distance(strobes) > max(within, target.grain))
+        last = far.shape[1] - 1 - np.argmax(far[:, ::-1], axis=1)
+        passed = np.cumsum(known, axis=1, dtype=np.int32)[np.arange(len(rows)), last]
+        time[rows] = np.minimum(np.where(far.any(axis=1), passed, 0), ends.periods[rows])
+    return time
 
 
 def _all_cells(
@@ -191,11 +219,7 @@ def _with_new(
         members += fresh
         all_states = np.stack([grid[1][columns], grid[0][rows]], axis=1)
         targets = tuple(member.target for member in fresh)
-        for start in range(0, len(rows), size := max(256, MOST_STATES // periods)):
-            part = slice(start, start + size)
-            label[rows[part], columns[part]], time[rows[part], columns[part]] = label_states(
-                clock, targets, all_states[part], periods, within, tol
-            )
+        label[rows, columns], time[rows, columns] = label_states(clock, targets, all_states, periods, within, tol)
     return tuple(sorted(members, key=lambda member: member.label)), label, time, reasons
 
 

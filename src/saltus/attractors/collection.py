@@ -142,11 +142,11 @@ class Collection:
 
     def judge(self, ends: Ends, i: int, longest: int) -> int:
         """The place of what motion i, which does not settle, moves on, by its verdict; FAILED if there is none."""
-        from saltus.attractors.verdict import classify
+        from saltus.attractors.classification import classify
 
         state = ends.strobes[i, -1]
         start: dict[str, Any] = {self.system.model.coordinates[0]: float(state[0]), "velocity": float(state[1])}
-        verdict = classify(self.system, **start, periods=VERDICT_PERIODS, longest=longest)
+        verdict = classify(self.system, **start, periods=VERDICT_PERIODS, longest=max(longest, 16))
         if verdict.kind == "rest":
             return self.add_rest()
         if verdict.kind == "periodic" and verdict.orbit is not None:

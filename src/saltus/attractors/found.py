@@ -73,10 +73,10 @@ def attractors(
     collection.add_images()
     label_of = order(collection)
     counts = np.bincount(places[:starts][places[:starts] >= 0], minlength=len(collection.targets))
-    assigned = np.array([label_of.get(int(place), UNDECIDED) for place in places[:starts]], dtype=int)
+    ends = np.array([label_of.get(int(place), UNDECIDED) for place in places], dtype=int)
     members = collection.members(label_of, counts, starts)
     say(1.0)
-    return Attractors(system, members, states, assigned, widths, seed, tol, tuple(collection.reasons))
+    return Attractors(system, members, states, ends[:starts], ends[starts:], widths, seed, tol, tuple(collection.reasons))
 
 
 def _places(collection: Collection, states: np.ndarray, longest: int, tol: float, say: Callable[[float], object]) -> np.ndarray:
@@ -115,7 +115,7 @@ def order(collection: Collection) -> dict[int, int]:
     def rank(place: int) -> tuple[float, ...]:
         orbit, (low, high) = collection.orbits[place], collection.ranges[place]
         if orbit is None:
-            return 1.0, 0.0, round(max(high, -low), 3), -high
+            return 1.0, 0.0, round(max(high, -low), 2), -round(float(collection.targets[place].strobes[:, 0].mean()), 2)
         return 0.0, float(orbit.periods), round(max(high, -low), 6), -round(high, 6)
 
     moving = [place for place, target in enumerate(collection.targets) if target.kind != "rest"]
