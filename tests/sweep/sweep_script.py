@@ -28,6 +28,8 @@ def rows_plan(rows):
 
 def go_on(store, where, pause):
     """Run, saying when: with so many workers, 0 for none, or on the cluster at an address."""
+    import zarr  # noqa: F401  # not to be timed
+
     plan = long_plan(pause=float(pause))
     print("go", flush=True)
     place = {"scheduler": where} if "://" in where else {"workers": int(where) or None}

@@ -13,62 +13,66 @@ from saltus.errors import SweepError
 from saltus.sweep import Status, files, run, status
 from saltus.sweep.store import opened
 
+CHUNKS = 120
+CREATION = -10  # from here to 0: while the store is made
+
 
 @pytest.fixture(scope="module")
 def reference(tree, tmp_path_factory):
-    """The files of a run that nothing disturbed, and how long it took."""
+    """The files of a run that nothing disturbed."""
     store = tmp_path_factory.mktemp("reference") / "store"
-    start = time.monotonic()
-    run(sweep_script.long_plan(pause=0.0), store)
-    return tree(store), time.monotonic() - start
+    run(sweep_script.long_plan(CHUNKS, pause=0.0), store)
+    return tree(store)
 
 
-def _killed(script, store, delay, workers=0) -> Status | None:
-    """Kill a run so many seconds after it begins; how far it came, None if not even to make the store."""
+def _killed(script, store, rng, chunks, workers=0) -> Status | None:
+    """Kill a run at a random moment after so many chunks; how far it came, None if not even to make the store."""
     process = script("go_on", store, workers, 0.0)
-    assert process.stdout.readline() == "go\n"
-    time.sleep(delay)
+    while (line := process.stdout.readline().strip()) and (line == "go" or int(line) < chunks):
+        if line == "go" and chunks < 0:
+            break
+    time.sleep(rng.uniform(0.0, 0.06 if chunks < 0 else 0.006))
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     return status(store) if store.exists() else None
 
 
-def _kill_and_resume(script, tree, tmp_path, reference, moments, workers=0):
-    """Kill a run at each of `moments`, as fractions of a run's time, and complete every store; how far each had come."""
-    files_there, duration = reference
+def _kill_and_resume(script, tree, tmp_path, reference, rng, moments):
+    """Kill a run at each of `moments`, and complete every store; how far each had come."""
     came = []
-    for i, moment in enumerate(moments):
+    for i, chunks in enumerate(moments):
         store = tmp_path / f"{i}" / "store"
-        came.append(_killed(script, store, moment * duration, workers))
-        run(sweep_script.long_plan(pause=0.0), store)
-        assert tree(store) == files_there
-        assert not [p for p in store.parent.iterdir() if p != store and time.time() - p.stat().st_mtime > files.STALE]
-    return came
+        came.append(_killed(script, store, rng, chunks))
+        run(sweep_script.long_plan(CHUNKS, pause=0.0), store)
+        assert tree(store) == reference
+    return [0 if c is None else c.done for c in came]
 
 
 def test_killed_runs_resume_to_the_same_bytes(script, tree, tmp_path, reference):
-    came = _kill_and_resume(script, tree, tmp_path, reference, (0.3, 0.55, 0.8))
-    assert any(c is not None and 0 < c.done < c.total for c in came)
+    done = _kill_and_resume(script, tree, tmp_path, reference, random.Random(0), (CREATION, 20, 70))
+    assert done[0] < CHUNKS
+    assert 20 <= done[1] < CHUNKS
+    assert 70 <= done[2] < CHUNKS
 
 
 @pytest.mark.thorough
 def test_20_kills_at_random_moments_resume_to_the_same_bytes(script, tree, tmp_path, reference):
     rng = random.Random(0)
-    came = _kill_and_resume(script, tree, tmp_path, reference, [rng.uniform(0.0, 1.1) for _ in range(20)])
-    assert sum(c is not None and 0 < c.done < c.total for c in came) >= 8
+    moments = [rng.randrange(CREATION, CHUNKS) for _ in range(20)]
+    done = _kill_and_resume(script, tree, tmp_path, reference, rng, moments)
+    assert sum(0 < d < CHUNKS for d in done) >= 12
 
 
 @pytest.mark.thorough
 def test_one_store_killed_again_and_again(script, tree, tmp_path, reference):
-    rng, store = random.Random(1), tmp_path / "store"
-    done = []
-    for _ in range(8):
-        came = _killed(script, store, rng.uniform(0.0, 0.25) * reference[1], workers=rng.choice((0, 2)))
-        done.append(came.done if came else 0)
+    rng, store, done = random.Random(1), tmp_path / "store", [0]
+    while done[-1] < CHUNKS - 10:
+        came = _killed(script, store, rng, done[-1] + rng.randrange(20), workers=rng.choice((0, 2)))
+        done.append(came.done)
     assert done == sorted(done)  # what is done stays
-    assert done[-1] > 0
-    run(sweep_script.long_plan(pause=0.0), store)
-    assert tree(store) == reference[0]
+    assert len(done) > 3
+    run(sweep_script.long_plan(CHUNKS, pause=0.0), store)
+    assert tree(store) == reference
 
 
 def test_what_a_kill_left_half_written_is_removed(tree, tmp_path):
