@@ -10,7 +10,7 @@ import numpy as np
 from saltus.attractors.averages import BATCHES
 from saltus.attractors.settling import clocked, settle
 from saltus.attractors.verdict import DRIVEN_LONGEST, Case, Verdict, settled
-from saltus.attractors.wandering import STROBES, wandering
+from saltus.attractors.wandering import STAGES, STROBES, wandering
 from saltus.errors import ParameterError
 from saltus.systems import System
 from saltus.systems.checks import check_number
@@ -34,10 +34,10 @@ def classify(
     * `periodic`: it repeats itself, and the orbit solves its own equations, has all multipliers inside the unit circle, repeats
       in direct simulation, and is met by the motion. Under constant loads an equilibrium is such an orbit, of period 1.
     * `chaotic`: not settled after transient + periods; then a largest Lyapunov exponent above 0 by more than its error and the
-      growth of regular motions, in both halves of runs of 500, 1000, 2000, ... periods, as far as `periods` go; and none of 128
-      motions from states beside the last one settles within as many periods. Chaotic transients, which end at random, are
-      told by that with a probability of 95 % while they last less than 43 `periods` in the mean. The 0-1 test is recorded beside
-      it, and must not contradict.
+      growth of regular motions, in both halves of a run and of one twice as long that goes on from it; and none of 128 motions
+      from states beside the last one settles within `periods`, or 2000 forcing periods if that is more. Chaotic transients,
+      which end at random, are told by that with a probability of 95 % while they last less than 43 times as long in the mean.
+      The 0-1 test is recorded beside it, and must not contradict.
     * `quasi-periodic`: only where `excludes_tori` knows no reason against it: exponents of 0 within their error and resolution,
       and a 0-1 test that sees order.
     * `undecided`: everything else, with the reason.
@@ -45,7 +45,7 @@ def classify(
     Args:
         system: a model with one coordinate, under constant or harmonic loads.
         velocity, coordinates: the state at the start, at phase 0.
-        periods: how long it may take, in forcing periods: so many for settling, so many for the exponents.
+        periods: how long it may take, in forcing periods: so many for settling, so many for the exponents; at least 96.
         transient: how many to let pass first.
         longest: the longest period looked for, at least 16.
         seed: of the companions' states and the frequencies of the 0-1 test.
@@ -57,7 +57,7 @@ def classify(
     """
     clock, start = clocked(system), _start(system, velocity, coordinates)
     for name, value, least in (
-        ("periods", periods, 4 * BATCHES),
+        ("periods", periods, STAGES * 2 * BATCHES),
         ("transient", transient, 0),
         ("longest", longest, DRIVEN_LONGEST),
     ):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from saltus.flow import Motion
+from saltus.flow import EventKind, Motion
 from saltus.flow.graph import Expr, differentiate, substitute
 from saltus.flow.intervals import Interval, enclose
 from saltus.flow.opening import Leaves, reads
@@ -36,13 +37,15 @@ class Contraction:
         known = not any(reads(d, "time", "coordinate", "velocity", "record") for d in damping.values())
         known &= not any(reads(slope, "record") for slope in self._slopes.values())
         self.known = known and len(system.model.coordinates) == 1  # whether da/dv is constant on each side
+        linear = {s: d for s, d in self._slopes.items() if not reads(d, "time", "velocity", "record")}
+        self._factors = {s: _middle(enclose([d], self._leaves)[0]) for s, d in linear.items()}
         self._rates = {s: _middle(enclose([d], self._leaves)[0]) for s, d in damping.items()} if self.known else {}
 
     def along(self, motion: Motion) -> float:
         """ln det from the start of a motion to its end; -inf if it rests between them, NaN where the law is not so simple."""
         if not self.known:
             return float("nan")
-        if any(event.kind == "rest" for event in motion.events):
+        if len(motion.events.of(EventKind.REST)):
             return float("-inf")
         crossings = motion.crossings
         bounds = np.concatenate([[motion.start], crossings.time, [motion.time]])
@@ -51,15 +54,16 @@ class Contraction:
         for side in set(crossings.side.tolist()):
             here = crossings.side == side
             before, after = crossings.velocity_before[here], crossings.velocity_after[here]
-            slope = self._slope(int(side), crossings.time[here], before)
             with np.errstate(divide="ignore"):
-                total += np.log(np.abs(slope * after / before)).sum()
+                total += np.log(np.abs(self._slope(int(side), crossings.time[here], before) * after / before)).sum()
         return float(total)
 
-    def _slope(self, side: int, time: np.ndarray, before: np.ndarray) -> np.ndarray:
+    def _slope(self, side: int, time: np.ndarray, before: np.ndarray) -> Any:
         """R_v at impacts with these velocities."""
+        if side in self._factors:
+            return self._factors[side]
         (slope,) = enclose([self._slopes[side]], Leaves(self._leaves.parameters, [], Interval(time), speed=Interval(before)))
-        return np.broadcast_to(_middle(slope), before.shape)
+        return _middle(slope)
 
 
 def impact_factor(system: System, parameters: Mapping[str, np.ndarray]) -> np.ndarray:

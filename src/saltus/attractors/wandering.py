@@ -14,9 +14,10 @@ from saltus.attractors.tori import excludes_tori
 from saltus.attractors.verdict import Case, Verdict, on_cycle, settled
 from saltus.attractors.zero_one import SHORTEST, ZeroOne, zero_one_test
 
-FIRST_STAGE = 500  # forcing periods of the first estimate of the exponents; each later one takes twice as many
+STAGES = 3  # the first estimate of the exponents takes a third of `periods`, the second one the rest, twice as many
 STROBES = 2000  # states at phase 0 that the 0-1 test looks at
 CHAOS, ORDER = 0.8, 0.2  # values of K above and below which the 0-1 test has an opinion
+LEAST = 2000  # forcing periods that they are followed: an orbit that they reach is recognised hundreds of periods later
 COMPANIONS = 128  # motions from states beside the last one, to see whether the chaos has a way out
 ASIDE = 1e-6  # how far: a chaotic motion of exponent 0.03 forgets it within 500 units of time
 
@@ -47,12 +48,8 @@ def wandering(case: Case, ends: Ends) -> Verdict:
 
 
 def _stages(case: Case, state: np.ndarray) -> list[Exponents]:
-    """Exponents of ever longer runs, one after the other, up to the first that is not positive."""
-    spans: list[int] = []
-    span = min(FIRST_STAGE, case.periods // 2)
-    while sum(spans) + span <= case.periods:
-        spans.append(span)
-        span *= 2
+    """Exponents of a run and, if they are positive, of one twice as long that goes on from there."""
+    spans = [case.periods // STAGES, 2 * (case.periods // STAGES)]
     stages: list[Exponents] = []
     at: dict[str, Any] = {case.system.model.coordinates[0]: float(state[0]), "velocity": float(state[1])}
     for i, span in enumerate(spans):
@@ -86,7 +83,7 @@ def _beside(case: Case, state: dict[str, Any]) -> Ends:
     around = np.random.default_rng(case.seed).uniform(-ASIDE, ASIDE, (COMPANIONS, 2))
     states = np.array([state[case.system.model.coordinates[0]], state["velocity"]]) + np.concatenate([[[0.0, 0.0]], around])
     kept = 4 * case.longest
-    return settle(case.clock, states, case.periods, kept=kept, tol=case.tol, progress=case.part(0.9, 1.0))
+    return settle(case.clock, states, max(case.periods, LEAST), kept=kept, tol=case.tol, progress=case.part(0.9, 1.0))
 
 
 def _only_first(ends: Ends) -> Ends:
@@ -111,14 +108,16 @@ def _chaotic(case: Case, ends: Ends, last: Exponents, opinion: ZeroOne | None, g
     size = f"{last.values[0]:.4g} +- {last.errors[0]:.1g}"
     left = given["evidence"]["companions_settled"]
     if left:
-        text = f"{left} of {COMPANIONS} motions from beside its last state settle within {case.periods} forcing periods"
+        text = (
+            f"{left} of {COMPANIONS} motions from beside its last state settle within {max(case.periods, LEAST)} forcing periods"
+        )
         return case.verdict("undecided", f"its largest exponent is {size}, but {text}: the chaos is a transient", ends, **given)
     if opinion is not None and opinion.K < ORDER:
         text = f"its largest exponent is {size}, but the 0-1 test sees order (K = {opinion.K:.3g})"
         return case.verdict("undecided", text, ends, **given)
     second = "" if opinion is None else f"; the 0-1 test {'agrees' if opinion.K > CHAOS else 'is not sure'} (K = {opinion.K:.3g})"
     text = f"its largest exponent is {size} over {last.periods} forcing periods"
-    text += f", and nothing near it settles in {case.periods} more{second}"
+    text += f", and nothing near it settles in {max(case.periods, LEAST)} more{second}"
     return case.verdict("chaotic", text, ends, **given)
 
 

@@ -1,0 +1,225 @@
+"""Verdicts: what each needs, and that slow passages and transient chaos are not taken for attractors."""
+
+import math
+
+import numpy as np
+import pytest
+from verdict_cases import under_force, wall
+
+import saltus
+from saltus import ParameterError
+from saltus.attractors import classify, excludes_tori
+from saltus.attractors.certify import certify
+from saltus.attractors.settling import settle
+from saltus.attractors.verdict import KINDS
+from saltus.theory import equilibria
+
+
+def test_rest_is_proved():
+    verdict = classify(under_force(1.0, 0.05), theta=0.01)
+    assert verdict.kind == "rest"
+    assert verdict.period is None
+    assert verdict.state == {"theta": 0.0, "velocity": 0.0}
+    assert "captured" in verdict.reason
+
+
+@pytest.mark.parametrize("e", [1.0, 0.5])
+def test_a_periodic_motion_is_certified_by_its_own_equations(e):
+    system = under_force(1.0, 0.5, e=e)
+    verdict = classify(system, theta=0.3)
+    assert (verdict.kind, verdict.period) == ("periodic", 1)
+    expected = saltus.find_orbit(system, theta=0.3)
+    assert verdict.orbit.amplitude == pytest.approx(expected.amplitude, abs=1e-10)
+    assert verdict.evidence["residual"] < 1e-12
+    assert verdict.evidence["largest_multiplier"] < 1.0
+    assert verdict.evidence["defect"] < 1e-9
+    assert verdict.exponents is None
+
+
+def test_a_longer_period_is_counted_in_forcing_periods():
+    """Hhat = 1 at Omega = 2.6: the family of period 3 between the folds of numerics.md, section 7."""
+    found = [classify(under_force(2.6, 1.0), theta=theta, velocity=v) for theta, v in ((4.0, 0.0), (3.0, 2.0), (-3.5, -1.0))]
+    longer = [v for v in found if v.period == 3]
+    assert longer
+    for verdict in longer:
+        strobes = settle(verdict.system, np.array([list(verdict.state.values())]), 3).strobes[0]
+        np.testing.assert_allclose(strobes[-1], list(verdict.state.values()), rtol=0, atol=1e-7)
+        assert np.abs(strobes[0] - strobes[-1]).max() > 1e-3
+
+
+def test_an_orbit_with_rest_is_periodic():
+    """Below one, e lets impacts die away; the load pulls the system off its contact again, twice a period."""
+    verdict = classify(under_force(0.05, 0.12, e=0.3), theta=0.05)
+    assert verdict.kind == "periodic"
+    assert verdict.orbit.rest_share > 0.1
+    assert verdict.evidence["largest_multiplier"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("frequency", "amplitude", "known", "periods"), [(0.38, 0.2, 0.03, 500), (1.2, 2.0, 0.12, 1000), (1.6, 3.0, 0.2, 1000)]
+)
+def test_chaos_is_seen_with_its_exponent(frequency, amplitude, known, periods):
+    """Issue text: about so much per unit of time; the first is the paper's band QP (errata 22)."""
+    system = under_force(frequency, amplitude)
+    verdict = classify(system, theta=0.3, periods=periods)
+    assert verdict.kind == "chaotic"
+    assert verdict.exponents.values[0] == pytest.approx(known, abs=0.15 * known + float(verdict.exponents.errors[0]))
+    assert verdict.exponents.sum_defect < 1e-8
+    assert verdict.zero_one.K > 0.8
+    assert verdict.evidence["companions_settled"] == 0
+    assert excludes_tori(system) is not None
+    data = verdict.to_xarray()
+    assert data.kind == "chaotic"
+    assert data.largest_exponent == verdict.exponents.values[0]
+    assert saltus.System.from_json(data.attrs["system"]) == system
+
+
+MORE = [pytest.param(amplitude, marks=pytest.mark.thorough) for amplitude in (7.3, 7.5, 7.6)]
+
+
+@pytest.mark.parametrize("amplitude", [7.2, 7.4, 7.7, *MORE])
+def test_long_chaotic_transients_are_not_called_chaos(amplitude):
+    """At Omega = 4 motions wander for thousands of periods, and many settle in the end; 2100 show nothing of it."""
+    system = under_force(4.0, amplitude)
+    starts = np.random.default_rng(1).uniform(-2.0, 2.0, (24, 2))
+    ends = settle(system, starts, 4000, kept=1, tol=1e-12)
+    slow = np.flatnonzero((ends.cycle > 0) & (ends.periods > 2200))
+    assert slow.size  # these are known to settle, late
+    theta, velocity = starts[slow[0]]
+    verdict = classify(system, theta=theta, velocity=velocity, periods=1000, transient=100)
+    assert verdict.kind in ("periodic", "undecided")
+    if verdict.kind == "undecided":
+        assert "transient" in verdict.reason
+        assert verdict.evidence["companions_settled"] > 0
+        assert verdict.exponents.positive  # without the companions it would have been chaos
+        assert verdict.zero_one.K > 0.8  # and the 0-1 test sees nothing wrong
+
+
+def test_given_time_a_transient_is_followed_to_its_end():
+    system = under_force(4.0, 7.2)
+    starts = np.random.default_rng(1).uniform(-2.0, 2.0, (24, 2))
+    ends = settle(system, starts, 4000, kept=1, tol=1e-12)
+    slow = int(np.argmax(np.where(ends.cycle > 0, ends.periods, 0)))
+    theta, velocity = starts[slow]
+    verdict = classify(system, theta=theta, velocity=velocity, periods=4000)
+    assert (verdict.kind, verdict.period) == ("periodic", int(ends.cycle[slow]))
+    assert verdict.periods == pytest.approx(ends.periods[slow], abs=50)
+
+
+def test_a_motion_that_settles_while_its_exponents_are_taken_is_periodic_after_all():
+    """At Hhat = 7.2 one that takes 2293 periods, given 1000 to settle."""
+    system = under_force(4.0, 7.2)
+    starts = np.random.default_rng(1).uniform(-2.0, 2.0, (24, 2))
+    ends = settle(system, starts, 4000, kept=1, tol=1e-12)
+    late = np.flatnonzero((ends.cycle > 0) & (ends.periods > 1100) & (ends.periods < 1600))
+    theta, velocity = starts[late[0]]
+    verdict = classify(system, theta=theta, velocity=velocity, periods=1000, transient=0)
+    assert verdict.kind == "periodic"
+    assert verdict.evidence["transient"] >= 1000
+    assert verdict.reason.startswith("after more than")
+
+
+def test_a_torus_is_quasi_periodic():
+    """Undamped motion about a deformed equilibrium under a weak force: a curve of the map, as KAM theory has it."""
+    system = under_force(1.0, 0.002, damping=0.0, vertical=0.5)
+    verdict = classify(system, theta=0.03, periods=600)
+    assert verdict.kind == "quasi-periodic"
+    assert (np.abs(verdict.exponents.values) < 1e-3).all()
+    assert abs(verdict.zero_one.K) < 0.1
+    linear = classify(wall(0.0, frequency=math.sqrt(5) - 1), x=0.3, periods=600)
+    assert linear.kind == "quasi-periodic"
+    assert (np.abs(linear.exponents.values) < 1e-12).all()
+
+
+def test_with_damping_the_same_start_ends_on_an_orbit():
+    verdict = classify(under_force(1.0, 0.002, damping=0.1, vertical=0.5), theta=0.03)
+    assert (verdict.kind, verdict.period) == ("periodic", 1)
+
+
+def test_an_orbit_that_does_not_attract_is_no_attractor():
+    """Undamped, linear, started on its periodic solution F / (k - W^2) cos W tau: multipliers of modulus 1."""
+    verdict = classify(wall(0.0, 1.0, force=0.2, frequency=1.5), x=0.2 / (1.0 - 2.25))
+    assert verdict.kind == "undecided"
+    assert "does not attract" in verdict.reason
+    assert verdict.evidence["largest_multiplier"] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_under_constant_loads_it_comes_to_an_equilibrium():
+    system = saltus.System(
+        model=saltus.Metainterface(beta0=math.radians(80), damping=0.1), load=saltus.Load(horizontal=0.1, vertical=0.5)
+    )
+    verdict = classify(system, theta=0.4)
+    assert verdict.kind == "periodic"
+    assert "equilibrium" in verdict.reason
+    stable = [q.theta for q in equilibria(system) if q.stable]
+    assert min(abs(verdict.state["theta"] - theta) for theta in stable) < 1e-9
+    free = classify(system.with_({"model.damping": 0.0}), theta=0.4, periods=256)
+    assert free.kind == "undecided"
+    assert "constant loads" in free.reason
+
+
+def test_a_motion_that_ends_is_undecided():
+    """A block that overturns."""
+    system = saltus.System(
+        model=saltus.RockingBlock(alpha=0.2),
+        load=saltus.Load(frequency=3.0, ground_horizontal=saltus.Harmonic(amplitude=0.5)),
+        impact=saltus.VelocityReduction(0.9),
+    )
+    verdict = classify(system, theta=0.1)
+    assert verdict.kind == "undecided"
+    assert "ends" in verdict.reason
+
+
+def test_a_longest_period_may_be_longer_than_what_settling_looks_for():
+    """A cycle of q periods is the smallest shift that maps the last states onto themselves."""
+    from saltus.attractors.verdict import _long_cycle
+
+    states = np.tile(np.arange(20.0), 6)[:, None] * [1.0, -2.0]
+    assert _long_cycle(states, 32) == 20
+    assert _long_cycle(states, 19) == 0
+    assert _long_cycle(states + np.arange(120)[:, None] * 1e-6, 32) == 0
+
+
+def test_a_certificate_says_what_is_wrong():
+    system = under_force(1.6, 3.0)
+    state = settle(system, np.array([[0.3, 0.0]]), 300, kept=1).strobes[0, -1]
+    found = certify(system, state, 1)
+    assert not found.sound
+    assert found.doubt
+    sound = saltus.find_orbit(under_force(1.0, 0.5), theta=0.3)
+    beside = certify(sound.system, np.array(sound.state) + 1e-4, 1)
+    assert "beside the motion" in beside.doubt
+    assert certify(sound.system, np.array(sound.state), 1).sound
+
+
+def test_verdicts_repeat_themselves():
+    one, other = (classify(under_force(1.6, 3.0), theta=0.3, periods=96, transient=50, seed=4) for _ in range(2))
+    assert one.reason == other.reason
+    assert one.evidence == other.evidence
+    assert one.kind in KINDS
+
+
+def test_progress_goes_from_nothing_to_all():
+    told = []
+    classify(under_force(1.6, 3.0), theta=0.3, periods=96, transient=50, progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        ({"periods": 10}, "periods must"),
+        ({"periods": 300.5}, "whole number"),
+        ({"longest": 3}, "longest must"),
+        ({"transient": -1}, "transient must"),
+        ({"theta": "far"}, "theta must"),
+        ({"velocity": math.inf}, "velocity must"),
+        ({"phi": 1.0}, "theta="),
+        ({"system": 3}, "System"),
+    ],
+)
+def test_it_refuses_what_has_no_meaning(changes, match):
+    arguments = {"system": under_force(1.0, 0.5), "theta": 0.3} | changes
+    with pytest.raises(ParameterError, match=match):
+        classify(arguments.pop("system"), **arguments)
