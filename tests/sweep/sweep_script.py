@@ -26,11 +26,11 @@ def rows_plan(rows):
     return Plan(function="sweep_toys:rows", axes=axes, chunk={"start": 1000, "row": 25}, variables=variables)
 
 
-def go_on(store, where, pause):
+def go_on(store, where, pause, quick=-2.0):
     """Run, saying when: with so many workers, 0 for none, or on the cluster at an address."""
     import zarr  # noqa: F401  # not to be timed
 
-    plan = long_plan(pause=float(pause))
+    plan = long_plan(pause=float(pause), quick=float(quick))
     print("go", flush=True)
     place = {"scheduler": where} if "://" in where else {"workers": int(where) or None}
     run(plan, store, progress=lambda done, total, left: print(done, flush=True), **place)

@@ -21,7 +21,7 @@ CREATION = -10  # from here to 0: while the store is made
 def reference(tree, tmp_path_factory):
     """The files of a run that nothing disturbed."""
     store = tmp_path_factory.mktemp("reference") / "store"
-    run(sweep_script.long_plan(CHUNKS, pause=0.0), store)
+    run(sweep_script.long_plan(CHUNKS, pause=0.0, quick=-2.0), store)
     return tree(store)
 
 
@@ -43,7 +43,7 @@ def _kill_and_resume(script, tree, tmp_path, reference, rng, moments):
     for i, chunks in enumerate(moments):
         store = tmp_path / f"{i}" / "store"
         came.append(_killed(script, store, rng, chunks))
-        run(sweep_script.long_plan(CHUNKS, pause=0.0), store)
+        run(sweep_script.long_plan(CHUNKS, pause=0.0, quick=-2.0), store)
         assert tree(store) == reference
     return [0 if c is None else c.done for c in came]
 
@@ -71,7 +71,7 @@ def test_one_store_killed_again_and_again(script, tree, tmp_path, reference):
         done.append(came.done)
     assert done == sorted(done)  # what is done stays
     assert len(done) > 3
-    run(sweep_script.long_plan(CHUNKS, pause=0.0), store)
+    run(sweep_script.long_plan(CHUNKS, pause=0.0, quick=-2.0), store)
     assert tree(store) == reference
 
 
@@ -110,13 +110,13 @@ def test_the_workers_of_a_killed_run_end_too(script, tmp_path):
 @pytest.mark.parametrize("workers", [0, 2])
 def test_an_interrupt_ends_a_run_at_once_and_says_how_to_go_on(script, tmp_path, workers):
     store = tmp_path / "store"
-    process = script("go_on", store, workers, 0.4)
-    while process.stdout.readline() not in ("1\n", "2\n", ""):
+    process = script("go_on", store, workers, 60.0, -0.97)  # two chunks, and then a minute for each
+    while process.stdout.readline() not in ("2\n", ""):
         pass
     start = time.monotonic()
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers too
     _, err = process.communicate(timeout=20)
-    assert time.monotonic() - start < 2.0
+    assert time.monotonic() - start < 3.0
     last = err.strip().splitlines()[-1]
     done = status(store).done
     assert last.endswith(f"interrupted after {done} of 120 chunks; {store} keeps them: run the same again to go on")
