@@ -26,7 +26,7 @@ PERIODS = 500
 WITHIN = 1e-2
 MOST_NEW = 64  # states of cells that end nowhere known from which new attractors are looked for, at a time
 ROUNDS = 3
-SOON = 96  # forcing periods of the first stage; each later one doubles what has passed
+STAGE = 48  # forcing periods after which motions that have settled are told from those that go on, longer later
 LAST = 64  # strobes of a motion that does not settle which must lie on a sampled set
 
 Grid = tuple[np.ndarray, np.ndarray]  # velocities, coordinates
@@ -45,10 +45,10 @@ def basins(
 ) -> xarray.Dataset:
     """The attractor on which the motion from each state (coordinate, velocity) of a grid at phase 0 ends, and the time it takes.
 
-    A cell has the label of an attractor if its motion is proved to be captured at rest, settles on the very cycle (to 1e-6), or
-    ends among the points of a chaotic set; else it is -1, undecided. Cells that settle elsewhere give new attractors, with labels
-    after the known ones. The time is that after which the motion stays within a distance of the attractor's points at phase 0, in
-    forcing periods; to rest, at most that to the proof of capture.
+    A cell has the label of an attractor if its motion is proved to be captured at rest, settles on the cycle (to 1e-6, or is as
+    near for two rounds, and nearer in the second), or ends among the points of a chaotic set; else it is -1, undecided. Cells
+    that settle elsewhere give new attractors, with labels after the known ones. The time is that after which the motion stays
+    within a distance of the attractor's points at phase 0, in forcing periods; to rest, at most that to the proof of capture.
 
     Args:
         system: what moves, as for `attractors`.
@@ -98,7 +98,7 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
     targets = [Target.from_dict(item) for item in arguments["attractors"]]
     grid = np.asarray(block["velocity"], dtype=float), np.asarray(block[system.model.coordinates[0]], dtype=float)
     numbers = (int(arguments["periods"]), float(arguments["within"]), float(arguments["tol"]))
-    label, time = _all_cells(clocked(system), targets, grid, *numbers, lambda _: None)
+    label, time = _all_cells(clocked(system), targets, grid, *numbers)
     return {"label": label, "time": time}
 
 
@@ -109,7 +109,13 @@ def cell_arguments(found: Attractors, *, periods: int = PERIODS, within: float =
 
 
 def label_states(
-    system: System, targets: Iterable[Target], states: np.ndarray, periods: int, within: float, tol: float
+    system: System,
+    targets: Iterable[Target],
+    states: np.ndarray,
+    periods: int,
+    within: float,
+    tol: float,
+    say: Callable[[float], object] = lambda _: None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The labels of states (n, 2), UNDECIDED where none is borne out, and the times to reach the attractors, (n,) each."""
     targets = tuple(targets)
@@ -118,6 +124,7 @@ def label_states(
     for start in range(0, len(states), size):
         part = slice(start, start + size)
         label[part], time[part] = _block(system, targets, states[part], periods, within, tol)
+        say(min(1.0, (start + size) / len(states)))
     return label, time
 
 
@@ -128,33 +135,44 @@ def _block(
     label, time = np.full(len(states), UNDECIDED, dtype=np.int16), np.full(len(states), np.nan)
     rows, history, done = np.arange(len(states)), states[:, None], 0
     while rows.size and done < periods:
-        span = min(max(SOON, done), periods - done)
+        span = min(max(STAGE, done // 2), periods - done)
         stage = settle(system, history[:, -1], span, tol=tol)
         history = np.concatenate([history, stage.strobes], axis=1)
         ends = replace(stage, strobes=history, periods=stage.periods + done)
         done += span
         label[rows] = _labelled(targets, ends, sampled=done == periods)
         time[rows] = _times(targets, label[rows], ends, within)
-        rows, history = rows[ends.moving], history[ends.moving]
+        on = ends.moving & (label[rows] == UNDECIDED)
+        rows, history = rows[on], history[on]
     return label, time
 
 
 def _labelled(targets: tuple[Target, ...], ends: Ends, sampled: bool) -> np.ndarray:
     """The labels of motions by their ends; with `sampled`, those that do not settle may lie on a set known by its points."""
     label = np.full(len(ends.cycle), UNDECIDED, dtype=np.int16)
-    last = ends.strobes[:, -1]
     for target in targets:
         if target.kind == "rest":
             label[ends.rest] = REST
         elif target.kind == "periodic":
-            near = NEAR * np.maximum(1.0, np.abs(last).max(axis=1))
-            label[(ends.cycle > 0) & (target.distance(last) < near)] = target.label
+            label[_on_cycle(target, ends)] = target.label
         elif sampled:
             rows = np.flatnonzero(ends.moving & (label == UNDECIDED))
             if rows.size:
                 apart = np.median(target.distance(ends.strobes[rows, -LAST:]), axis=1)
                 label[rows[apart < target.grain]] = target.label
     return label
+
+
+def _on_cycle(target: Target, ends: Ends) -> np.ndarray:
+    """Which motions have settled on a cycle, or were near it for two rounds, and nearer in the second, (n,)."""
+    last, q = ends.strobes[:, -1], len(target.strobes)
+    near = NEAR * np.maximum(1.0, np.abs(last).max(axis=1))
+    here: np.ndarray = (target.distance(last) < near) & ((ends.cycle > 0) | ends.moving)
+    rows = np.flatnonzero(here & ends.moving)
+    rounds = target.distance(ends.strobes[rows, -2 * q :])
+    before, after = rounds[:, :q].max(axis=1), rounds[:, q:].max(axis=1)
+    here[rows] = (before < near[rows]) & (after < before) & (rounds.shape[1] == 2 * q)
+    return here
 
 
 def _times(targets: tuple[Target, ...], label: np.ndarray, ends: Ends, within: float) -> np.ndarray:
@@ -183,16 +201,11 @@ def _all_cells(
     periods: int,
     within: float,
     tol: float,
-    say: Callable[[float], object],
+    say: Callable[[float], object] = lambda _: None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Labels and times over the grid, in pieces that bound the memory."""
+    """Labels and times over the grid."""
     states = np.stack(np.meshgrid(grid[1], grid[0]), axis=-1).reshape(-1, 2)
-    label, time = np.empty(len(states), dtype=np.int16), np.empty(len(states))
-    size = max(256, MOST_STATES // periods)
-    for start in range(0, len(states), size):
-        part = slice(start, start + size)
-        label[part], time[part] = label_states(system, targets, states[part], periods, within, tol)
-        say(min(1.0, (start + size) / len(states)))
+    label, time = label_states(system, targets, states, periods, within, tol, say)
     shape = (len(grid[0]), len(grid[1]))
     return label.reshape(shape), time.reshape(shape)
 

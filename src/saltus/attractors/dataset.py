@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import xarray
 
     from saltus.attractors.attractor import Attractor, Attractors
-    from saltus.systems import System
+    from saltus.systems import Load, System
 
 MOST_STROBES = 64  # points at phase 0 that are written of each attractor
 
@@ -45,8 +45,14 @@ def provenance(system: System, kind: str) -> dict[str, Any]:
         "kind": kind,
         "saltus_version": __version__,
         "system": system.to_json(),
+        "load": "constant" if is_constant(system.load) else "periodic",
         "Conventions": "CF-1.8",
     }
+
+
+def is_constant(load: Load) -> bool:
+    """Whether no channel varies: the section at phase 0 is then the phase plane, and cycles of period 1 are equilibria."""
+    return not any(signal.periodic for signal in load.channels.values())
 
 
 def coordinate(system: System) -> tuple[str, str]:

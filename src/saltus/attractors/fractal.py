@@ -17,7 +17,7 @@ from saltus.errors import ParameterError
 from saltus.orbits.find import check_whole
 
 RADIUS = 5  # cells within which a cell of the boundary must meet all labels
-MOST_CELLS = 0.9  # a share of uncertain cells above this says nothing: it cannot grow
+MOST_CELLS = 0.5  # a share of uncertain cells above this grows less than the boundary does: it meets itself
 AGREES, FAILS = 0.9, 0.5  # shares of boundary cells from which on basins agree with Wada, and up to which they do not
 
 
@@ -93,7 +93,7 @@ def uncertainty_exponent(labels: Any, distances: Iterable[int] | None = None) ->
     A cell is uncertain at eps if a cell with another label lies within eps cells of it, along each axis (undecided cells are not
     counted, and make none uncertain). Cells nearer to the edge than the largest eps are not counted. The slope of ln f over
     ln eps is fitted, with its standard error, over distances (1, 2, 3, 4, 6, 8, ... up to 1/16 of the grid) at which f is below
-    0.9, unless fewer than three are.
+    0.5, unless fewer than three are.
 
     Raises:
         ParameterError: a grid too small for three distances; distances that are not whole.

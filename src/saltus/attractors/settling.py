@@ -16,7 +16,7 @@ from saltus.systems import Load, System
 if TYPE_CHECKING:
     import xarray
 
-MOST_STATES = 1 << 21  # strobe points kept at once: 100 MB of memory with what is made of them
+MOST_STATES = 1 << 22  # states at phase 0 kept at once: 67 MB, and as much again for what is made of them
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ UNDECIDED = "#ffffff"
 AT_REST = "#dddddd"  # lighter than every colour of a moving attractor
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
 MARK: dict[str, Any] = {"linestyle": "none", "markersize": 4.5, "markerfacecolor": "white", "markeredgecolor": INK, "zorder": 6}
+POINT: dict[str, Any] = MARK | {"marker": "o", "markersize": 1.8, "markeredgewidth": 0.4}  # of a set that does not repeat
 BOUNDARY: dict[str, Any] = {"color": INK, "linewidth": 0.7, "zorder": 4}
 HALO = [Stroke(linewidth=1.7, foreground="white", alpha=0.8), Normal()]  # so that the line shows on dark colours, too
 MOST_NAMED = 8  # attractors in the legend
@@ -27,7 +28,7 @@ def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), width: float = SING
     """A Figure from a dataset of `basins`.
 
     Rest is light grey, the other attractors go from dark to light by their labels, undecided cells are white; each attractor
-    is marked at phase 0 of the load.
+    is marked at phase 0 of the load, one that does not repeat by some of its points.
 
     Args:
         dataset: from `saltus.attractors.basins`.
@@ -45,16 +46,16 @@ def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), width: float = SING
     for states in manifolds:
         points = np.asarray(states, dtype=float)
         ax.plot(points[:, 0], points[:, 1], path_effects=HALO, **BOUNDARY)
-    for i in range(len(numbers)):
-        ax.plot(
-            dataset[f"strobe_{name}"].values[i], dataset["strobe_velocity"].values[i], marker=MARKERS[i % len(MARKERS)], **MARK
-        )
+    for i, kind in enumerate(dataset["attractor_kind"].values):
+        mark = {"marker": MARKERS[i % len(MARKERS)], **MARK} if kind in ("rest", "periodic") else POINT
+        ax.plot(dataset[f"strobe_{name}"].values[i], dataset["strobe_velocity"].values[i], **mark)
     ax.set_xlim(_edges(x))
     ax.set_ylim(_edges(y))
     symbol = r"\theta" if name.startswith("theta") else name
     unit = " (rad)" if name.startswith("theta") else ""
-    ax.set_xlabel(rf"${symbol}$ at phase 0{unit}")
-    ax.set_ylabel(rf"${symbol}'$ at phase 0")
+    when = "" if _steady(dataset) else " at phase 0"
+    ax.set_xlabel(rf"${symbol}${when}{unit}")
+    ax.set_ylabel(rf"${symbol}'${when}")
     handles = _legend(dataset, numbers, colours)
     figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.2, handletextpad=0.4)
     return figure
@@ -94,13 +95,18 @@ def _legend(dataset: Any, numbers: list[int], colours: list[Any]) -> list[Line2D
     handles = []
     for i, number in enumerate(numbers[:MOST_NAMED]):
         kind, periods = str(dataset["attractor_kind"].values[i]), int(dataset["attractor_periods"].values[i])
-        what = f"period {periods}" if kind == "periodic" else kind
+        what = kind if kind != "periodic" else "equilibrium" if _steady(dataset) else f"period {periods}"
         text = f"{number}: {what}, {_percent(float(dataset['cells'].values[i]))}"
         handles.append(_handle(MARKERS[i % len(MARKERS)], colours[i], text))
     left = float(dataset.attrs.get("undecided", 0.0))
     if left:
         handles.append(_handle("s", UNDECIDED, f"undecided, {_percent(left)}"))
     return handles
+
+
+def _steady(dataset: Any) -> bool:
+    """Whether the load is constant: there are no phases then."""
+    return bool(dataset.attrs.get("load") == "constant")
 
 
 def _handle(marker: str, colour: Any, text: str) -> Line2D:
