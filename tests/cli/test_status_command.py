@@ -50,6 +50,14 @@ def test_a_complete_sweep(plan, told, tmp_path):
     assert any(line.startswith("size ") and line.endswith(" kB") for line in lines)
 
 
+def test_the_command_is_there(plan, saltus, refused, tmp_path):
+    run(plan, tmp_path / "store")
+    result = saltus("status", tmp_path / "store")
+    assert result.exit_code == 0
+    assert "6 of 6 done" in result.stdout
+    assert refused("status", tmp_path / "no store") == f"saltus: there is no store at {tmp_path / 'no store'}"
+
+
 def test_a_sweep_that_was_stopped(plan, told, tmp_path):
     run(plan, tmp_path / "store")
     files.chunk_file(tmp_path / "store", "c", (1, 1), 0).unlink()

@@ -3,6 +3,7 @@
 import random
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError, SweepError
 from saltus.sweep import Plan, Variable, files, open_store, run
-from saltus.sweep.store import Store, opened
+from saltus.sweep.store import opened
 
 
 @pytest.fixture(scope="module")
@@ -179,5 +180,15 @@ def test_planning_and_looking_at_a_sweep_import_nothing_heavy():
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
 
 
-def test_a_store_in_memory_is_never_done_before(waves_plan):
-    assert len(Store(waves_plan(), None).missing()) == 8
+def test_a_sweep_in_memory_needs_no_zarr(waves_plan):
+    code = "; ".join(
+        (
+            "import sys, numpy as np",
+            "from saltus.sweep import Plan, Variable, run",
+            "entries = {'arguments': {'kinds': ['f8']}, 'axes': {'x': np.arange(3.0)}, 'variables': {'f8': Variable()}}",
+            "run(Plan(function='sweep_toys:kinds', **entries))",
+            "print([m for m in ('zarr', 'distributed') if m in sys.modules])",
+        )
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path(__file__).parent)
+    assert result.stdout.strip() == "[]"

@@ -29,7 +29,7 @@ def print_status(path: Path) -> None:
 
     found = status(path)
     console = Console(highlight=False)
-    console.print(f"[bold]{found.kind.capitalize().replace('_', ' ')}[/] ", end="")
+    console.print(f"[bold]{found.kind[:1].upper()}{found.kind[1:].replace('_', ' ')}[/] ", end="")
     console.print(f"in {path}", markup=False, soft_wrap=True)
     if console.is_terminal:
         console.print(ProgressBar(total=found.total, completed=found.done, width=WIDTH), "", sep="\n")

@@ -13,7 +13,7 @@ import numpy as np
 
 from saltus.errors import ParameterError, near
 from saltus.sweep.chunk import resolve
-from saltus.sweep.jsonable import plain
+from saltus.sweep.jsonable import plain, text
 from saltus.sweep.layout import Index, Layout
 
 NAME = re.compile(r"[A-Za-z][\w.\-]*")  # of an axis, a dimension or a variable: it is a folder's name in a store
@@ -120,6 +120,11 @@ class Plan:
         """The shape of a variable, whole or in the chunk `index`."""
         sizes = self.layout.sizes.values() if index is None else (s.stop - s.start for s in self.layout.slices(index))
         return (*sizes, *(size for _, size in self.variables[name].extra))
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Those of the dataset: the plan's own, and the plan itself as a text."""
+        return {**self.attrs, "plan": text(self.describe())}
 
     def describe(self) -> dict[str, Any]:
         """The plan as JSON: two plans that say the same compute the same. Axes are told by a digest of their values."""

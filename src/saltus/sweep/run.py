@@ -6,13 +6,14 @@ import logging
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError, SweepError
 from saltus.sweep.chunk import Failure, Raised, attempt, checked
 from saltus.sweep.layout import Index
+from saltus.sweep.memory import Memory
 from saltus.sweep.plan import Plan
 from saltus.sweep.store import Store, opened
 
@@ -64,7 +65,7 @@ def run(
         SweepInterrupted: Ctrl-C. In all these cases the chunks written before are kept.
     """
     path = _check(plan, store, workers, scheduler, progress, retries)
-    with opened(plan, path) as sheets:
+    with nullcontext(Memory(plan)) if path is None else opened(plan, path) as sheets:
         sweep = _Sweep(plan, sheets, progress, retries)
         try:
             sweep.fill(workers, scheduler)
@@ -82,7 +83,7 @@ def run(
 class _Sweep:
     """One run: the queue of missing chunks, the failures, the clock."""
 
-    def __init__(self, plan: Plan, sheets: Store, progress: Progress | None, retries: int) -> None:
+    def __init__(self, plan: Plan, sheets: Store | Memory, progress: Progress | None, retries: int) -> None:
         self.plan, self.sheets, self.progress, self.retries = plan, sheets, progress, retries
         self.queue = deque(sheets.missing())
         self.total = plan.layout.total

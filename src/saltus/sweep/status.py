@@ -65,7 +65,7 @@ def status(path: Path | str) -> Status:
         updated = max(updated, *times)
     return Status(
         path=path,
-        kind=str(plan["attrs"].get("kind", "sweep")),
+        kind=str(plan["attrs"].get("kind") or plan["attrs"].get("title") or "sweep"),
         function=plan["function"],
         sizes=dict(layout.sizes),
         done=layout.total - len(missing),

@@ -15,7 +15,7 @@ import numpy as np
 from saltus.errors import ParameterError, SweepError
 from saltus.sweep import files
 from saltus.sweep.chunk import Arrays, Failure
-from saltus.sweep.jsonable import differences, text
+from saltus.sweep.jsonable import differences
 from saltus.sweep.layout import Index
 from saltus.sweep.plan import Plan
 from saltus.sweep.status import read_plan, status
@@ -25,19 +25,17 @@ if TYPE_CHECKING:
 
 
 class Store:
-    """The arrays of a plan, in a folder or, where `path` is None, in memory.
+    """The arrays of a plan, in a folder.
 
     A chunk is done when the file of every variable is there. A file is written once and whole, so that it is there or not,
     and its bytes are those of the computed numbers alone: a store does not show who wrote it, when, or in what order.
     """
 
-    def __init__(self, plan: Plan, path: Path | None) -> None:
+    def __init__(self, plan: Plan, path: Path) -> None:
         import zarr
 
         self.plan, self.path = plan, path
-        self.zarr: Any = zarr.storage.MemoryStore() if path is None else files.zarr_store(path)
-        if path is None:
-            _make(plan, self.zarr)
+        self.zarr = files.zarr_store(path)
         # Otherwise a chunk of nothing but fill values has no file, and would never be done.
         with zarr.config.set({"array.write_empty_chunks": True}):
             group: Any = zarr.open_group(self.zarr, mode="r+")
@@ -66,8 +64,6 @@ class Store:
 
     def note(self, failures: Iterable[Failure]) -> None:
         """Keep a list of the chunks that failed beside the arrays, for `status`; without any, the file is gone."""
-        if self.path is None:
-            return
         entries = [{"index": f.index, "place": f.place, "error": f.error, "attempts": f.attempts} for f in failures]
         file = self.path / files.FAILURES
         with contextlib.suppress(OSError):  # a full disk is told where a chunk is written
@@ -77,26 +73,22 @@ class Store:
                 file.unlink(missing_ok=True)
 
     def dataset(self) -> xarray.Dataset:
-        """What there is: in memory, or read from the folder as it is needed."""
-        dataset = _dataset(self.zarr)
-        return dataset.load() if self.path is None else dataset
+        """What there is, read from the folder as it is needed."""
+        return _dataset(self.zarr)[list(self.plan.variables)]
 
     def _has(self, name: str, index: Index) -> bool:
         extra = len(self.plan.variables[name].extra)
-        return self.path is not None and files.chunk_file(self.path, name, index, extra).exists()
+        return files.chunk_file(self.path, name, index, extra).exists()
 
 
 @contextlib.contextmanager
-def opened(plan: Plan, path: Path | None) -> Iterator[Store]:
-    """The store of `plan` at `path`, made if it is not there, and locked; or one in memory.
+def opened(plan: Plan, path: Path) -> Iterator[Store]:
+    """The store of `plan` at `path`, made if it is not there, and locked.
 
     Raises:
         ParameterError: there is something else at `path`, or the store of another plan.
         SweepError: it cannot be made, or another run is writing to it.
     """
-    if path is None:
-        yield Store(plan, None)
-        return
     if not (path / files.METADATA).is_file():
         _create(plan, path)
     there = read_plan(path)
@@ -165,7 +157,7 @@ def _make(plan: Plan, store: Any) -> None:
     """Write the metadata and the coordinates; nothing of it is ever written again."""
     import zarr
 
-    group = zarr.create_group(store, zarr_format=3, attributes={**plan.attrs, "plan": text(plan.describe())})
+    group = zarr.create_group(store, zarr_format=3, attributes=plan.attributes)
     for name, values in plan.axes.items():
         coordinate = group.create_array(name, shape=values.shape, chunks=values.shape, dtype=values.dtype, dimension_names=[name])
         coordinate[:] = values

@@ -1,0 +1,48 @@
+"""A sweep that is kept in memory: the same as a store, without files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from saltus.sweep.chunk import Arrays, Failure
+from saltus.sweep.layout import Index
+from saltus.sweep.plan import Plan
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class Memory:
+    """The arrays of a plan, in memory; see `saltus.sweep.store.Store`."""
+
+    path = None
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.arrays = {name: np.full(plan.shape(name), v.fill, dtype=v.dtype) for name, v in plan.variables.items()}
+
+    def missing(self) -> list[Index]:
+        """All chunks."""
+        return list(self.plan.layout.indices())
+
+    def write(self, index: Index, values: Arrays) -> None:
+        """Keep a chunk."""
+        cut = self.plan.layout.slices(index)
+        for name, array in self.arrays.items():
+            array[cut] = values[name]
+
+    def note(self, failures: Iterable[Failure]) -> None:
+        """Nobody could look at them here."""
+
+    def dataset(self) -> xarray.Dataset:
+        """What there is."""
+        import xarray
+
+        variables = {
+            name: (self.plan.dimensions(name), array, self.plan.variables[name].attrs) for name, array in self.arrays.items()
+        }
+        axes = {name: (name, values.copy()) for name, values in self.plan.axes.items()}
+        return xarray.Dataset(variables, coords=axes, attrs=self.plan.attributes)
