@@ -1,6 +1,9 @@
 """Lyapunov exponents against linear theory, the multipliers of orbits, the mean divergence, and each other's methods."""
 
 import math
+import subprocess
+import sys
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -26,6 +29,37 @@ def test_they_are_exact_below_the_wall_of_a_piecewise_linear_oscillator(damping,
     assert found.agrees
     assert found.divergence == pytest.approx(-damping, abs=1e-12)
     assert found.note is None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chain(saltus.Model):
+    """Two equal masses, each with a spring and a damper c to the ground, and a spring and a damper d between them."""
+
+    stiffness: float = 2.0
+    damping: float = 0.1
+    between: float = 0.2
+
+    coordinates = ("left", "right")
+    channels = ("force",)
+
+    @property
+    def sides(self):
+        return ()
+
+    def acceleration(self, t, q, v, side, load):
+        pull = self.stiffness * (q[1] - q[0]) + self.between * (v[1] - v[0])
+        return load.force(t) - q[0] + pull - self.damping * v[0], -pull - q[1] - self.damping * v[1]
+
+
+def test_they_are_exact_with_two_coordinates():
+    """The masses together have s^2 + c s + 1, against each other s^2 + (c + 2 d) s + 1 + 2 k: real parts -c/2, -(c + 2 d)/2."""
+    force = saltus.Load(frequency=1.7, force=saltus.Harmonic(amplitude=0.2))
+    system = saltus.System(model=Chain(), load=force)
+    expected = np.array([-0.05, -0.05, -0.25, -0.25])
+    found = lyapunov_spectrum(system, left=0.1, right=0.0, velocity=(0.0, 0.1), periods=400, transient=5)
+    np.testing.assert_allclose(found.values, expected, rtol=0, atol=1e-6)
+    assert found.values.sum() == pytest.approx(-0.6, abs=1e-9)
+    assert found.stroboscopic == pytest.approx(expected[0], abs=1e-5)
 
 
 @pytest.mark.parametrize("frequency", [None, 1.3])
@@ -191,6 +225,19 @@ def test_results_are_labelled_and_do_not_depend_on_what_else_is_computed():
     assert saltus.System.from_json(found.attrs["system"]) == under_force(1.0, 1.0)
     alone = lyapunov_many(under_force(1.0, 3.0), theta=[0.9], periods=32, transient=5)
     np.testing.assert_array_equal(found.exponent[1, 2], alone.exponent[0])
+
+
+def test_threads_do_not_get_in_each_others_way_in_a_fresh_process():
+    """Where nothing has been compiled or loaded before."""
+    script = (
+        "import numpy as np, saltus\n"
+        "from saltus.attractors import lyapunov_many\n"
+        "load = saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(amplitude=0.5), vertical=-0.5)\n"
+        "system = saltus.System(model=saltus.Metainterface(beta0=1.4, damping=0.1), load=load)\n"
+        "found = lyapunov_many(system, theta=np.linspace(0.3, 0.9, 40), periods=32, transient=0)\n"
+        "assert abs(found.exponent.sum('index') + 0.1).max() < 1e-8\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)
 
 
 def test_progress_goes_from_nothing_to_all():

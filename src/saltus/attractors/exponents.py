@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.attractors.averages import BATCHES, average, uncertainty
 from saltus.attractors.divergence import Contraction
-from saltus.attractors.pieces import check_periodic, check_run, pieces_of
+from saltus.attractors.pieces import check_periodic, check_run, first_frame, pieces_of
 from saltus.attractors.shadow import shadow_growth
 from saltus.errors import ParameterError
 from saltus.flow import Motion, Stop, sensitivities, simulate
@@ -151,7 +151,7 @@ class _Run:
 
     def go(self, state: dict[str, Any], tol: float, progress: Callable[[float], object] | None) -> str | None:
         """Follow the motion period after period; returns why that was no use."""
-        contraction, frame = Contraction(self.system), np.eye(self.stretch.shape[1])
+        contraction, frame = Contraction(self.system), first_frame(self.stretch.shape[1])
         for p in range(len(self.areas)):
             self.stretch[p], self.areas[p] = 0.0, 0.0
             for j in range(self.count):

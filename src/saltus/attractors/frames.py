@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.attractors.pieces import piece_count
+from saltus.attractors.pieces import first_frame, piece_count
 from saltus.flow import layout as k
 from saltus.flow.ensemble import _lanes as compiled_lanes
 from saltus.flow.ensemble_dataset import Wanted
+from saltus.flow.lanes.compile import load_advance, load_driver, load_helpers
 from saltus.flow.lanes.run import Jobs, Lanes, available_cores
 from saltus.flow.simulation import limits_of, program
 from saltus.systems import System
 
-GROUP = 128  # motions that one thread follows together: enough that a call costs less than its work
+LARGEST_GROUP = 256  # motions that one thread follows together: enough that a call costs less than its work
 LOOK = 0.2  # seconds between looks at Ctrl-C and at the progress
 
 
@@ -46,12 +48,7 @@ def stretch_many(
     lanes = compiled_lanes(system, program(system, limits, ()), wanted, 1)
     result = Stretched(np.full((periods, len(states), 2), np.nan), np.full((len(states), 2), np.nan))
     counts = np.array([piece_count(length) for length in lengths])
-    groups = [
-        rows[first : first + GROUP]
-        for count in np.unique(counts)
-        for rows in [np.flatnonzero(counts == count)]
-        for first in range(0, len(rows), GROUP)
-    ]
+    groups = [group for count in np.unique(counts) for group in _groups(np.flatnonzero(counts == count))]
     done = np.zeros(1)
     stopped: list[bool] = []
 
@@ -64,6 +61,7 @@ def stretch_many(
             done[0] += len(rows)
         result.states[rows] = follower.ends()
 
+    load_driver(), load_helpers(), load_advance()  # compiled here, not by each thread
     with ThreadPoolExecutor(available_cores()) as pool:
         workers = [pool.submit(work, rows) for rows in groups]
         try:
@@ -78,6 +76,12 @@ def stretch_many(
     return result
 
 
+def _groups(rows: np.ndarray) -> list[np.ndarray]:
+    """Rows in groups for the threads, a group or more for each core."""
+    least = max(available_cores(), math.ceil(len(rows) / LARGEST_GROUP))
+    return [group for group in np.array_split(rows, least) if group.size]
+
+
 class _Follower:
     """A group of motions with frames, a row of numbers for each: coordinate, its two derivatives, velocity, its two."""
 
@@ -85,7 +89,7 @@ class _Follower:
         self._lanes, self._columns, self._lengths = lanes, columns, lengths
         self._rows = np.zeros((len(states), 6))
         self._rows[:, [0, 3]] = states
-        self._rows[:, [1, 5]] = 1.0
+        self._rows[:, [1, 2, 4, 5]] = first_frame(2).ravel()
         self._alive = np.isfinite(states).all(axis=1)
 
     def period(self, pieces: int) -> np.ndarray:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from saltus.attractors.averages import BATCHES
 from saltus.errors import ParameterError
 from saltus.systems import Record, System
@@ -22,6 +24,15 @@ def pieces_of(system: System) -> tuple[float, int]:
 def piece_count(length: float) -> int:
     """Into how many pieces a period of this length is cut."""
     return max(1, math.ceil(length / LONGEST))
+
+
+def first_frame(size: int) -> np.ndarray:
+    """An orthonormal frame to begin with, (size, size), that no symmetry of a system fits.
+
+    One along the coordinates may lie in an invariant plane, and would then stay there until rounding moves it out.
+    """
+    frame: np.ndarray = np.linalg.qr(np.random.default_rng(0).standard_normal((size, size)))[0]
+    return frame
 
 
 def check_periodic(system: System) -> None:
