@@ -6,7 +6,7 @@ Every cell is tried from states spread over a region, then from the motions of i
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,11 +18,13 @@ from saltus.systems import System
 
 MOTIONS = 8  # kept of each cell, the largest ones
 INNERMOST = 1e-2  # every other start lies in a smaller copy of the region, down to this part of it
-STAGES = (1 / 12, 1 / 12, 1 / 6, 2 / 3)  # of the forcing periods, after which motions that have come together go on as one
+STAGES = (1 / 20, 1 / 20, 1 / 10, 4 / 5)  # of the forcing periods, after which motions that have come together go on as one
+AT_ONCE, FEWER_STAGES = 500, (1 / 10, 9 / 10)  # for no more tracks than so many
 PATIENCE, FEW = 4, 3  # times the periods for what is left of a cell, if no more than so many: slow, and not chaotic
-TOGETHER = 1e-3  # of their amplitude: motions so near to one another at the same phase become one
+TOGETHER = 1e-2  # of their amplitude: motions so near to one another at the same phase become one
+NEGLIGIBLE = 0.5  # of the least amplitude: what stays below it for some periods is not followed to where it settles
 EQUAL = 1e-4  # of the amplitude: settled motions with the same extrema, or the mirror images of these, are one
-ALIKE = 0.1  # of the amplitude: where a cell has such a motion already a neighbour's is no news
+ALIKE = 0.2  # of the amplitude: where a cell has such a motion already a neighbour's is no news
 ROUNDS = 400  # of starts from neighbours
 SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))
 MOTION = np.dtype(
@@ -108,21 +110,23 @@ def starts(system: System, count: int, region: tuple[float, float], seed: int) -
     return states
 
 
-def settle(task: Task, cell: np.ndarray, states: np.ndarray) -> Found:
-    """Follow motions from states (n, 2) at phase 0 in the cells of these numbers until they settle."""
+def settle(task: Task, cell: np.ndarray, states: np.ndarray, known: np.ndarray | None = None) -> Found:
+    """Follow motions from states (n, 2) at phase 0 in the cells of these numbers until they settle, or come to a known one."""
     tracks = Tracks(cell, states, np.ones(len(cell), dtype=np.int64), np.full(len(cell), np.inf))
     ended = {name: np.zeros(task.size, dtype=np.int64) for name in ("captured", "tiny", "unsettled")}
     motions = [np.empty(0, MOTION)]
-    for share in (*STAGES, PATIENCE):
+    for share in (*(STAGES if len(cell) > AT_ONCE else FEWER_STAGES), PATIENCE):
         if share == PATIENCE:
             many = np.bincount(tracks.cell, minlength=task.size)[tracks.cell] > FEW
             _count(ended["unsettled"], tracks.only(many))
             tracks = tracks.only(~many)
         tracks, settled, captured = _follow(task, tracks, math.ceil(share * task.periods), motions)
-        small = settled & (tracks.amplitude < task.least)
+        small = ~captured & (tracks.amplitude < task.least * np.where(settled, 1.0, NEGLIGIBLE))
         _count(ended["captured"], tracks.only(captured))
         _count(ended["tiny"], tracks.only(small))
-        tracks = joined(tracks.only(~captured & ~settled))
+        tracks = joined(tracks.only(~captured & ~settled & ~small))
+        if known is not None:
+            tracks = tracks.only(~arrived(tracks, known))
     small = tracks.amplitude < task.least
     _count(ended["tiny"], tracks.only(small))
     _count(ended["unsettled"], tracks.only(~small))
@@ -142,7 +146,7 @@ def _follow(task: Task, tracks: Tracks, periods: int, motions: list[np.ndarray])
     captured = np.isin(ends["stop"].values, [stops.index("captured"), stops.index("rest")])
     settled = (ends["cycle"].values > 0) & (ends["cycle"].values <= task.longest) & ~captured
     kept = np.where(settled, ends["cycle"].values, task.longest)  # of the last forcing periods
-    window = np.arange(task.longest)[::-1] < kept[:, None]
+    window = np.arange(ends.sizes["period"])[::-1] < kept[:, None]
     extremes = [np.nanmax(np.where(window, side, np.nan), axis=1, initial=-np.inf) for side in (
         ends[f"largest_{name}"].values, -ends[f"smallest_{name}"].values)]  # fmt: skip
     state = np.stack([ends[name].values, ends["velocity"].values], axis=1)
@@ -211,7 +215,7 @@ def from_neighbours(task: Task, found: Found, shape: tuple[int, int]) -> np.ndar
         cell, states = seeds(news, known, shape)
         if not len(cell):
             break
-        further = settle(task, cell, states).motions
+        further = settle(task, cell, states, known).motions
         news = further[~has(known, further["cell"], further, EQUAL)]
         known = distinct(np.concatenate([known, news]))
     return known
@@ -231,17 +235,32 @@ def seeds(motions: np.ndarray, known: np.ndarray, shape: tuple[int, int]) -> tup
 
 def has(known: np.ndarray, cell: np.ndarray, motions: np.ndarray, tolerance: float) -> np.ndarray:
     """Whether these cells have a motion like each of these: of the same period and impacts, and of about the same extrema."""
-    first = np.searchsorted(known["cell"], cell)
-    last, result = np.searchsorted(known["cell"], cell, side="right"), np.zeros(len(cell), dtype=bool)
+    result = np.zeros(len(cell), dtype=bool)
+    for there, other in _motions_of(known, cell):
+        like = there.copy()
+        for name in ("period", "crossings"):
+            like &= other[name] == motions[name]
+        for name in ("amplitude", "other"):
+            like &= np.abs(other[name] - motions[name]) <= tolerance * motions["amplitude"]
+        result |= like
+    return result
+
+
+def arrived(tracks: Tracks, known: np.ndarray) -> np.ndarray:
+    """Which tracks have come to a motion that their cell has already."""
+    result = np.zeros(len(tracks.cell), dtype=bool)
+    for there, other in _motions_of(known, tracks.cell):
+        apart = np.abs(tracks.state - other["state"]).max(axis=1)
+        result |= there & (apart <= TOGETHER * np.minimum(tracks.amplitude, other["amplitude"]))
+    return result
+
+
+def _motions_of(known: np.ndarray, cell: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """The first motion of each of these cells, then the second, ...: whether there is one, and what it is."""
+    first, last = (np.searchsorted(known["cell"], cell, side=side) for side in ("left", "right"))
     for step in range(int((last - first).max(initial=0))):
         there = first + step < last
-        other = known[np.where(there, first + step, 0)]
-        for name in ("period", "crossings"):
-            there &= other[name] == motions[name]
-        for name in ("amplitude", "other"):
-            there &= np.abs(other[name] - motions[name]) <= tolerance * motions["amplitude"]
-        result |= there
-    return result
+        yield there, known[np.where(there, first + step, 0)]
 
 
 def table(found: Found, motions: np.ndarray, size: int) -> dict[str, np.ndarray]:
