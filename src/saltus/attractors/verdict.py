@@ -107,10 +107,11 @@ def _long_cycle(strobes: np.ndarray, longest: int) -> int:
 
 def on_cycle(case: Case, ends: Ends, found: Certificate, seen: str, **more: Any) -> Verdict:
     """The verdict on a motion with an orbit under it, certified or not."""
+    more["evidence"] = more.get("evidence", {}) | found.evidence
     if found.orbit is None or not found.sound:
-        return case.verdict("undecided", f"{seen}, but {found.doubt}", ends, evidence=found.evidence, **more)
+        return case.verdict("undecided", f"{seen}, but {found.doubt}", ends, **more)
     q = found.orbit.periods
     text = f"{seen}, on an orbit of period {q} with the largest multiplier {abs(found.orbit.multipliers[0]):.6g}"
     if case.system.load.period is None:
         text = f"it comes to the equilibrium at {float(ends.strobes[0, -1, 0]):.9g}, which attracts"
-    return case.verdict("periodic", text, ends, period=q, orbit=found.orbit, evidence=found.evidence, **more)
+    return case.verdict("periodic", text, ends, period=q, orbit=found.orbit, **more)

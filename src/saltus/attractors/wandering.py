@@ -94,7 +94,7 @@ def _after_all(verdict: Verdict, given: dict[str, Any]) -> Verdict:
     """The verdict on a motion that has settled in the end, after the exponents of its transient were taken."""
     before, exponents = given["periods"], given["exponents"]
     chaos = f" of transient chaos with an exponent of {exponents.values[0]:.4g}" if exponents.positive else ""
-    reason = f"after more than {before} forcing periods{chaos} {verdict.reason}"
+    reason = f"after more than {before} forcing periods{chaos}: {verdict.reason}"
     return replace(
         verdict,
         reason=reason,
@@ -133,7 +133,7 @@ def _regular(case: Case, ends: Ends, last: Exponents, opinion: ZeroOne | None, g
         return case.verdict("quasi-periodic", text, ends, **given)
     found = certify(case.clock, np.array(list(last.state.values())[:2]), None, longest=case.longest)
     if found.sound:
-        return on_cycle(case, ends, found, "it approaches slowly", **{k: v for k, v in given.items() if k != "evidence"})
+        return on_cycle(case, ends, found, "it approaches slowly", **given)
     given["evidence"] |= {} if against is None else {"no_tori": against}
     text = f"it has not settled in {given['periods']} forcing periods, and an exponent of {size} is not surely above 0"
     return case.verdict("undecided", text + ("; a torus is excluded" if against else ""), ends, **given)
