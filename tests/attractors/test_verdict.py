@@ -34,6 +34,8 @@ def test_a_periodic_motion_is_certified_by_its_own_equations(e):
     assert verdict.evidence["largest_multiplier"] < 1.0
     assert verdict.evidence["defect"] < 1e-9
     assert verdict.exponents is None
+    if e == 1.0:  # a pair of multipliers, whose product is exp(-C T): both exponents are -C / 2
+        assert verdict.evidence["largest_exponent"] == pytest.approx(-0.05, abs=1e-9)
 
 
 def test_a_longer_period_is_counted_in_forcing_periods():
@@ -53,6 +55,7 @@ def test_an_orbit_with_rest_is_periodic():
     assert verdict.kind == "periodic"
     assert verdict.orbit.rest_share > 0.1
     assert verdict.evidence["largest_multiplier"] == 0.0
+    assert verdict.evidence["largest_exponent"] == -math.inf
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,9 +56,11 @@ class Certificate:
         """The numbers, by name."""
         if self.orbit is None:
             return {}
+        multiplier = float(abs(self.orbit.multipliers[0]))
         return {
             "residual": self.orbit.residual,
-            "largest_multiplier": float(abs(self.orbit.multipliers[0])),
+            "largest_multiplier": multiplier,
+            "largest_exponent": math.log(multiplier) / self.orbit.duration if multiplier > 0.0 else -math.inf,
             "defect": self.orbit.defect,
             "distance": self.distance,
             "amplitude": self.orbit.amplitude,
