@@ -101,6 +101,17 @@ def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
     return np.asarray(straight + u**2 * (2.0 * bend + twist) + u**3 * (bend + twist))
 
 
+def between(a: Point, b: Point, share: float) -> np.ndarray:
+    """Where the curve is expected at a share of the way from a to b: on the cubic through both with their tangents."""
+    if a.curve is not b.curve:
+        return a.place + share * (b.place - a.place)
+    chord = b.place - a.place
+    length = a.curve.norm(chord) * (1.0 + float(a.curve.norm(b.tangent - a.tangent)) ** 2 / 24.0)
+    start_, end = length * a.tangent - chord, length * b.tangent - chord
+    rest = 1.0 - share
+    return np.asarray(a.place + share * chord + share * rest * (rest * start_ - share * end))
+
+
 def start(orbit: PeriodicOrbit, scale: float, symmetric: bool, upwards: bool) -> Point:
     """A known orbit as the first point of its curve, to be followed towards larger or smaller parameters."""
     curve = Curve(orbit.problem, scale, symmetric)

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.path import Curve, Point
+from saltus.orbits.path import Curve, Point, between
 from saltus.orbits.signature import Signature
 
 REACHES = 10.0 ** np.arange(-8, -0.9)  # along a parent's branch, until its special point is found between
-NARROW = 1e-15  # bracket, in the step that contains the point
+NARROW = 1e-11  # bracket, in the step that contains the point; what is nearest to zero is nearer still,
+GRAZING = 1e-15  # and nearest of all at a grazing, beside which motions part by the square root
 KINDS = {
     "LP": "fold (limit point)",
     "PD": "period doubling",
@@ -131,7 +132,7 @@ def located(kind: str, test: Test, a: Point, b: Point) -> SpecialPoint | None:
 
     def at(share: float) -> float:
         if share not in known:
-            point = a.curve.solve(a.place + share * chord, direction)
+            point = a.curve.solve(between(a, b, share), direction)
             if point is None:
                 raise ArithmeticError
             known[share] = point
@@ -141,7 +142,7 @@ def located(kind: str, test: Test, a: Point, b: Point) -> SpecialPoint | None:
     if before * after > 0.0 or not np.isfinite([before, after]).all():
         return None
     try:
-        brentq(at, 0.0, 1.0, xtol=NARROW, rtol=1e-15)
+        brentq(at, 0.0, 1.0, xtol=GRAZING if kind == "GR" else NARROW, rtol=1e-15)
     except (ArithmeticError, RuntimeError):
         return None
     values = {share: test(point) for share, point in known.items()}
