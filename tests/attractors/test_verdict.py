@@ -203,7 +203,10 @@ def test_a_motion_that_ends_is_undecided():
     )
     verdict = classify(system, theta=0.1)
     assert verdict.kind == "undecided"
-    assert "ends" in verdict.reason
+    assert "where its margin overturned reaches 0" in verdict.reason
+    torn = classify(under_force(1.0, 0.3, damping=0.1, vertical=0.5, e=0.0), theta=0.3, velocity=-3.0)
+    assert torn.kind == "undecided"
+    assert "not unique" in torn.reason
 
 
 def test_a_longest_period_may_be_longer_than_what_settling_looks_for():

@@ -68,7 +68,7 @@ def classify(
     ends = settle(
         clock, start, int(transient + periods), kept=max(STROBES, 4 * int(longest)), tol=tol, progress=case.part(0.0, 0.1)
     )
-    verdict = settled(case, ends) or wandering(case, ends)
+    verdict = settled(case, ends, start[0]) or wandering(case, ends)
     case.progress(1.0)
     return verdict
 

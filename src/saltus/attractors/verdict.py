@@ -12,6 +12,8 @@ from saltus.attractors.certify import Certificate, certify
 from saltus.attractors.exponents import Exponents
 from saltus.attractors.settling import Ends
 from saltus.attractors.zero_one import ZeroOne
+from saltus.errors import MotionError
+from saltus.flow import simulate
 from saltus.orbits import PeriodicOrbit
 from saltus.systems import System
 
@@ -80,21 +82,32 @@ class Case:
         return Verdict(system=self.system, kind=kind, reason=reason, **given)
 
 
-def settled(case: Case, ends: Ends) -> Verdict | None:
-    """The verdict on a motion that has come to rest, ended or repeats itself; None where it wanders on."""
+def settled(case: Case, ends: Ends, start: np.ndarray) -> Verdict | None:
+    """The verdict on a motion from a state (2,) that has come to rest, ended or repeats itself; None where it wanders on."""
     done = round(float(ends.periods[0]))
     if ends.rest[0]:
         point = {case.system.model.coordinates[0]: float(case.system.model.contact), "velocity": 0.0}
         text = f"within {done} forcing periods it is captured by the contact, from where no later load pulls it"
         return case.verdict("rest", text, ends, state=point)
     if ends.ended[0]:
-        text = f"the motion ends within {done} forcing periods: at a margin of the model, or because it cannot go on"
-        return case.verdict("undecided", text, ends)
+        return case.verdict("undecided", _why_ended(case, start, done), ends)
     cycle = int(ends.cycle[0]) or _long_cycle(ends.strobes[0], case.longest)
     if not cycle:
         return None
     found = certify(case.clock, ends.strobes[0, -1], cycle)
     return on_cycle(case, ends, found, "it repeats itself" + (f" every {cycle} forcing periods" if cycle > 1 else ""))
+
+
+def _why_ended(case: Case, start: np.ndarray, periods: int) -> str:
+    """The sentence of `simulate` on a motion that ends."""
+    begin: dict[str, Any] = {case.system.model.coordinates[0]: float(start[0]), "velocity": float(start[1])}
+    try:
+        motion = simulate(case.clock, **begin, periods=periods + 1, tol=case.tol, dense=False)
+    except MotionError as error:
+        return f"the motion cannot go on: {error}"
+    if motion.limit is not None:
+        return f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0"
+    return f"the motion cannot be followed beyond some {periods} forcing periods"
 
 
 def _long_cycle(strobes: np.ndarray, longest: int) -> int:

@@ -39,7 +39,7 @@ def wandering(case: Case, ends: Ends) -> Verdict:
         return case.verdict("undecided", f"after {followed} forcing periods {last.note}", ends, **given)
     later = _beside(case, last.state)
     evidence |= {"companions": COMPANIONS, "companions_settled": int((~later.moving[1:]).sum())}
-    verdict = settled(case, _only_first(later))
+    verdict = settled(case, _only_first(later), _row(case, last.state))
     if verdict is not None:
         return _after_all(verdict, given)
     if all(stage.positive for stage in stages):
@@ -48,7 +48,7 @@ def wandering(case: Case, ends: Ends) -> Verdict:
 
 
 def _stages(case: Case, state: np.ndarray) -> list[Exponents]:
-    """Exponents of a run and, if they are positive, of one twice as long that goes on from there."""
+    """Exponents of a run and of one twice as long that goes on from there."""
     spans = [case.periods // STAGES, 2 * (case.periods // STAGES)]
     stages: list[Exponents] = []
     at: dict[str, Any] = {case.system.model.coordinates[0]: float(state[0]), "velocity": float(state[1])}
@@ -57,7 +57,7 @@ def _stages(case: Case, state: np.ndarray) -> list[Exponents]:
         part = case.part(0.1 + 0.8 * done, 0.1 + 0.8 * (done + span / sum(spans)))
         stages.append(lyapunov_spectrum(case.system, **at, periods=span, transient=0, tol=case.tol, shadow=i == 0, progress=part))
         at = stages[-1].state
-        if not stages[-1].positive:
+        if stages[-1].note is not None:
             break
     return stages
 
@@ -81,9 +81,13 @@ def _numbers(stages: list[Exponents], opinion: ZeroOne | None) -> dict[str, Any]
 def _beside(case: Case, state: dict[str, Any]) -> Ends:
     """How motions end that begin at a state, the first, and beside it."""
     around = np.random.default_rng(case.seed).uniform(-ASIDE, ASIDE, (COMPANIONS, 2))
-    states = np.array([state[case.system.model.coordinates[0]], state["velocity"]]) + np.concatenate([[[0.0, 0.0]], around])
+    states = _row(case, state) + np.concatenate([[[0.0, 0.0]], around])
     kept = 4 * case.longest
     return settle(case.clock, states, max(case.periods, LEAST), kept=kept, tol=case.tol, progress=case.part(0.9, 1.0))
+
+
+def _row(case: Case, state: dict[str, Any]) -> np.ndarray:
+    return np.array([state[case.system.model.coordinates[0]], state["velocity"]])
 
 
 def _only_first(ends: Ends) -> Ends:
@@ -131,7 +135,7 @@ def _regular(case: Case, ends: Ends, last: Exponents, opinion: ZeroOne | None, g
         assert opinion is not None
         text = f"its exponents are 0 ({size}), it does not repeat itself, and the 0-1 test sees order (K = {opinion.K:.3g})"
         return case.verdict("quasi-periodic", text, ends, **given)
-    found = certify(case.clock, np.array(list(last.state.values())[:2]), None, longest=case.longest)
+    found = certify(case.clock, _row(case, last.state), None, longest=case.longest)
     if found.sound:
         return on_cycle(case, ends, found, "it approaches slowly", **given)
     given["evidence"] |= {} if against is None else {"no_tori": against}
