@@ -142,6 +142,10 @@ def test_a_slow_passage_by_a_fold_is_no_attractor(at_the_fold):
     late = classify(under_force(1.0, 0.0219879514 - 1e-7), theta=theta, velocity=velocity + 1e-4, periods=4000)
     assert late.kind == "rest"
     assert late.periods > 1000
+    during = classify(late.system, theta=theta, velocity=velocity + 1e-4, periods=late.periods - 300, transient=0)
+    assert during.kind == "rest"  # though the exponents are lost on the way
+    assert np.isnan(during.evidence["largest_exponent"])
+    assert during.periods == pytest.approx(late.periods, abs=1)
 
 
 def test_a_slow_approach_to_an_orbit_is_periodic(at_the_fold):

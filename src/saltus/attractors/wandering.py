@@ -31,17 +31,17 @@ def wandering(case: Case, ends: Ends) -> Verdict:
     last, series = stages[-1], ends.strobes[0, :, 0]
     series = series[np.isfinite(series)]
     opinion = zero_one_test(series, seed=case.seed) if series.size >= SHORTEST else None
-    followed = round(float(ends.periods[0])) + sum(stage.periods for stage in stages)
+    followed = round(float(ends.periods[0])) + sum(stage.periods for stage in stages if stage.note is None)
     evidence = _numbers(stages, opinion)
     given: dict[str, Any] = {"exponents": last, "zero_one": opinion, "state": last.state}
     given |= {"periods": followed, "evidence": evidence}
-    if last.note is not None:
-        return case.verdict("undecided", f"after {followed} forcing periods {last.note}", ends, **given)
     later = _beside(case, last.state)
     evidence |= {"companions": COMPANIONS, "companions_settled": int((~later.moving[1:]).sum())}
     verdict = settled(case, _only_first(later), _row(case, last.state))
     if verdict is not None:
         return _after_all(verdict, given)
+    if last.note is not None:
+        return case.verdict("undecided", f"after {followed} forcing periods {last.note}", ends, **given)
     if all(stage.positive for stage in stages):
         return _chaotic(case, ends, last, opinion, given)
     return _regular(case, ends, last, opinion, given)
