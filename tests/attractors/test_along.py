@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from attractor_cases import FOLDS, HELD, ONSET, loaded
+from attractor_cases import FOLDS, HELD, ONSET, loaded, walled
 
 import saltus
 from saltus.attractors.along import attractors_along, set_distance
 from saltus.attractors.attractor import Target
 from saltus.errors import ParameterError
+from saltus.theory import wall_orbits
 
 
 def test_births_and_deaths_bracket_the_folds_and_the_jump_changes_the_identity() -> None:
@@ -41,6 +42,17 @@ def test_an_attractor_without_starts_of_its_own_is_carried_along() -> None:
     branch = saltus.continue_orbit(saltus.find_orbit(loaded(W=0.8), theta=0.3), "load.frequency", (0.7, 0.92))
     upper = [max(orbit.amplitude for orbit in branch.at(value) if orbit.stable) for value in values]
     assert amplitude == pytest.approx(upper, rel=1e-9)  # the large motion is followed past the birth of the small one
+
+
+def test_a_doubling_changes_the_period_where_the_closed_form_says_and_not_the_identity() -> None:
+    system = walled(W=2.6, wall=0.3, e=0.5)
+    family = wall_orbits(system, 2)
+    doubling = family.amplitude(family.doubling_speed)
+    values = doubling * np.array([0.99, 0.996, 1.004, 1.01])
+    found = attractors_along(system, "load.force.amplitude", values, starts=48)
+    assert found["event_kind"].size == 0
+    assert found["period"].sel(attractor=1).values.tolist() == [1, 1, 1, 1]  # without impacts
+    assert found["period"].sel(attractor=2).values.tolist() == [2, 2, 4, 4]
 
 
 def test_mirror_images_are_not_exchanged() -> None:

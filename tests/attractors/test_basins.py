@@ -104,6 +104,19 @@ def test_a_grid_of_its_own_keeps_to_the_side_of_the_wall() -> None:
     assert (picture["label"].values == 1).all()
 
 
+@pytest.mark.thorough
+def test_cells_of_a_chaotic_attractor_are_told_from_those_of_a_cycle() -> None:
+    grid = np.linspace(-1.9, 1.9, 8)
+    system = loaded(3.0, 1.1)
+    picture = basins(system, theta=grid, velocity=grid)
+    assert picture["attractor_kind"].values.tolist() == ["periodic", "chaotic"]
+    assert picture.attrs["undecided"] == 0.0
+    for i, j in ((0, 0), (7, 0), (2, 5), (5, 6)):
+        last = strobes(system, np.array([grid[j], grid[i]]), 120)
+        repeats = np.abs(last[-1] - last[-2]).max() < 1e-6
+        assert int(picture["label"][i, j]) == (1 if repeats else 2)
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

@@ -1,0 +1,41 @@
+"""Where motions of the metainterface end: three attractors under one load, their basins, and the curves that part them."""
+
+import numpy as np
+
+import saltus
+from saltus.attractors.basins import basins
+from saltus.attractors.found import attractors
+from saltus.attractors.fractal import basin_entropy, uncertainty_exponent
+from saltus.attractors.manifolds import stable_manifold
+
+system = saltus.System(
+    model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
+    load=saltus.Load(frequency=2.4, horizontal=saltus.Harmonic(amplitude=1.0), vertical=-0.5),
+)
+found = attractors(system, region=(2.0, 2.0))
+print(found)
+
+grid = np.linspace(-2.0, 2.0, 101)
+picture = basins(system, theta=grid, velocity=grid, found=found)
+for label, share in zip(picture.attractor.values, picture.cells.values, strict=True):
+    slowest = float(picture.time.where(picture.label == label).max())
+    print(f"attractor {label}: {100 * share:.1f} % of the grid, reached within {slowest:.0f} forcing periods")
+exponent = uncertainty_exponent(picture.label)
+print(basin_entropy(picture.label))
+print(f"boundary of dimension {exponent.dimension:.2f} +- {exponent.error:.2f}, as far as this grid shows it")
+
+# The saddle orbits: the states that the flow takes to them, computed by the exact backward flow, are where the basins meet.
+branch = saltus.continue_orbit(found.of(3).orbit, "load.frequency", (2.1, 3.2))
+saddles = [orbit for orbit in branch.at(2.4) if not orbit.stable]
+curves = [stable_manifold(saddle, window=((-2.0, 2.0), (-2.0, 2.0))) for saddle in saddles]
+for curve in curves:
+    print(curve)
+
+labels = picture.label.values
+rows, columns = np.nonzero(labels[:, 1:] != labels[:, :-1])
+edge = np.stack([0.5 * (grid[columns] + grid[columns + 1]), grid[rows]], axis=1)
+states = np.concatenate([curve.states for curve in curves])
+states = states[np.isfinite(states).all(axis=1)]
+distance = np.array([np.abs(states - point).max(axis=1).min() for point in edge])
+print(f"{len(edge)} edges between cells lie within {distance.max() / (grid[1] - grid[0]):.2f} cells of the manifolds")
+assert distance.max() < grid[1] - grid[0]
