@@ -112,6 +112,25 @@ def test_with_unequal_layers_and_losses_they_add_up_to_the_mean_divergence():
     assert Contraction(system).along(motion) == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.thorough
+def test_the_sum_of_the_exponents_is_the_divergence_of_random_systems():
+    rng, checked = np.random.default_rng(8), 0
+    for _ in range(30):
+        numbers = {
+            "damping": rng.uniform(0.0, 0.3),
+            "e": rng.choice([1.0, rng.uniform(0.6, 1.0)]),
+            "stiffness_ratio": rng.uniform(0.5, 2.0),
+            "mass_ratio": rng.uniform(0.0, 1.0),
+            "dissipation_ratio": rng.uniform(0.0, 2.0),
+        }
+        system = under_force(rng.uniform(0.3, 3.0), rng.uniform(0.5, 4.0), **numbers)
+        found = lyapunov_spectrum(system, theta=rng.uniform(-1, 1), periods=48, transient=20, shadow=False)
+        if found.note is None:
+            assert found.sum_defect < 1e-8
+            checked += 1
+    assert checked > 20
+
+
 def test_the_contraction_of_an_impact_that_depends_on_the_ground_is_that_of_its_slope():
     """T+ = r T-, with a moving ground: (v+ dv+/dv-) / v- by differences of the law itself."""
     system = saltus.System(

@@ -78,7 +78,8 @@ def lyapunov_many(
     cycle = run.cycle(stretched.states)
     if progress is not None:
         progress(1.0)
-    return _dataset(system, run, stretched, captured, cycle, {"periods": periods, "transient": transient, "tol": tol})
+    measures = _measures(system, run, stretched, captured) | {"cycle": cycle}
+    return _dataset(run, measures, stretched.states, {"periods": periods, "transient": transient, "tol": tol})
 
 
 class _Many:
@@ -135,15 +136,9 @@ def _words(result: Any) -> np.ndarray:
     return np.array(result["stop"].attrs["flag_meanings"].split())[result["stop"].values]
 
 
-def _dataset(
-    system: System, run: _Many, stretched: Stretched, captured: np.ndarray, cycle: np.ndarray, attributes: dict[str, Any]
-) -> xarray.Dataset:
-    import xarray
-
-    from saltus import __version__
-
-    inputs, half = run.inputs, len(stretched.growth) // 2
-    growth = stretched.growth
+def _measures(system: System, run: _Many, stretched: Stretched, captured: np.ndarray) -> dict[str, np.ndarray]:
+    """Exponents, errors and what follows from them, a row for each motion."""
+    growth, half = stretched.growth, len(stretched.growth) // 2
     if captured.any():
         lossy = impact_factor(system, run.parameters) < ONE
         growth = np.where((captured & lossy)[None, :, None], -np.inf, growth)
@@ -152,30 +147,47 @@ def _dataset(
     means = {name: average(part) for name, part in parts.items()}
     errors = {name: uncertainty(part) for name, part in parts.items()}
     limits = {name: np.array([resolution(len(part) * t) for t in run.lengths]) for name, part in parts.items()}
-    positive = np.logical_and.reduce([means[n][:, 0] - errors[n][:, 0] > limits[n] for n in parts])
     rested = captured | np.isneginf(means["exponent"][:, 1])
-    ending = np.where(rested, 1, np.where(np.isfinite(stretched.states).all(axis=1), 0, 2)).astype(np.int8)
-    dims = inputs.dims
-    texts = {"exponent": "Lyapunov exponents", "at_half": "from the first half alone", "later_half": "from the second half alone"}
-    values: dict[str, Any] = {}
+    moving = np.isfinite(stretched.states).all(axis=1)
+    return means | {
+        "error": errors["exponent"],
+        "resolution": limits["exponent"],
+        "positive": np.logical_and.reduce([means[n][:, 0] - errors[n][:, 0] > limits[n] for n in parts]),
+        "ending": np.where(rested, 1, np.where(moving, 0, 2)).astype(np.int8),
+    }
 
-    def add(name: str, array: np.ndarray, text: str, *extra: str, **more: Any) -> None:
+
+TEXTS = {
+    "exponent": "Lyapunov exponents, per unit of dimensionless time",
+    "at_half": "the exponents from the first half of the run alone",
+    "later_half": "the exponents from the second half of the run alone",
+    "error": "half width of the 95 % interval of the exponent",
+    "resolution": "2 ln(t) / t, what growth by the square of the time would give",
+    "positive": "whether the largest exponent is above its error and the resolution, in all and in both halves",
+    "ending": "what the motion does at the end",
+    "cycle": "forcing periods after which the motion repeats itself at the end, 0 if it does not",
+}
+
+
+def _dataset(run: _Many, measures: dict[str, np.ndarray], states: np.ndarray, attributes: dict[str, Any]) -> xarray.Dataset:
+    import xarray
+
+    from saltus import __version__
+
+    inputs, values = run.inputs, {}
+
+    def add(name: str, array: np.ndarray, text: str, **more: Any) -> None:
+        dims = (*inputs.dims, *(("index",) if array.ndim > 1 else ()))
         whole = array.reshape((*inputs.shape, *array.shape[1:]))
-        values[name] = ((*dims, *extra), whole, {"units": "1", "long_name": text} | more)
+        values[name] = (dims, whole, {"units": "1", "long_name": text} | more)
 
-    for name, text in texts.items():
-        add(name, means[name], f"{text}, per unit of dimensionless time", "index")
-    add("error", errors["exponent"], "half width of the 95 % interval of the exponent", "index")
-    add("resolution", limits["exponent"], "2 ln(t) / t, what growth by the square of the time would give")
-    add("positive", positive, "whether the largest exponent is above its error and the resolution, in all and in both halves")
-    add("cycle", cycle, "forcing periods after which the motion repeats itself at the end, 0 if it does not")
-    flags = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(ENDINGS)}
-    add("ending", ending, "what the motion does at the end", **flags)
-    name = system.model.coordinates[0]
-    for i, label in enumerate((name, "velocity")):
-        add(f"end_{label}", stretched.states[:, i], f"{label} at the end, at phase 0 of the load")
+    for name, array in measures.items():
+        add(name, array, TEXTS[name])
+    values["ending"][2].update(flag_values=np.arange(3, dtype=np.int8), flag_meanings=" ".join(ENDINGS))
+    for i, label in enumerate((run.system.model.coordinates[0], "velocity")):
+        add(f"end_{label}", states[:, i], f"{label} at the end, at phase 0 of the load")
     for path, given in run.parameters.items():
         if path not in inputs.coords:
             add(path, np.asarray(given), f"parameter {path}")
-    about = {"title": "Lyapunov exponents computed by saltus", "saltus_version": __version__, "system": system.to_json()}
+    about = {"title": "Lyapunov exponents computed by saltus", "saltus_version": __version__, "system": run.system.to_json()}
     return xarray.Dataset(values, coords=inputs.coords, attrs=about | attributes)
