@@ -80,15 +80,21 @@ def test_chaos_is_seen_with_its_exponent(frequency, amplitude, known, periods):
 MORE = [pytest.param(amplitude, marks=pytest.mark.thorough) for amplitude in (7.3, 7.4, 7.5, 7.6)]
 
 
+def settled_late(system, count, periods):
+    """Random starts, and how many forcing periods they take to settle; nan for those that do not within `periods`."""
+    starts = np.random.default_rng(1).uniform(-2.0, 2.0, (count, 2))
+    ends = settle(system, starts, periods, kept=1, tol=1e-12)
+    return starts, np.where(ends.cycle > 0, ends.periods, np.nan), ends.cycle
+
+
 @pytest.mark.parametrize("amplitude", [7.2, 7.7, *MORE])
 def test_long_chaotic_transients_are_not_called_chaos(amplitude):
-    """At Omega = 4 motions wander for thousands of periods, and many settle in the end; 2100 show nothing of it."""
+    """At Omega = 4 motions wander for thousands of periods, and many settle in the end; the first thousand show nothing of it."""
     system = under_force(4.0, amplitude)
-    starts = np.random.default_rng(1).uniform(-2.0, 2.0, (24, 2))
-    ends = settle(system, starts, 4000, kept=1, tol=1e-12)
-    slow = np.flatnonzero((ends.cycle > 0) & (ends.periods > 2200))
-    assert slow.size  # these are known to settle, late
-    theta, velocity = starts[slow[0]]
+    starts, late, _ = settled_late(system, 24, 4000)
+    slowest = int(np.nanargmax(late))
+    assert late[slowest] > 1200  # known to settle, later than the first look of the verdict below
+    theta, velocity = starts[slowest]
     verdict = classify(system, theta=theta, velocity=velocity, periods=1000, transient=100)
     assert verdict.kind in ("periodic", "undecided")
     if verdict.kind == "undecided":
@@ -100,26 +106,28 @@ def test_long_chaotic_transients_are_not_called_chaos(amplitude):
 
 def test_given_time_a_transient_is_followed_to_its_end():
     system = under_force(4.0, 7.2)
-    starts = np.random.default_rng(1).uniform(-2.0, 2.0, (24, 2))
-    ends = settle(system, starts, 4000, kept=1, tol=1e-12)
-    slow = int(np.argmax(np.where(ends.cycle > 0, ends.periods, 0)))
-    theta, velocity = starts[slow]
+    starts, late, cycle = settled_late(system, 24, 4000)
+    slowest = int(np.nanargmax(late))
+    theta, velocity = starts[slowest]
     verdict = classify(system, theta=theta, velocity=velocity, periods=4000)
-    assert (verdict.kind, verdict.period) == ("periodic", int(ends.cycle[slow]))
-    assert verdict.periods == pytest.approx(ends.periods[slow], abs=50)
+    assert (verdict.kind, verdict.period) == ("periodic", int(cycle[slowest]))
+    assert verdict.periods == pytest.approx(late[slowest], abs=1)
 
 
 def test_a_motion_that_settles_while_its_exponents_are_taken_is_periodic_after_all():
-    """At Hhat = 7.2 one that takes 2293 periods, given 1000 to settle."""
+    """Motions of a mean life of a thousand periods in chaos, given 600 to settle; one of three at least does it later."""
     system = under_force(4.0, 7.2)
-    starts = np.random.default_rng(1).uniform(-2.0, 2.0, (24, 2))
-    ends = settle(system, starts, 4000, kept=1, tol=1e-12)
-    late = np.flatnonzero((ends.cycle > 0) & (ends.periods > 1100) & (ends.periods < 1600))
-    theta, velocity = starts[late[0]]
-    verdict = classify(system, theta=theta, velocity=velocity, periods=1000, transient=0)
-    assert verdict.kind == "periodic"
-    assert verdict.evidence["transient"] >= 1000
-    assert verdict.reason.startswith("after more than")
+    starts, late, _ = settled_late(system, 64, 2000)
+    verdicts = [
+        classify(system, theta=starts[i, 0], velocity=starts[i, 1], periods=600, transient=0)
+        for i in np.flatnonzero(late > 700)[:3]
+    ]
+    assert {verdict.kind for verdict in verdicts} <= {"periodic", "undecided"}
+    after_all = [verdict for verdict in verdicts if verdict.kind == "periodic"]
+    assert after_all
+    for verdict in after_all:
+        assert verdict.evidence["transient"] >= 600
+        assert verdict.reason.startswith("after more than")
 
 
 @pytest.fixture(scope="module")
