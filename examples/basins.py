@@ -3,10 +3,7 @@
 import numpy as np
 
 import saltus
-from saltus.attractors.basins import basins
-from saltus.attractors.found import attractors
-from saltus.attractors.fractal import basin_entropy, uncertainty_exponent
-from saltus.attractors.manifolds import stable_manifold
+from saltus.attractors import attractors, basin_entropy, basins, stable_manifold, uncertainty_exponent
 
 system = saltus.System(
     model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from attractor_cases import loaded, steady, strobes, walled
+from scipy.optimize import brentq
 from scipy.spatial import cKDTree
 
 import saltus
@@ -14,7 +15,7 @@ from saltus.attractors.separatrices import saddles, separatrices
 from saltus.errors import ParameterError
 from saltus.paper.manifolds import manifold
 from saltus.systems.reversed import reversed_load, reversed_system
-from saltus.theory import equilibria
+from saltus.theory import equilibria, wall_orbits
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +107,26 @@ def test_the_boundary_of_the_basins_lies_on_it_to_a_cell(curve: Manifold) -> Non
     inside = on[np.abs(on).max(axis=1) < 2.9]
     assert len(inside) > 300
     assert cKDTree(edge).query(inside)[0].max() < 1.5 * cell
+
+
+def test_with_impacts_that_lose_speed_the_multiplier_is_the_closed_forms_and_the_basins_meet_on_it() -> None:
+    system = walled(0.6, 2.6, wall=0.3, e=0.5)
+    family = wall_orbits(system, 2)
+    speed = brentq(lambda v: family.amplitude(v) - 0.6, 1e-6, family.fold_speed)
+    known = family.orbit(speed)
+    x, velocity = known.state(0.0)
+    orbit = saltus.find_orbit(system, x=float(x), velocity=float(velocity), period=2, settle=0)
+    found = stable_manifold(orbit, window=((-1.0, 0.3), (-1.5, 1.5)), periods=20)
+    assert found.multiplier == pytest.approx(min(np.abs(known.multipliers)), rel=1e-9)
+    assert len({branch.point for branch in found.curves}) == 2
+    grid = np.linspace(-1.0, 0.3, 66), np.linspace(-1.5, 1.5, 61)
+    labels = basins(system, x=grid[0], velocity=grid[1])["label"].values
+    cell = np.array([grid[0][1] - grid[0][0], grid[1][1] - grid[1][0]])
+    places = edge_of(labels)
+    edge = np.stack([grid[0][places[:, 1]], grid[1][places[:, 0]]], axis=1) / cell
+    on = found.states[np.isfinite(found.states).all(axis=1)] / cell
+    assert len(edge) > 50
+    assert cKDTree(on).query(edge)[0].max() < 1.5
 
 
 def test_neighbours_are_as_close_as_the_step(curve: Manifold) -> None:
