@@ -38,6 +38,21 @@ def longer() -> Manifold:
     return stable_manifold(orbit, window=((-2.0, 2.0), (-2.0, 2.0)), periods=24, step=0.02)
 
 
+@pytest.fixture(scope="module")
+def turning() -> Manifold:
+    """Of an orbit that has doubled its period, whose multipliers are below 0, with impacts that lose speed."""
+    system = walled(0.5, 2.6, wall=0.3, e=0.5)
+    family = wall_orbits(system, 2)
+    speed = 1.02 * family.doubling_speed
+    known = family.orbit(speed)
+    if abs(known.multipliers).max() < 1.0:
+        known = family.orbit(0.98 * family.doubling_speed)
+    x, velocity = known.state(0.0)
+    loaded = system.with_({"load.force.amplitude": known.amplitude})
+    orbit = saltus.find_orbit(loaded, x=float(x), velocity=float(velocity), period=2, settle=0)
+    return stable_manifold(orbit, window=((-2.0, 0.3), (-3.0, 3.0)), periods=12, step=0.05)
+
+
 def edge_of(labels: np.ndarray) -> np.ndarray:
     """The places (row, column) of cells with another label beside them, above or to the right."""
     edge = np.zeros(labels.shape, dtype=bool)
@@ -46,7 +61,7 @@ def edge_of(labels: np.ndarray) -> np.ndarray:
     return np.argwhere(edge)
 
 
-@pytest.mark.parametrize("which", ["curve", "longer"])
+@pytest.mark.parametrize("which", ["curve", "longer", "turning"])
 def test_forward_it_shrinks_onto_its_first_segment_to_1e_8(which: str, request: pytest.FixtureRequest) -> None:
     found: Manifold = request.getfixturevalue(which)
     system, q = found.orbit.system, found.orbit.periods
@@ -62,10 +77,13 @@ def test_forward_it_shrinks_onto_its_first_segment_to_1e_8(which: str, request: 
             point = (branch.point + periods) % q
             offset = end - found.strobes[point]
             along = offset @ found.directions[point]
+            rounds = (branch.point + periods) // q  # directions are carried from point 0 on, and turn where a round is complete
+            assert np.sign(along) == branch.side * np.sign(found.multiplier) ** rounds
             assert np.abs(offset - along * found.directions[point]).max() < 1e-8
             assert np.abs(offset).max() < 10.0 * OFFSET / min(1.0, abs(found.multiplier))
             tried += 1
     assert tried >= 6
+    assert (found.multiplier < 0.0) == (which == "turning")
 
 
 def test_each_point_goes_to_its_place_a_period_before(curve: Manifold) -> None:

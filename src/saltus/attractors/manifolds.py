@@ -181,14 +181,18 @@ def _flow(system: System, backward: bool) -> Any:
 
 
 def _curves(levels: list[Level], q: int, side: int, stable: bool, turns: bool, ends: str) -> list[Curve]:
-    """The levels that belong to each point of the orbit, put together from the orbit on; where mu < 0 sides change each time."""
+    """The levels that belong to each point of the orbit, put together from the orbit on.
+
+    Where mu < 0 a round of the orbit, from point 0 to point 0, turns the side.
+    """
     curves = []
     for first in range(min(q, len(levels))):
         own = levels[first::q]
         point = (-first if stable else first) % q
         parts: dict[int, list[Level]] = {}
-        for i, level in enumerate(own):
-            parts.setdefault(side * (-1) ** i if turns else side, []).append(level)
+        for level in own:
+            rounds = -(-level.periods // q) if stable else level.periods // q
+            parts.setdefault(side * (-1) ** rounds if turns else side, []).append(level)
         for sign, chosen in parts.items():
             states = np.concatenate([level.points for level in chosen])
             place = np.concatenate([level.places + level.periods / q for level in chosen])
