@@ -18,6 +18,8 @@ from saltus.paper import (
     fig11,
     fig12,
     fig13,
+    fig14,
+    fig15,
     statements,
     table1,
 )
@@ -30,6 +32,7 @@ FIGURES: dict[str, PaperFigure] = {
     for part in (
         *(fig01c, fig02, fig03, fig04, fig05, fig06, fig07, fig08),
         *(fig09, fig10, fig11, fig12, fig13),
+        *(fig14, fig15),
         *(table1, appendix, statements),
     )
 }

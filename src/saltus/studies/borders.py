@@ -75,15 +75,14 @@ def exact_borders(
     waiting = ends_of(cells)
     total, size = max(len(waiting), 1), np.bincount(cells.family, minlength=1)
     for _ in range(LOOKS):
-        waiting = waiting.only(~explained(cells, waiting, found.curves))
         if progress is not None:
             progress(1 - len(waiting) / total)
         if not len(waiting) or len(found.curves) >= most:
             break
         urgent = size[cells.family[waiting.motion]] * np.where(cells.empty[tuple(waiting.target.T)], BESIDE_REST, 1)
-        first = np.arange(len(waiting)) == np.argmax(urgent)
+        first, before = np.arange(len(waiting)) == np.argmax(urgent), len(found.curves)
         _look(system, chart, cells, waiting.only(first), found)
-        waiting = waiting.only(~first)
+        waiting = waiting.only(~first & ~explained(cells, waiting, found.curves[before:]))
     return found
 
 
@@ -115,7 +114,7 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     ends = ends_of(cells)
     harmless = np.array([borders.ends.get(key) in HARMLESS for key in keys_of(cells, ends)], dtype=bool)
     left = ends.only(~explained(cells, ends, borders.curves) & ~harmless)
-    middle, lonely = (left.source + left.target) / 2, unseen(cells, float(chart.attrs["least"]), borders.curves)
+    middle, lonely = (left.source + left.target) / 2, unseen(cells, borders.curves)
     columns = {
         "amplitude": cells.amplitude[left.motion],
         "period": cells.period[left.motion],
@@ -156,7 +155,7 @@ def _curve(
         same = [np.abs(cells.amplitude[here] - amplitude).min(initial=np.inf) < EQUAL * amplitude for amplitude in reached]
         if any(same):
             return CONTINUED
-        return SHRINKS if reached and max(reached) < float(chart.attrs["least"]) else special
+        return SHRINKS if reached and max(reached) < cells.least else special
     spot = (special.parameter, begin[1]) if along == 0 else (begin[0], special.parameter)
     if any(passes(cells, curve, spot) for curve in known if curve.attrs["kind"] == special.kind):
         return MEETS

@@ -222,28 +222,45 @@ def from_neighbours(task: Task, found: Found, shape: tuple[int, int]) -> np.ndar
 
 
 def seeds(motions: np.ndarray, known: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Cells, (n,), and states of their neighbours' motions, (n, 2), where the cell has no motion alike."""
+    """Cells, (n,), and states, (n, 2), where a neighbour has a motion and the cell none alike: its state, or where that is
+    heading to if the cell behind the neighbour has such a motion too."""
     rows, columns = np.unravel_index(motions["cell"], shape)
     found = []
     for down, right in SIDES:
         inside = (rows + down >= 0) & (rows + down < shape[0]) & (columns + right >= 0) & (columns + right < shape[1])
-        target, source = motions["cell"][inside] + down * shape[1] + right, motions[inside]
-        new = ~has(known, target, source, ALIKE)
-        found.append((target[new], source["state"][new]))
+        behind = (rows - down >= 0) & (rows - down < shape[0]) & (columns - right >= 0) & (columns - right < shape[1])
+        step, source = down * shape[1] + right, motions[inside]
+        new = ~has(known, source["cell"] + step, source, ALIKE)
+        source, behind = source[new], behind[inside][new]
+        found.append((source["cell"] + step, _heading(source, known, np.where(behind, source["cell"] - step, -1))))
     return np.concatenate([cell for cell, _ in found]), np.concatenate([states for _, states in found])
 
 
+def _heading(motions: np.ndarray, known: np.ndarray, behind: np.ndarray) -> np.ndarray:
+    """States a cell further on in a straight line from those of alike motions in the cells behind; else the states themselves."""
+    ahead = motions["state"].copy()
+    for there, other in _motions_of(known, behind):
+        like = there & _alike(other, motions, ALIKE)
+        step = motions["state"] - other["state"]
+        like &= np.abs(step).max(axis=1) <= ALIKE * motions["amplitude"]  # also at the same phase of several periods
+        ahead[like] = motions["state"][like] + step[like]
+    return ahead
+
+
 def has(known: np.ndarray, cell: np.ndarray, motions: np.ndarray, tolerance: float) -> np.ndarray:
-    """Whether these cells have a motion like each of these: of the same period and impacts, and of about the same extrema."""
+    """Whether these cells have a motion like each of these."""
     result = np.zeros(len(cell), dtype=bool)
     for there, other in _motions_of(known, cell):
-        like = there.copy()
-        for name in ("period", "crossings"):
-            like &= other[name] == motions[name]
-        for name in ("amplitude", "other"):
-            like &= np.abs(other[name] - motions[name]) <= tolerance * motions["amplitude"]
-        result |= like
+        result |= there & _alike(other, motions, tolerance)
     return result
+
+
+def _alike(some: np.ndarray, others: np.ndarray, tolerance: float) -> np.ndarray:
+    """Whether motions are of the same period and impacts, and of about the same extrema."""
+    like = (some["period"] == others["period"]) & (some["crossings"] == others["crossings"])
+    for name in ("amplitude", "other"):
+        like &= np.abs(some[name] - others[name]) <= tolerance * others["amplitude"]
+    return np.asarray(like)
 
 
 def arrived(tracks: Tracks, known: np.ndarray) -> np.ndarray:

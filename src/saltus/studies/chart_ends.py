@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 ALIKE = 0.35  # of the amplitude: motions of neighbouring cells that are one family
 SAME = 0.5  # of the amplitude, between a curve's orbit and a motion that ends there: at a fold amplitudes are steep
+COUNTS = 1.2  # times the least amplitude: motions up to here may end in a cell because they are too small to count in the next
 SYMMETRIC = 2e-4  # of the amplitude, between the two extrema
 SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))
 KNOWN = 0.02  # of a cell, between a point and a curve that goes through it
@@ -31,6 +32,7 @@ class Cells:
     period: np.ndarray
     symmetric: np.ndarray
     family: np.ndarray  # (n,): a number that alike motions of neighbouring cells share
+    least: float  # amplitude that counts
     empty: np.ndarray  # (rows, columns): no motion, settled or not, beside rest
 
 
@@ -55,7 +57,7 @@ def keys_of(cells: Cells, ends: Ends) -> list[tuple[int, ...]]:
     return [tuple(map(int, (*a, cells.rank[m], *b))) for a, m, b in zip(ends.source, ends.motion, ends.target, strict=True)]
 
 
-def unseen(cells: Cells, least: float, curves: Sequence[xarray.Dataset]) -> np.ndarray:
+def unseen(cells: Cells, curves: Sequence[xarray.Dataset]) -> np.ndarray:
     """Places (n, 2), row and column, where a fold of motions that count runs between cells none of which has one of them.
 
     Where another border of theirs is less than a cell away they exist in too narrow a strip for a cell to show it.
@@ -70,7 +72,7 @@ def unseen(cells: Cells, least: float, curves: Sequence[xarray.Dataset]) -> np.n
     number, spots, heights, periods = (np.array([row[i] for row in every]) for i in range(4))
     found = [np.empty((0, 2))]
     for curve_number, spot, height, period, kind in every:
-        if kind != "LP" or height < (1 + SAME) * least:
+        if kind != "LP" or height < (1 + SAME) * cells.least:
             continue
         here = (np.abs(cells.cell - spot) < 1 + 1e-9).all(axis=1) & (cells.period == period)
         strip = (number != curve_number) & (np.abs(spots - spot) < 1.0 + 1e-9).all(axis=1)
@@ -103,6 +105,7 @@ def read(chart: xarray.Dataset) -> Cells:
         period=period,
         symmetric=np.abs(size - other) < SYMMETRIC * size,
         family=np.zeros(len(size), dtype=int),
+        least=float(chart.attrs["least"]),
         empty=((chart["count"] == 0) & (chart["unsettled"] == 0)).values,
     )
     pairs = np.concatenate([np.empty((0, 2), dtype=int), *(_alike(cells, side)[0] for side in SIDES)])
@@ -133,10 +136,10 @@ def _alike(cells: Cells, side: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]
 
 
 def ends_of(cells: Cells) -> Ends:
-    """Every end of a motion between two cells of a chart."""
+    """Every end of a motion between two cells of a chart, but of those hardly large enough to count."""
     motion, target = [], []
     for side in SIDES:
-        alone = np.flatnonzero(_alike(cells, side)[1])
+        alone = np.flatnonzero(_alike(cells, side)[1] & (cells.amplitude > COUNTS * cells.least))
         motion.append(alone)
         target.append(cells.cell[alone] + side)
     chosen = np.concatenate(motion)

@@ -1,0 +1,127 @@
+"""What Figs. 14 and 15 share: a panel is a stability chart with its exact and quasi-static borders, and what disagrees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from saltus.paper import spectra
+from saltus.paper.provenance import dataset
+from saltus.plots.chart import draw_borders, draw_chart, draw_closed_form, draw_static, legend
+from saltus.plots.style import DOUBLE_COLUMN, new_figure, panel_label, styled
+
+REGION = (2.0, 2.0)  # of the initial states
+LOWEST = -2.0  # V
+WIDEST = 0.5  # Hhat
+FAST = 2.0  # Omega from which the closed form of the onset is drawn too
+CURVES = 20  # on which motions end, at most, for one chart
+
+
+def system(beta0: float = 80.0, damping: float = 0.1, frequency: float = 1.0) -> Any:
+    """The paper's system under load (i), `loadpatha`; beta0 in degrees."""
+    from saltus.systems import Harmonic, Load, Metainterface, System
+
+    model = Metainterface(beta0=math.radians(beta0), damping=damping)
+    return System(model=model, load=Load(frequency=frequency, horizontal=Harmonic(amplitude=0.1), vertical=-0.5))
+
+
+def compute(panels: Mapping[str, Mapping[str, float]], size: int, curves: int = CURVES, **options: Any) -> Any:
+    """A chart of `size` x `size` cells for each panel; options are those of `stability_chart`."""
+    made = {name: panel(**values, size=size, curves=curves, **options) for name, values in panels.items()}
+    return spectra.together(made, what="stability charts under load (i)")
+
+
+def panel(
+    *, beta0: float, damping: float, frequency: float, widest: float, size: int, curves: int = CURVES, **options: Any
+) -> Any:
+    """Groups `chart`, `borders` (see `saltus.studies.borders`), `disagreements` and `static`."""
+    import xarray as xr
+
+    from saltus.studies.borders import disagreements, exact_borders
+    from saltus.studies.chart import stability_chart
+
+    here = system(beta0, damping, frequency)
+    horizontal, vertical = np.linspace(0.0, widest, size), np.linspace(LOWEST, 0.0, size)
+    chart = stability_chart(here, horizontal=horizontal, vertical=vertical, **({"region": REGION} | options))
+    borders = exact_borders(here, chart, most=curves)
+    chart.attrs = {name: value for name, value in chart.attrs.items() if name != "plan"}
+    groups = {"chart": chart, "static": static_borders(math.radians(beta0)), "disagreements": disagreements(chart, borders)}
+    tree = xr.DataTree.from_dict(groups).assign({"borders": borders.to_xarray()})
+    tree.attrs = {"system": here.to_json(), "beta0_degrees": beta0, "damping": damping, "frequency": frequency}
+    return tree
+
+
+def static_borders(beta0: float) -> Any:
+    """Both parts of the quasi-static border over V, `critical` (the paper's) and `fold`; `true` is the lesser (erratum 23)."""
+    from saltus.theory import critical_horizontal, fold_horizontal, subcritical_vertical, unloaded_fold
+
+    start, end = subcritical_vertical(beta0), unloaded_fold(beta0)[0]
+    bend = end + (start - end) * np.linspace(0.0, 1.0, 101) ** 0.5  # the fold leaves the line at V = start as a power 3/2
+    vertical = np.unique(np.concatenate([np.linspace(LOWEST, end, 21), bend, np.linspace(start, 0.0, 21)]))
+    fold = np.full_like(vertical, np.nan)
+    fold[vertical <= start] = fold_horizontal(beta0, vertical[vertical <= start])
+    critical = critical_horizontal(beta0, vertical)
+    text = "Hhat at the fold of deformed equilibria (erratum 23)"
+    return dataset(
+        {
+            "critical": ("vertical", critical, "1", "Hhat at which the undeformed state is lost (the paper's border)"),
+            "fold": ("vertical", fold, "1", text),
+            "true": ("vertical", np.fmin(critical, fold), "1", "the lesser of both: the quasi-static border"),
+        },
+        {"vertical": ("vertical", vertical, "1", "V")},
+        what="quasi-static borders",
+        subcritical_below=start,
+    )
+
+
+def curves_of(panel: Any) -> list[Any]:
+    """The exact borders of a panel."""
+    borders = panel["borders"]
+    return [borders[name].to_dataset() for name in sorted(borders.children) if name.startswith("curve_")]
+
+
+@styled
+def draw(data: Any, columns: int, height: float) -> Any:
+    """A chart for each panel, `columns` in a row, all in one scale of colours."""
+    panels = list(data.children.items())
+    figure = new_figure(DOUBLE_COLUMN, height)
+    axes = np.atleast_1d(figure.subplots(-(-len(panels) // columns), columns, squeeze=False)).ravel()
+    top = max(float(np.nanmax(tree["chart"]["amplitude"].values, initial=1e-3)) for _, tree in panels)
+    cells, fast = None, False
+    for ax, (name, tree) in zip(axes, panels, strict=False):
+        cells = draw_chart(ax, tree["chart"].to_dataset(), top) or cells
+        draw_borders(ax, curves_of(tree))
+        draw_static(ax, tree["static"])
+        fast |= _closed_form(ax, tree)
+        panel_label(ax, name)
+        attrs = tree.attrs
+        ax.set_title(
+            rf"$\Omega={attrs['frequency']:g}$, $\beta_0={attrs['beta0_degrees']:g}^\circ$, $\mathcal{{C}}={attrs['damping']:g}$",
+            pad=4,
+        )
+        ax.set_xlabel(r"load amplitude $\widehat{\mathcal{H}}$")
+        ax.set_ylabel(r"vertical load $\overline{\mathcal{V}}$")
+    for ax in axes[len(panels) :]:
+        ax.remove()
+    if cells is not None:
+        bar = figure.colorbar(cells, ax=axes[: len(panels)].tolist(), fraction=0.03, pad=0.01, format="%.2g")
+        bar.set_label(r"largest $\max_\tau|\theta|$ of the stable motions (rad)")
+    legend(figure, [curve for _, tree in panels for curve in curves_of(tree)], fast)
+    return figure
+
+
+def _closed_form(ax: Any, tree: Any) -> bool:
+    """Mark the onset's closed form (erratum 28) where the load is fast; returns whether it is."""
+    from saltus.theory import high_frequency_onset
+
+    frequency = float(tree.attrs["frequency"])
+    if frequency < FAST:
+        return False
+    vertical = np.linspace(LOWEST, -0.1, 20)
+    beta0, damping = math.radians(float(tree.attrs["beta0_degrees"])), float(tree.attrs["damping"])
+    onset = [high_frequency_onset(frequency, beta0=beta0, vertical=v, damping=damping, order=2) for v in vertical]
+    draw_closed_form(ax, np.array(onset), vertical)
+    return True

@@ -1,0 +1,50 @@
+"""Fig. 14: stability charts under load (i) for six frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from saltus.paper import charts
+from saltus.paper.claim import Claim
+from saltus.paper.figure import PaperFigure
+from saltus.paper.statements_charts import over_frequency
+
+PANELS: dict[str, dict[str, float]] = {
+    name: {"beta0": 80.0, "damping": 0.1, "frequency": frequency, "widest": widest}
+    for name, frequency, widest in (
+        *(("a", 0.1, charts.WIDEST), ("b", 0.5, charts.WIDEST), ("c", 0.75, charts.WIDEST)),
+        *(("d", 1.0, charts.WIDEST), ("e", 1.5, charts.WIDEST), ("f", 4.0, 0.2)),  # at Omega = 4 all borders are at small Hhat
+    )
+}
+
+
+def compute(panels: Mapping[str, Mapping[str, float]] = PANELS, size: int = 101, **options: Any) -> Any:
+    """One chart for each frequency; options are those of `stability_chart`."""
+    return charts.compute(panels, size, **options)
+
+
+def draw(data: Any) -> Any:
+    """(a) to (f), a panel for each frequency."""
+    return charts.draw(data, columns=2, height=240.0)
+
+
+def claims(data: Any) -> list[Claim]:
+    """The statements of the text on Fig. 14."""
+    return over_frequency(data)
+
+
+FIGURE = PaperFigure(
+    name="fig14",
+    title="Fig. 14: stability charts, Ω = 0.1, 0.5, 0.75, 1, 1.5 and 4",
+    caption=(
+        "Largest amplitude of the stable motions beside rest under H = Ĥ sin Ωτ at constant V̄, β₀ = 80°, C = 0.1. White: from "
+        "all starts the motion comes to rest. Grey: none settles on a motion of up to six periods (chaos). Dotted: several "
+        "such motions, those of at least 0.001 rad counted. Red: quasi-static border, with the fold of equilibria "
+        "below V̄ = −sin β₀ (erratum 23); red dots: the rest of the paper's line. Black: exact curves on which motions are born "
+        "(folds) or lose their stability. Green: beyond it the largest motion passes the straight line."
+    ),
+    compute=compute,
+    draw=draw,
+    claims=claims,
+)

@@ -1,0 +1,136 @@
+"""Stability charts: the largest amplitude over the plane of two loads, the number of motions, and borders over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+
+from saltus.plots.style import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, new_figure, styled
+
+COLOURS = "viridis_r"  # large amplitudes dark, beside the white of rest small ones light
+LEVELS = 12
+CHAOS = "#c9c9c9"
+BORDERS: dict[str, Any] = {"LP": "-", "PD": (0, (5, 1.5)), "BPC": (0, (5, 1.2, 1, 1.2)), "GR": (0, (1, 1.1))}
+NAMES = {"LP": "fold", "PD": "period doubling", "BPC": "symmetry breaking", "GR": "grazing"}
+
+
+@styled
+def draw_stability_chart(data: Any) -> Any:
+    """One chart as it is stored, with its scale; without borders."""
+    figure = new_figure(SINGLE_COLUMN, 85.0)
+    ax = figure.subplots()
+    cells = draw_chart(ax, data)
+    path = list(data.attrs.get("path", ("horizontal", "vertical")))
+    ax.set_xlabel(path[0])
+    ax.set_ylabel(path[1])
+    if cells is not None:
+        figure.colorbar(cells, ax=ax, label="largest amplitude (rad)")
+    return figure
+
+
+def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:
+    """The cells: coloured by the largest amplitude, dotted where there are several motions, grey where none settles, white where
+    rest is alone; crosses where the largest goes beyond the kinematic limit. Returns what a colour bar needs, or None."""
+    x, y = chart["horizontal"].values, chart["vertical"].values
+    amplitude = chart["amplitude"].transpose("vertical", "horizontal").values
+    number = chart["count"].transpose("vertical", "horizontal").values
+    unsettled = chart["unsettled"].transpose("vertical", "horizontal").values > 0
+    edges = _edges(x), _edges(y)
+    ax.set_xlim(*((x[0], x[-1]) if len(x) > 1 else edges[0]))
+    ax.set_ylim(*((y[0], y[-1]) if len(y) > 1 else edges[1]))
+    wild = np.where((number == 0) & unsettled, 1.0, np.nan)
+    ax.pcolormesh(*edges, wild, cmap=mpl.colors.ListedColormap([CHAOS]), rasterized=True, zorder=1)
+    if not np.isfinite(amplitude).any():
+        return None
+    highest = float(np.nanmax(amplitude)) if top is None else top
+    levels = highest * np.linspace(0.0, 1.0, LEVELS + 1) ** 2  # finer where amplitudes are small
+    norm = mpl.colors.BoundaryNorm(levels, 256)
+    cells = ax.pcolormesh(*edges, amplitude, cmap=COLOURS, norm=norm, rasterized=True, zorder=1)
+    _hatch(ax, x, y, number >= 2)
+    if "beyond_kinematic" in chart:
+        rows, columns = np.nonzero(chart["beyond_kinematic"].transpose("vertical", "horizontal").values)
+        ax.plot(x[columns], y[rows], linestyle="none", marker="x", color=UNSTABLE, markersize=1.5, markeredgewidth=0.3, zorder=3)
+    if "beyond_line" in chart:
+        _outline(ax, *edges, chart["beyond_line"].transpose("vertical", "horizontal").values)
+    return cells
+
+
+def _edges(middle: np.ndarray) -> np.ndarray:
+    """The edges of cells about their middles."""
+    if len(middle) == 1:
+        return middle[0] + np.array([-0.5, 0.5])
+    inner = (middle[1:] + middle[:-1]) / 2
+    return np.concatenate([[2 * middle[0] - inner[0]], inner, [2 * middle[-1] - inner[-1]]])
+
+
+def _hatch(ax: Any, x: np.ndarray, y: np.ndarray, where: np.ndarray) -> None:
+    """Dots over the cells, without a line about them."""
+    if min(where.shape) < 2 or not where.any():
+        return
+    with mpl.rc_context({"hatch.linewidth": 0.3, "hatch.color": "white"}):
+        ax.contourf(x, y, where.astype(float), levels=[0.5, 1.5], colors="none", hatches=["......"], zorder=2)
+
+
+def _outline(ax: Any, x: np.ndarray, y: np.ndarray, where: np.ndarray) -> None:
+    """A green line about the cells, along their edges."""
+    padded = np.pad(where, 1, mode="edge").astype(int)
+    across, down = np.diff(padded, axis=1)[1:-1], np.diff(padded, axis=0)[:, 1:-1]
+    lines = [((x[j], y[i]), (x[j], y[i + 1])) for i, j in np.argwhere(across)]
+    lines += [((x[j], y[i]), (x[j + 1], y[i])) for i, j in np.argwhere(down)]
+    ax.add_collection(mpl.collections.LineCollection(lines, colors=LIMIT, linewidths=0.9, zorder=4))
+
+
+def draw_static(ax: Any, static: Any) -> None:
+    """The quasi-static border in red: solid where it is the true one, dotted the part of the paper's that is not."""
+    vertical, critical, fold = (static[name].values for name in ("vertical", "critical", "fold"))
+    below = np.isfinite(fold)
+    colour = {"color": UNSTABLE, "zorder": 6}
+    ax.plot(critical[~below], vertical[~below], lw=1.4, **colour)
+    ax.plot(critical[below], vertical[below], lw=1.0, ls=(0, (1, 1.2)), **colour)
+    ax.plot(fold[below & (fold > 0)], vertical[below & (fold > 0)], lw=1.4, **colour)
+
+
+def draw_borders(ax: Any, curves: Sequence[Any]) -> None:
+    """The exact borders, each kind with dashes of its own, on a white ground so that they are seen on every colour."""
+    from matplotlib.patheffects import Normal, Stroke
+
+    for curve in curves:
+        ax.plot(
+            curve["horizontal"],
+            curve["vertical"],
+            color=INK,
+            lw=0.7,
+            ls=BORDERS[str(curve.attrs["kind"])],
+            path_effects=[Stroke(linewidth=1.5, foreground="white"), Normal()],
+            zorder=5,
+        )
+
+
+def legend(figure: Any, curves: Sequence[Any], closed_form: bool = False) -> None:
+    """What the lines and fillings mean, below all panels."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    kinds = {str(curve.attrs["kind"]) for curve in curves}
+    handles: list[Any] = [
+        Line2D([], [], color=UNSTABLE, lw=1.4, label="quasi-static border"),
+        Line2D([], [], color=UNSTABLE, lw=1.0, ls=(0, (1, 1.2)), label=r"$\widehat{\mathcal{H}}_{cr}^{QS}$ where it is not"),
+    ]
+    handles += [Line2D([], [], color=INK, lw=0.8, ls=BORDERS[kind], label=NAMES[kind]) for kind in BORDERS if kind in kinds]
+    handles.append(Line2D([], [], color=LIMIT, lw=0.9, label=r"max$|\theta|=\pi-\beta_0$"))
+    with mpl.rc_context({"hatch.linewidth": 0.3}):
+        handles.append(Patch(facecolor="#7fb8a8", edgecolor="white", hatch="......", label="several motions"))
+    handles.append(Patch(facecolor=CHAOS, label="none settles"))
+    if closed_form:
+        handles.append(
+            Line2D([], [], linestyle="none", marker="o", mfc="white", mec=INK, ms=3, label="closed form, high frequency")
+        )
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+
+
+def draw_closed_form(ax: Any, horizontal: np.ndarray, vertical: np.ndarray) -> None:
+    """The onset by its closed form (erratum 28), as marks over the computed curve."""
+    ax.plot(horizontal, vertical, linestyle="none", marker="o", mfc="white", mec=INK, ms=2.2, mew=0.6, zorder=7)
