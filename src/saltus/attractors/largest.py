@@ -26,6 +26,14 @@ class Largest:
     positive: np.ndarray  # whether it is above its error and the resolution, in all and in both halves
     states: np.ndarray  # (n, 2) at the end
 
+    def replaced(self, rows: np.ndarray, other: Largest) -> Largest:
+        """The same with some of its motions from another run."""
+        columns = {}
+        for name in ("exponent", "error", "positive", "states"):
+            columns[name] = getattr(self, name).copy()
+            columns[name][rows] = getattr(other, name)
+        return Largest(**columns)
+
 
 def largest_exponents(
     system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray], *, periods: int = 12, tol: float = 1e-10

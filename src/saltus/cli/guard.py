@@ -25,10 +25,10 @@ def guarded() -> Iterator[None]:
             yield
     except SaltusError as error:
         stop(str(error), BAD_INPUT)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         # Python notes an interrupt that leaves an exec of text, and `python -m` then dies of SIGINT; the next exec forgets it.
         exec("")
-        stop(INTERRUPTION, INTERRUPTED)
+        stop(str(error) or INTERRUPTION, INTERRUPTED)  # a sweep says how to go on
     except BrokenPipeError:  # `saltus info ... | head`: typer ends this quietly
         raise
     except OSError as error:

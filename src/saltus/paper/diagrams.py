@@ -18,14 +18,14 @@ NEAR = 1e-3  # relative distance from Hcr at which rest is tried
 WAIT, LAST = 300, 10  # forcing periods
 
 
-def compute(frequencies: Mapping[str, float], largest: float, **options: Any) -> Any:
-    """One diagram under load (i) for each frequency, with the fate of the undeformed state on both sides of Hcr."""
+def compute(frequencies: Mapping[str, float], largest: Mapping[float, float], **options: Any) -> Any:
+    """One diagram under load (i) for each frequency, up to the amplitude for it, with the fate of rest on both sides of Hcr."""
     return spectra.together(each(_panel, frequencies, largest=largest, **options), what="bifurcation diagram under load (i)")
 
 
-def _panel(frequency: float, largest: float, **options: Any) -> Any:
+def _panel(frequency: float, largest: Mapping[float, float], **options: Any) -> Any:
     system = spectra.under_force(frequency=frequency)
-    tree = spectra.diagram(system, (LEAST, largest), **options)
+    tree = spectra.diagram(system, (LEAST, largest[frequency]), **options)
     return spectra.with_groups(tree, {"undeformed": undeformed(system, tree.attrs["critical"])})
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from saltus.paper import spectra
 from saltus.paper.claim import Claim
 from saltus.paper.features import main_branch
-from saltus.paper.fig09 import FREQUENCIES, draw_panel
+from saltus.paper.fig09 import draw_panel
 from saltus.paper.figure import PaperFigure
 from saltus.paper.panels import each
 from saltus.paper.statements_spectra import ground_spectra
@@ -16,6 +16,7 @@ from saltus.plots.response import draw_zoom, highest, legend
 from saltus.plots.style import DOUBLE_COLUMN, new_figure, styled
 
 AMPLITUDES = {"a": 0.25, "b": 0.5}  # zetahat
+FREQUENCIES = (0.1, 4.0)  # Omega: up to chaos
 
 
 def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any:

@@ -11,7 +11,7 @@ from saltus.paper.figure import PaperFigure
 from saltus.paper.statements_spectra import force_diagrams
 
 FREQUENCIES = {"a": 0.5, "b": 1.0}  # Omega
-LARGEST = 3.0  # Hhat
+LARGEST = dict.fromkeys(FREQUENCIES.values(), 4.0)  # Hhat: beyond the second region of chaos, or what is left of it
 
 
 def compute(frequencies: Mapping[str, float] = FREQUENCIES, **options: Any) -> Any:

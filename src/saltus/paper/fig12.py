@@ -11,7 +11,7 @@ from saltus.paper.figure import PaperFigure
 from saltus.paper.statements_spectra import force_diagrams
 
 FREQUENCIES = {"a": 2.0, "b": 4.0}  # Omega
-LARGEST = 5.0  # Hhat
+LARGEST = {2.0: 5.0, 4.0: 9.0}  # Hhat, by Omega: beyond the first chaos
 
 
 def compute(frequencies: Mapping[str, float] = FREQUENCIES, **options: Any) -> Any:

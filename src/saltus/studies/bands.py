@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     import xarray
 
 SETTLING = 400  # forcing periods that a motion is given to come to rest or to repeat itself,
-CONFIRMED = 3000  # and for which it must go on afterwards without settling: long transients of chaos are none
+LONGER = 60  # periods of a stretch, instead of 12, where that leaves open whether the exponent is positive
+CONFIRMED = 4000  # and for which it must go on afterwards without settling: long transients of chaos are none
+COMPANIONS = 12  # motions from points of one that looks chaotic that must do so, all of them
 KEPT = 64  # stroboscopic points of each motion
 SEEDS = 4  # states of a chaotic motion from which its neighbours along the parameter are begun
 ROUNDS = 7  # halvings of the bracket of an edge
@@ -103,7 +105,9 @@ def chaotic_bands(
     """Where motions are chaotic along a parameter, from `starts` states at each of `count` values.
 
     A motion is called chaotic if it has not settled after 400 forcing periods, its largest Lyapunov exponent over the next 384
-    exceeds its error bar in both halves of them, and it still has not settled 3000 periods later. Every band is carried on to
+    (or, where that leaves it open, 1920 more) exceeds its error bar in both halves of them, and none of 12 motions from points
+    of those that look so at this value settles within 4000 periods: a motion on an attractor never leaves it, and where one
+    does chaos is transient. Every band is carried on to
     its neighbours by motions begun on it, and each edge is then halved seven times between a value with chaos and one
     without. Windows of periodic motion between two values of the grid are not seen; attractors whose basins hold no start are
     not either.
@@ -156,13 +160,27 @@ class _Search:
         """Exponents of what has not settled, and whether it is chaotic."""
         values = tried.values[rows[0]]
         found = largest_exponents(self.system, ends.strobes[rows][:, -1], {self.path: values}, tol=TOLERANCE)
+        again = np.flatnonzero(~found.positive & (found.exponent > 0.0))  # weak chaos, or none: a longer run may tell
+        if again.size:
+            columns = {self.path: values[again]}
+            longer = largest_exponents(self.system, found.states[again], columns, periods=LONGER, tol=TOLERANCE)
+            found = found.replaced(again, longer)
         tried.exponent[rows], tried.error[rows], positive = found.exponent, found.error, found.positive
-        tried.undecided[rows] = ~positive
+        tried.undecided[rows] = ~positive & ~(found.exponent + found.error < 0.0)
         if positive.any():
-            kept = tuple(place[positive] for place in rows)
-            later = self._run(values[positive], found.states[positive][:, None], CONFIRMED)
-            tried.chaotic[kept] = later.moving[:, 0]
-            tried.strobes[kept], tried.peaks[kept] = later.strobes[:, 0], later.peaks[:, 0]
+            self._confirm(tried, tuple(place[positive] for place in rows))
+
+    def _confirm(self, tried: Tried, kept: tuple[np.ndarray, ...]) -> None:
+        """Follow companions of motions that look chaotic: where one of them settles, chaos is a transient, however long."""
+        lines = np.unique(kept[0])
+        states = np.empty((len(lines), COMPANIONS, 2))
+        for i, line in enumerate(lines):
+            there = tried.strobes[line, kept[1][kept[0] == line]].reshape(-1, 2)
+            states[i] = there[np.linspace(0, len(there) - 1, COMPANIONS).astype(int)]
+        later = self._run(tried.values[lines], states, CONFIRMED)
+        stays = dict(zip(lines.tolist(), later.moving.all(axis=1), strict=True))
+        for line, start in zip(*kept, strict=True):
+            tried.chaotic[line, start], tried.undecided[line, start] = stays[line], not stays[line]
 
     def _run(
         self, values: np.ndarray, states: np.ndarray, periods: int, progress: Callable[[float], object] | None = None
