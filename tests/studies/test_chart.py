@@ -159,6 +159,16 @@ def test_seeds_are_what_the_neighbours_have_and_the_cell_has_not():
     assert has(known, np.array([0, 0, 1]), known[[1, 2, 2]], 0.1).tolist() == [True, False, True]
 
 
+def test_a_seed_heads_on_in_a_straight_line_from_two_cells():
+    known = distinct(some((0, 1, 2, 0.50, 0.5), (1, 1, 2, 0.51, 0.5)))
+    known["state"] = [[0.30, 0.10], [0.32, 0.07]]
+    cell, states = seeds(known, known, (1, 3))
+    assert cell.tolist() == [2]
+    np.testing.assert_allclose(states, [[0.34, 0.04]])
+    known["state"][0] = [-0.3, 0.1]  # at another phase of several periods: no line to go on
+    np.testing.assert_allclose(seeds(known, known, (1, 3))[1], [[0.32, 0.07]])
+
+
 def test_tracks_that_come_together_go_on_as_one_that_stands_for_all():
     cell = np.array([3, 1, 3, 3, 1])
     state = np.array([[0.5, 0.0], [0.5, 0.0], [0.5002, 0.0], [0.5004, 0.0], [0.6, 0.0]])

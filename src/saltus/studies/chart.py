@@ -26,7 +26,7 @@ LEAST = 1e-3  # rad: smaller motions are not told from rest
 DECAY = 100.0  # a motion settles, or counts as unsettled, while exp(-C tau / 2) falls to exp(-100), as a rule
 FEWEST, MOST = 40, 1200  # but within so many forcing periods
 TOL = 1e-10  # with larger errors the motion beside an equilibrium would not come to a halt
-ROWS = 51  # of the chart in one chunk
+ROWS = 101  # of the chart in one chunk: more chunks keep more of a run that is killed, and know less of their neighbours
 CELLS = "saltus.studies.chart_cells:cells"
 
 
