@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from saltus.paper import spectra
+from saltus.paper import spectra, statements_chaos
 from saltus.paper.claim import Claim
 from saltus.paper.figure import PaperFigure
 from saltus.paper.panels import each
@@ -64,8 +64,9 @@ def zoom(ax: Any, tree: Any, window: tuple[float, float]) -> None:
 
 
 def claims(data: Any) -> list[Claim]:
-    """Every feature that the text names, but for chaos and quasi-periodicity."""
-    return force_spectra(data, {name: AMPLITUDES[name] for name in data.children})
+    """Every feature that the text names."""
+    amplitudes = {name: AMPLITUDES[name] for name in data.children}
+    return [*force_spectra(data, amplitudes), *statements_chaos.force_spectra(data, amplitudes)]
 
 
 FIGURE = PaperFigure(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from saltus.paper import spectra
+from saltus.paper import spectra, statements_chaos
 from saltus.paper.claim import Claim
 from saltus.paper.features import main_branch
 from saltus.paper.fig09 import draw_panel
@@ -50,8 +50,9 @@ def zoom(ax: Any, tree: Any) -> None:
 
 
 def claims(data: Any) -> list[Claim]:
-    """Every feature that the text names, but for chaos and quasi-periodicity."""
-    return ground_spectra(data, {name: AMPLITUDES[name] for name in data.children})
+    """Every feature that the text names."""
+    amplitudes = {name: AMPLITUDES[name] for name in data.children}
+    return [*ground_spectra(data, amplitudes), *statements_chaos.ground_spectra(data, amplitudes)]
 
 
 FIGURE = PaperFigure(

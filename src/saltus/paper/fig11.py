@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from saltus.paper import diagrams
+from saltus.paper import diagrams, statements_chaos
 from saltus.paper.claim import Claim
 from saltus.paper.figure import PaperFigure
 from saltus.paper.statements_spectra import force_diagrams
@@ -25,8 +25,9 @@ def draw(data: Any) -> Any:
 
 
 def claims(data: Any) -> list[Claim]:
-    """Every feature that the text names, but for chaos."""
-    return force_diagrams("fig11", data, {name: FREQUENCIES[name] for name in data.children})
+    """Every feature that the text names."""
+    frequencies = {name: FREQUENCIES[name] for name in data.children}
+    return [*force_diagrams("fig11", data, frequencies), *statements_chaos.force_diagrams("fig11", data, frequencies)]
 
 
 FIGURE = PaperFigure(

@@ -1,6 +1,6 @@
 """What section 6 says of Figs. 9 to 13, judged by their data: knots, superharmonics, loops, jumps, onsets, coexistence, symmetry.
 
-Its statements on chaotic and quasi-periodic bands need verdicts on motions that are not periodic; they are not judged here.
+Its statements on chaotic and quasi-periodic bands are judged in `statements_chaos.py`.
 """
 
 from __future__ import annotations
