@@ -12,7 +12,8 @@ import numpy as np
 from saltus.attractors.attractor import NEAR, REST, UNDECIDED, Attractor, Attractors, Target
 from saltus.attractors.dataset import attractor_table, coordinate, labels, provenance
 from saltus.attractors.found import attractors
-from saltus.attractors.settling import MOST_STATES, Ends, clocked, settle
+from saltus.attractors.labelling import label_states
+from saltus.attractors.settling import clocked
 from saltus.errors import ParameterError
 from saltus.orbits.find import check_whole
 from saltus.orbits.search import REGION
@@ -26,8 +27,6 @@ PERIODS = 500
 WITHIN = 1e-2
 MOST_NEW = 64  # states of cells that end nowhere known from which new attractors are looked for, at a time
 ROUNDS = 3
-STAGE = 48  # forcing periods after which motions that have settled are told from those that go on, longer later
-LAST = 64  # strobes of a motion that does not settle which must lie on a sampled set
 
 Grid = tuple[np.ndarray, np.ndarray]  # velocities, coordinates
 
@@ -39,6 +38,7 @@ def basins(
     found: Attractors | None = None,
     periods: int = PERIODS,
     within: float = WITHIN,
+    curves: bool = False,
     tol: float = 1e-11,
     progress: Callable[[float], object] | None = None,
     **coordinates: Any,
@@ -56,6 +56,8 @@ def basins(
         found: the attractors and their labels; by default those that `attractors` finds, over the grid.
         periods: the most forcing periods of each motion.
         within: that distance, in the larger of coordinate and velocity.
+        curves: adds the curves at which basins meet, computed by the backward flow (see `boundaries`), as `boundary_...` over
+            `boundary_point`, nan between pieces.
         tol: the error of a step.
         progress: called with the fraction done.
         coordinates: the coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201).
@@ -80,8 +82,12 @@ def basins(
         found = attractors(system, region=(widths[0], widths[1]), tol=tol, progress=lambda done: say(0.1 * done))
     label, time = _all_cells(clock, found.targets, grid, periods, within, tol, lambda done: say(0.1 + 0.8 * done))
     members, label, time, reasons = _with_new(system, found, grid, label, time, periods, within, tol)
+    numbers = {"periods": periods, "within": within, "tol": tol, "reasons": reasons}
+    data = _dataset(system, members, grid, label, time, numbers)
+    if curves:
+        data = data.assign(_meeting(replace(found, members=members), grid, label, periods, within, tol))
     say(1.0)
-    return _dataset(system, members, grid, label, time, {"periods": periods, "within": within, "tol": tol, "reasons": reasons})
+    return data
 
 
 def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
@@ -106,92 +112,6 @@ def cell_arguments(found: Attractors, *, periods: int = PERIODS, within: float =
     """The arguments of `cells` that are the same for all blocks."""
     targets = [target.to_dict() for target in found.targets]
     return {"system": found.system.to_dict(), "attractors": targets, "periods": periods, "within": within, "tol": tol}
-
-
-def label_states(
-    system: System,
-    targets: Iterable[Target],
-    states: np.ndarray,
-    periods: int,
-    within: float,
-    tol: float,
-    say: Callable[[float], object] = lambda _: None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The labels of states (n, 2), UNDECIDED where none is borne out, and the times to reach the attractors, (n,) each."""
-    targets = tuple(targets)
-    label, time = np.empty(len(states), dtype=np.int16), np.empty(len(states))
-    size = max(256, MOST_STATES // periods)
-    for start in range(0, len(states), size):
-        part = slice(start, start + size)
-        label[part], time[part] = _block(system, targets, states[part], periods, within, tol)
-        say(min(1.0, (start + size) / len(states)))
-    return label, time
-
-
-def _block(
-    system: System, targets: tuple[Target, ...], states: np.ndarray, periods: int, within: float, tol: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """The same for as many states as fit into the memory, in stages: those that have settled go no further."""
-    label, time = np.full(len(states), UNDECIDED, dtype=np.int16), np.full(len(states), np.nan)
-    rows, history, done = np.arange(len(states)), states[:, None], 0
-    while rows.size and done < periods:
-        span = min(max(STAGE, done // 2), periods - done)
-        stage = settle(system, history[:, -1], span, tol=tol)
-        history = np.concatenate([history, stage.strobes], axis=1)
-        ends = replace(stage, strobes=history, periods=stage.periods + done)
-        done += span
-        label[rows] = _labelled(targets, ends, sampled=done == periods)
-        time[rows] = _times(targets, label[rows], ends, within)
-        on = ends.moving & (label[rows] == UNDECIDED)
-        rows, history = rows[on], history[on]
-    return label, time
-
-
-def _labelled(targets: tuple[Target, ...], ends: Ends, sampled: bool) -> np.ndarray:
-    """The labels of motions by their ends; with `sampled`, those that do not settle may lie on a set known by its points."""
-    label = np.full(len(ends.cycle), UNDECIDED, dtype=np.int16)
-    for target in targets:
-        if target.kind == "rest":
-            label[ends.rest] = REST
-        elif target.kind == "periodic":
-            label[_on_cycle(target, ends)] = target.label
-        elif sampled:
-            rows = np.flatnonzero(ends.moving & (label == UNDECIDED))
-            if rows.size:
-                apart = np.median(target.distance(ends.strobes[rows, -LAST:]), axis=1)
-                label[rows[apart < target.grain]] = target.label
-    return label
-
-
-def _on_cycle(target: Target, ends: Ends) -> np.ndarray:
-    """Which motions have settled on a cycle, or were near it for two rounds, and nearer in the second, (n,)."""
-    last, q = ends.strobes[:, -1], len(target.strobes)
-    near = NEAR * np.maximum(1.0, np.abs(last).max(axis=1))
-    here: np.ndarray = (target.distance(last) < near) & ((ends.cycle > 0) | ends.moving)
-    rows = np.flatnonzero(here & ends.moving)
-    rounds = target.distance(ends.strobes[rows, -2 * q :])
-    before, after = rounds[:, :q].max(axis=1), rounds[:, q:].max(axis=1)
-    here[rows] = (before < near[rows]) & (after < before) & (rounds.shape[1] == 2 * q)
-    return here
-
-
-def _times(targets: tuple[Target, ...], label: np.ndarray, ends: Ends, within: float) -> np.ndarray:
-    """Forcing periods after which each motion stays near its attractor, up to its end; nan where undecided.
-
-    The strobes begin with the initial state; nan stands for periods that were not needed.
-    """
-    time = np.full(len(label), np.nan)
-    for target in targets:
-        rows = np.flatnonzero(label == target.label)
-        if not rows.size:
-            continue
-        strobes = ends.strobes[rows]
-        known = np.isfinite(strobes[:, :, 0])
-        far = known & (target.distance(strobes) > max(within, target.grain))
-        last = far.shape[1] - 1 - np.argmax(far[:, ::-1], axis=1)
-        passed = np.cumsum(known, axis=1, dtype=np.int32)[np.arange(len(rows)), last]
-        time[rows] = np.minimum(np.where(far.any(axis=1), passed, 0), ends.periods[rows])
-    return time
 
 
 def _all_cells(
@@ -234,6 +154,22 @@ def _with_new(
         targets = tuple(member.target for member in fresh)
         label[rows, columns], time[rows, columns] = label_states(clock, targets, all_states, periods, within, tol)
     return tuple(sorted(members, key=lambda member: member.label)), label, time, reasons
+
+
+def _meeting(found: Attractors, grid: Grid, label: np.ndarray, periods: int, within: float, tol: float) -> dict[str, Any]:
+    """The curves at which basins meet, as variables."""
+    from saltus.attractors.boundaries import boundaries, clipped
+
+    clock, (name, unit) = clocked(found.system), coordinate(found.system)
+    curves = boundaries(
+        found, lambda states: label_states(clock, found.targets, states, periods, within, tol)[0], label, grid[1], grid[0]
+    )
+    points = clipped(curves, (grid[1][[0, -1]], grid[0][[0, -1]]))
+    text = "of the stable manifolds between basins, nan between pieces"
+    return {
+        f"boundary_{name}": ("boundary_point", points[:, 0], {"units": unit, "long_name": f"{name} {text}"}),
+        "boundary_velocity": ("boundary_point", points[:, 1], {"units": "1", "long_name": f"velocity {text}"}),
+    }
 
 
 def _same(one: Target, other: Target) -> bool:

@@ -11,6 +11,7 @@ ROUNDS = 40  # of refinement: each may halve the gaps
 NARROWEST = 1e-13  # between two parameters on the segment
 BEND = 0.15  # rad, between two chords that are longer than a tenth of the step
 SHORT = 0.1  # of the step: shorter chords are not divided for their bend
+TORN = 2.0  # steps
 REACH = 3.0  # half widths of the window beyond which points are dropped
 
 Flow = Callable[[np.ndarray, int], np.ndarray]  # states (n, 2) and forcing periods -> states (n, 2), nan where there are none
@@ -59,10 +60,10 @@ def grow(
         if periods:
             points = _advance(flow, points, 1, window)
         places, points, full = _refine(segment, flow, periods, places, points, window, most - total)
-        done.append(Level(periods, places, points))
-        total += len(places)
         if full:
             return done, f"{most} points"
+        done.append(Level(periods, *_parted(places, points, window)))
+        total += len(places)
         if np.isnan(points).all():
             return done, "all of it has left the window"
     return done, f"{levels} forcing periods"
@@ -98,6 +99,14 @@ def _refine(
         fresh = _advance(flow, fresh, periods, window) if periods else fresh
         places, points = np.insert(places, gaps + 1, between), np.insert(points, gaps + 1, fresh, axis=0)
     return places, points, False
+
+
+def _parted(places: np.ndarray, points: np.ndarray, window: Window) -> tuple[np.ndarray, np.ndarray]:
+    """The points with nan between neighbours that refinement has not brought together: the image is torn there."""
+    chords = np.abs(np.diff(window.scaled(points), axis=0)).max(axis=1)
+    torn = np.flatnonzero(chords > TORN * window.step) + 1
+    torn = torn[_may_cross(window.scaled(points))[torn - 1] | (np.abs(window.scaled(points)) <= 1.0).all(axis=1)[torn]]
+    return np.insert(places, torn, places[torn]), np.insert(points, torn, np.nan, axis=0)
 
 
 def _coarse(places: np.ndarray, points: np.ndarray, window: Window) -> np.ndarray:

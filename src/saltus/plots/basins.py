@@ -32,7 +32,8 @@ def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), width: float = SING
 
     Args:
         dataset: from `saltus.attractors.basins`.
-        manifolds: arrays (n, 2) of coordinate and velocity, nan between pieces, such as `stable_manifold(orbit).states`.
+        manifolds: arrays (n, 2) of coordinate and velocity, nan between pieces, such as `stable_manifold(orbit).states`, to be
+            drawn besides the dataset's own.
         width: of the figure, mm.
     """
     name = next(str(dim) for dim in dataset["label"].dims if dim != "velocity")
@@ -43,7 +44,10 @@ def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), width: float = SING
     x, y = dataset[name].values, dataset["velocity"].values
     colours = _colours(numbers)
     _paint(ax, x, y, dataset["label"].values, numbers, colours)
-    for states in manifolds:
+    own = (
+        [np.stack([dataset[f"boundary_{name}"], dataset["boundary_velocity"]], axis=1)] if "boundary_velocity" in dataset else []
+    )
+    for states in (*own, *manifolds):
         points = np.asarray(states, dtype=float)
         ax.plot(points[:, 0], points[:, 1], path_effects=HALO, **BOUNDARY)
     for i, kind in enumerate(dataset["attractor_kind"].values):
