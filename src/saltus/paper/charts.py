@@ -28,9 +28,9 @@ def system(beta0: float = 80.0, damping: float = 0.1, frequency: float = 1.0) ->
     return System(model=model, load=Load(frequency=frequency, horizontal=Harmonic(amplitude=0.1), vertical=-0.5))
 
 
-def compute(panels: Mapping[str, Mapping[str, float]], size: int, curves: int = CURVES, **options: Any) -> Any:
+def compute(panels: Mapping[str, Mapping[str, Any]], size: int, curves: int = CURVES, **options: Any) -> Any:
     """A chart of `size` x `size` cells for each panel; options are those of `stability_chart`."""
-    made = {name: panel(**values, size=size, curves=curves, **options) for name, values in panels.items()}
+    made = {name: panel(**({"curves": curves} | dict(values)), size=size, **options) for name, values in panels.items()}
     return spectra.together(made, what="stability charts under load (i)")
 
 
@@ -60,7 +60,9 @@ def static_borders(beta0: float) -> Any:
 
     start, end = subcritical_vertical(beta0), unloaded_fold(beta0)[0]
     bend = end + (start - end) * np.linspace(0.0, 1.0, 101) ** 0.5  # the fold leaves the line at V = start as a power 3/2
-    vertical = np.unique(np.concatenate([np.linspace(LOWEST, end, 21), bend, np.linspace(start, 0.0, 21)]))
+    vertical = np.unique(
+        np.concatenate([np.linspace(LOWEST, end, 21), bend, np.linspace(end, start, 101), np.linspace(start, 0.0, 21)])
+    )
     fold = np.full_like(vertical, np.nan)
     fold[vertical <= start] = fold_horizontal(beta0, vertical[vertical <= start])
     critical = critical_horizontal(beta0, vertical)

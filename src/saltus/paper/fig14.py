@@ -10,16 +10,17 @@ from saltus.paper.claim import Claim
 from saltus.paper.figure import PaperFigure
 from saltus.paper.statements_charts import over_frequency
 
-PANELS: dict[str, dict[str, float]] = {
-    name: {"beta0": 80.0, "damping": 0.1, "frequency": frequency, "widest": widest}
-    for name, frequency, widest in (
-        *(("a", 0.1, charts.WIDEST), ("b", 0.5, charts.WIDEST), ("c", 0.75, charts.WIDEST)),
-        *(("d", 1.0, charts.WIDEST), ("e", 1.5, charts.WIDEST), ("f", 4.0, 0.2)),  # at Omega = 4 all borders are at small Hhat
+PANELS: dict[str, dict[str, Any]] = {
+    name: {"beta0": 80.0, "damping": 0.1, "frequency": frequency, "widest": widest, "curves": curves}
+    for name, frequency, widest, curves in (
+        *(("a", 0.1, charts.WIDEST, 6), ("b", 0.5, charts.WIDEST, 10)),  # slow loads: chaos, and orbits of many impacts
+        *(("c", 0.75, charts.WIDEST, 16), ("d", 1.0, charts.WIDEST, 20), ("e", 1.5, charts.WIDEST, 16)),
+        ("f", 4.0, 0.2, 20),  # all borders are at small Hhat
     )
 }
 
 
-def compute(panels: Mapping[str, Mapping[str, float]] = PANELS, size: int = 101, **options: Any) -> Any:
+def compute(panels: Mapping[str, Mapping[str, Any]] = PANELS, size: int = 101, **options: Any) -> Any:
     """One chart for each frequency; options are those of `stability_chart`."""
     return charts.compute(panels, size, **options)
 

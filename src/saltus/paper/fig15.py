@@ -11,13 +11,13 @@ from saltus.paper.figure import PaperFigure
 from saltus.paper.statements_charts import over_parameters
 
 REFERENCE = "reference"  # Fig. 14 (d) again, which all are compared with
-PANELS: dict[str, dict[str, float]] = {
-    name: {"beta0": beta0, "damping": damping, "frequency": 1.0, "widest": charts.WIDEST}
+PANELS: dict[str, dict[str, Any]] = {
+    name: {"beta0": beta0, "damping": damping, "frequency": 1.0, "widest": charts.WIDEST, "curves": 12}
     for name, beta0, damping in (("a", 60.0, 0.1), ("b", 80.0, 0.05), ("c", 80.0, 0.15), (REFERENCE, 80.0, 0.1))
 }
 
 
-def compute(panels: Mapping[str, Mapping[str, float]] = PANELS, size: int = 101, **options: Any) -> Any:
+def compute(panels: Mapping[str, Mapping[str, Any]] = PANELS, size: int = 101, **options: Any) -> Any:
     """One chart for each system; options are those of `stability_chart`."""
     return charts.compute(panels, size, **options)
 

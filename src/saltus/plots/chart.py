@@ -85,12 +85,11 @@ def _outline(ax: Any, x: np.ndarray, y: np.ndarray, where: np.ndarray) -> None:
 
 def draw_static(ax: Any, static: Any) -> None:
     """The quasi-static border in red: solid where it is the true one, dotted the part of the paper's that is not."""
-    vertical, critical, fold = (static[name].values for name in ("vertical", "critical", "fold"))
-    below = np.isfinite(fold)
-    colour = {"color": UNSTABLE, "zorder": 6}
-    ax.plot(critical[~below], vertical[~below], lw=1.4, **colour)
-    ax.plot(critical[below], vertical[below], lw=1.0, ls=(0, (1, 1.2)), **colour)
-    ax.plot(fold[below & (fold > 0)], vertical[below & (fold > 0)], lw=1.4, **colour)
+    vertical, critical, true = (static[name].values for name in ("vertical", "critical", "true"))
+    last = max(int(np.argmax(true > 0)) - 1, 0)  # where the border reaches Hhat = 0; below it there is none
+    ax.plot(true[last:], vertical[last:], color=UNSTABLE, lw=1.4, zorder=6)
+    other = vertical <= float(static.attrs["subcritical_below"])
+    ax.plot(critical[other], vertical[other], color=UNSTABLE, lw=1.0, ls=(0, (1, 1.2)), zorder=6)
 
 
 def draw_borders(ax: Any, curves: Sequence[Any]) -> None:

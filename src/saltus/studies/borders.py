@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 KINDS = ("LP", "PD", "BPC", "GR")
 EQUAL = 1e-3  # of the amplitude, between the orbit followed to a neighbour and the motion that is there
 MOST = 24  # curves
-LOOKS = 120  # changes that are looked into, at most
+LOOKS = 3  # times as many changes are looked into as curves are wanted, at most
 BESIDE_REST = 10  # times as much as others do the changes matter where the neighbour has rest alone
 CONTINUED, SHRINKS, MEETS = "the motion goes on", "becomes too small to count", "ends on a known curve"
 HARMLESS = (CONTINUED, SHRINKS, MEETS)
@@ -68,13 +68,13 @@ def exact_borders(
     Args:
         system: that of the chart.
         chart: as `stability_chart` returns it.
-        most: how many curves at most; 120 changes at most are looked into.
+        most: how many curves at most; three times as many changes are looked into at most.
         progress: called with the share of the changes that are explained.
     """
     found, cells = Borders(), read(chart)
     waiting = ends_of(cells)
     total, size = max(len(waiting), 1), np.bincount(cells.family, minlength=1)
-    for _ in range(LOOKS):
+    for _ in range(LOOKS * most):
         if progress is not None:
             progress(1 - len(waiting) / total)
         if not len(waiting) or len(found.curves) >= most:
