@@ -154,6 +154,14 @@ def test_a_sampled_set_knows_its_points_from_others() -> None:
 
 
 @pytest.mark.thorough
+def test_without_losses_nothing_attracts() -> None:
+    found = attractors(loaded(0.05, C=0.0), starts=2)
+    assert len(found) == 0
+    assert found.undecided == 2
+    assert any("areas do not shrink" in reason for reason in found.reasons)
+
+
+@pytest.mark.thorough
 def test_chaos_and_a_periodic_motion_coexist() -> None:
     found = attractors(loaded(3.0, 1.1), starts=64)
     assert [member.kind for member in found] == ["periodic", "chaotic"]

@@ -20,6 +20,7 @@ from saltus.systems import System
 CLOUD = 2048  # strobe points that stand for a chaotic set
 VERDICT_PERIODS = 4000
 OPEN, FAILED = -1, -2  # where a motion ends: not yet known; not to be decided
+LOSSLESS = 1e-6  # sum of the exponents above which areas of states do not shrink: attractors have none
 SPREAD = 64  # strobes of a motion that must lie on a sampled set
 
 
@@ -153,6 +154,11 @@ class Collection:
             return self.add_orbit(verdict.orbit)
         if verdict.kind not in ("chaotic", "quasi-periodic"):
             self.reasons.append(f"from ({state[0]:.6g}, {state[1]:.6g}): {verdict.reason}")
+            return FAILED
+        if verdict.exponents is not None and float(verdict.exponents.values.sum()) > -LOSSLESS:
+            self.reasons.append(
+                f"from ({state[0]:.6g}, {state[1]:.6g}): {verdict.kind}, but areas do not shrink, so nothing attracts"
+            )
             return FAILED
         cloud, range_ = self._sampled(state)
         return self.add_sampled(verdict.kind, cloud, range_, verdict.reason)

@@ -38,7 +38,7 @@ def attractors(
     """The attractors on which motions from a region of initial states at phase 0 end, each certified, with its share of them.
 
     Rest is one by proof (`capture_speed`, or no load that ever pulls); a cycle, by its own equations, solved to rounding, with
-    multipliers inside the unit circle; what never settles, by the verdict of `classify`. What none of these bears out is
+    multipliers inside the unit circle; what never settles, by the verdict of `classify`, if areas shrink. What none bears out is
     undecided, and counted, with reasons. The mirror image of an attractor of a symmetric system is another one, unless it is its
     own, and is added even where no start leads to it. Under a constant load the equilibria are found, as cycles of period 1.
 
