@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 SETTLING = 400  # forcing periods that a motion is given to come to rest or to repeat itself,
 LONGER = 60  # periods of a stretch, instead of 12, where that leaves open whether the exponent is positive
-CONFIRMED = 4000  # and for which it must go on afterwards without settling: long transients of chaos are none
-COMPANIONS = 12  # motions from points of one that looks chaotic that must do so, all of them
+CONFIRMED = 2000  # for which all of its companions must go on without settling: long transients of chaos are none
+COMPANIONS, BESIDE = 64, 12  # motions from points of one that looks chaotic that must be so, all of them; at edges fewer do
+APART = 1e-7  # between their beginnings, or those from one motion would all be that motion
 KEPT = 64  # stroboscopic points of each motion
 SEEDS = 4  # states of a chaotic motion from which its neighbours along the parameter are begun
 ROUNDS = 7  # halvings of the bracket of an edge
@@ -105,12 +106,12 @@ def chaotic_bands(
     """Where motions are chaotic along a parameter, from `starts` states at each of `count` values.
 
     A motion is called chaotic if it has not settled after 400 forcing periods, its largest Lyapunov exponent over the next 384
-    (or, where that leaves it open, 1920 more) exceeds its error bar in both halves of them, and none of 12 motions from points
-    of those that look so at this value settles within 4000 periods: a motion on an attractor never leaves it, and where one
-    does chaos is transient. Every band is carried on to
-    its neighbours by motions begun on it, and each edge is then halved seven times between a value with chaos and one
-    without. Windows of periodic motion between two values of the grid are not seen; attractors whose basins hold no start are
-    not either.
+    (or, where that leaves it open, 1920 more) exceeds its error bar in both halves of them, and none of 64 motions from beside
+    points of those that look so at this value (12 at the halvings of an edge) settles within 2000 periods: a motion on an
+    attractor never leaves it, and where one does chaos is transient. Transients that live for 100 000 periods on average pass
+    for chaos nevertheless. Every band is carried on to its neighbours by motions begun on it, and each edge is then halved
+    seven times between a value with chaos and one without. Windows of periodic motion between two values of the grid are not
+    seen; attractors whose basins hold no start are not either.
     """
     say = progress or (lambda share: None)
     search = _Search(system, path, starts, region, seed)
@@ -153,10 +154,10 @@ class _Search:
         )
         rows = np.nonzero(ends.moving)
         if rows[0].size:
-            self._judge(tried, rows, ends)
+            self._judge(tried, rows, ends, COMPANIONS if states is None else BESIDE)
         return tried
 
-    def _judge(self, tried: Tried, rows: tuple[np.ndarray, ...], ends: _Ends) -> None:
+    def _judge(self, tried: Tried, rows: tuple[np.ndarray, ...], ends: _Ends, companions: int) -> None:
         """Exponents of what has not settled, and whether it is chaotic."""
         values = tried.values[rows[0]]
         found = largest_exponents(self.system, ends.strobes[rows][:, -1], {self.path: values}, tol=TOLERANCE)
@@ -168,15 +169,15 @@ class _Search:
         tried.exponent[rows], tried.error[rows], positive = found.exponent, found.error, found.positive
         tried.undecided[rows] = ~positive & ~(found.exponent + found.error < 0.0)
         if positive.any():
-            self._confirm(tried, tuple(place[positive] for place in rows))
+            self._confirm(tried, tuple(place[positive] for place in rows), companions)
 
-    def _confirm(self, tried: Tried, kept: tuple[np.ndarray, ...]) -> None:
+    def _confirm(self, tried: Tried, kept: tuple[np.ndarray, ...], companions: int) -> None:
         """Follow companions of motions that look chaotic: where one of them settles, chaos is a transient, however long."""
         lines = np.unique(kept[0])
-        states = np.empty((len(lines), COMPANIONS, 2))
+        states = np.empty((len(lines), companions, 2))
         for i, line in enumerate(lines):
             there = tried.strobes[line, kept[1][kept[0] == line]].reshape(-1, 2)
-            states[i] = there[np.linspace(0, len(there) - 1, COMPANIONS).astype(int)]
+            states[i] = there[np.linspace(0, len(there) - 1, companions).astype(int)] + APART * np.arange(companions)[:, None]
         later = self._run(tried.values[lines], states, CONFIRMED)
         stays = dict(zip(lines.tolist(), later.moving.all(axis=1), strict=True))
         for line, start in zip(*kept, strict=True):

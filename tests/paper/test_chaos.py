@@ -1,0 +1,98 @@
+"""The statements on chaos are judged by bands and exponents alone: made by hand, they decide as they must."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from spectrum_cases import branch, diagram
+
+from saltus.paper import Verdict, statements_chaos
+from saltus.paper.spectra import under_force
+
+
+def panel(*spans, wandering=(), bounds=(0.0, 3.0), stable=True):
+    """A diagram with one branch over its whole range, bands at `spans`, and chaos or transients at the values `wandering`."""
+    tree = diagram(branch(bounds, [0.5, 0.6], [stable, stable]), bounds=bounds)
+    low, high = (np.array([span[i] for span in spans], float) for i in (0, 1))
+    marks = np.full(len(spans), "PD", dtype="U16")
+    columns = {"low": low, "high": high, "exponent": np.full(len(spans), 0.1), "low_mark": marks, "high_mark": marks}
+    tree["bands"] = xr.DataTree(xr.Dataset({name: ("band", values) for name, values in columns.items()}))
+    values = np.linspace(*bounds, 31)
+    chaotic = np.array([any(a <= v <= b for a, b in spans) for v in values])
+    wanders = chaotic | np.isin(np.round(values, 6), np.round(wandering, 6))
+    table = {
+        "exponent": np.where(wanders, 0.1, np.nan)[:, None],
+        "error": np.where(wanders, 0.01, np.nan)[:, None],
+        "chaotic": chaotic[:, None].astype(int),
+        "undecided": (wanders & ~chaotic)[:, None].astype(int),
+    }
+    tree["exponents"] = xr.DataTree(xr.Dataset({k: (("value", "start"), v) for k, v in table.items()}, {"value": values}))
+    tree.attrs["system"] = under_force().to_json()
+    return tree
+
+
+def verdicts(claims):
+    return {claim.id: claim.verdict for claim in claims}
+
+
+def test_what_the_paper_calls_quasi_periodic_is_chaos_by_erratum_22_or_nothing():
+    amplitudes = {"a": 0.2, "f": 3.0}
+    small, large = panel((0.36, 0.39)), panel((1.0, 1.8))
+    found = verdicts(statements_chaos.force_spectra({"a": small, "f": large}, amplitudes))
+    assert found["fig09-quasi-periodic"] is Verdict.ERRATUM
+    empty = verdicts(statements_chaos.force_spectra({"a": panel(), "f": large}, amplitudes))
+    assert empty["fig09-quasi-periodic"] is Verdict.DISAGREES
+
+
+@pytest.mark.parametrize(
+    ("spans", "verdict"),
+    [
+        ({"c": [], "e": [(1.0, 1.2)], "f": [(1.0, 1.6)]}, Verdict.AGREES),
+        ({"c": [], "e": [(1.0, 1.6)], "f": [(1.0, 1.2)]}, Verdict.DISAGREES),  # it narrows
+        ({"c": [(1.0, 1.9)], "e": [(1.0, 1.2)], "f": [(1.0, 1.6)]}, Verdict.DISAGREES),  # more at a small load
+        ({"c": [], "e": [], "f": [(1.0, 1.6)]}, Verdict.DISAGREES),
+    ],
+)
+def test_chaos_widens_with_the_load(spans, verdict):
+    amplitudes = {"c": 1.0, "e": 2.0, "f": 3.0}
+    data = {name: panel(*spans[name]) for name in amplitudes}
+    assert verdicts(statements_chaos.force_spectra(data, amplitudes))["fig09-chaos"] is verdict
+
+
+@pytest.mark.parametrize(("stable", "verdict"), [(True, Verdict.AGREES), (False, Verdict.DISAGREES)])
+def test_a_band_is_pierced_by_a_stable_motion_alone(stable, verdict):
+    assert statements_chaos.pierced("x", "here", panel((1.0, 1.5), stable=stable), "Ω").verdict is verdict
+
+
+@pytest.mark.parametrize(
+    ("small", "large", "verdict"),
+    [
+        (panel(), panel((2.0, 2.5)), Verdict.AGREES),
+        (panel(), panel(wandering=(2.0, 2.1)), Verdict.ERRATUM),
+        (panel(wandering=(2.0, 2.1)), panel(wandering=(2.0,)), Verdict.DISAGREES),
+        (panel(), panel(wandering=(0.4,)), Verdict.DISAGREES),  # at low frequency alone
+    ],
+)
+def test_chaos_at_high_frequency_lasts_or_is_a_transient_by_erratum_31(small, large, verdict):
+    claims = statements_chaos.ground_spectra({"a": small, "b": large}, {"a": 0.25, "b": 0.5})
+    assert verdicts(claims)["fig10-chaos"] is verdict
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "first", "verdict"),
+    [
+        ({"a": 2.0, "b": 4.0}, (1.0, 2.0), Verdict.AGREES),
+        ({"a": 0.5, "b": 1.0}, (2.0, 1.0), Verdict.ERRATUM),
+        ({"a": 2.0, "b": 4.0}, (2.0, 1.0), Verdict.DISAGREES),  # no erratum above the resonance
+    ],
+)
+def test_chaos_begins_at_larger_loads_for_larger_frequencies_above_the_resonance(frequencies, first, verdict):
+    data = {name: panel((start, start + 0.3)) for name, start in zip(frequencies, first, strict=True)}
+    assert verdicts(statements_chaos.force_diagrams("fig12", data, frequencies))["fig12-shift"] is verdict
+
+
+@pytest.mark.parametrize(
+    ("spans", "verdict"), [([(1.0, 1.2), (2.0, 2.2)], Verdict.AGREES), ([(1.0, 1.2)], Verdict.DISAGREES), ([], Verdict.DISAGREES)]
+)
+def test_two_regions_of_chaos_are_parted_by_stable_motions(spans, verdict):
+    claims = statements_chaos.force_diagrams("fig11", {"a": panel(*spans)}, {"a": 1.0})
+    assert verdicts(claims)["fig11-two-regions"] is verdict
