@@ -73,17 +73,23 @@ def exact_borders(
     """
     found, cells = Borders(), read(chart)
     waiting = ends_of(cells)
-    total, size = max(len(waiting), 1), np.bincount(cells.family, minlength=1)
+    total = max(len(waiting), 1)
     for _ in range(LOOKS * most):
         if progress is not None:
             progress(1 - len(waiting) / total)
         if not len(waiting) or len(found.curves) >= most:
             break
-        urgent = size[cells.family[waiting.motion]] * np.where(cells.empty[tuple(waiting.target.T)], BESIDE_REST, 1)
-        first, before = np.arange(len(waiting)) == np.argmax(urgent), len(found.curves)
+        first, before = _most_urgent(cells, waiting), len(found.curves)
         _look(system, chart, cells, waiting.only(first), found)
         waiting = waiting.only(~first & ~explained(cells, waiting, found.curves[before:]))
     return found
+
+
+def _most_urgent(cells: Cells, waiting: Ends) -> np.ndarray:
+    """The end of the widest family, above all of those with rest alone beside them; as a mask."""
+    size = np.bincount(cells.family)[cells.family[waiting.motion]]
+    weight = size * np.where(cells.empty[tuple(waiting.target.T)], BESIDE_REST, 1)
+    return np.asarray(np.arange(len(waiting)) == np.argmax(weight))
 
 
 def _look(system: System, chart: xarray.Dataset, cells: Cells, end: Ends, found: Borders) -> None:
