@@ -10,8 +10,21 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from saltus import flow, systems, theory
+    from saltus.attractors import (  # type: ignore[no-redef]  # functions, which hide the modules that they are in
+        Exponents,
+        Verdict,
+        attractors_along,
+        basins,
+        classify,
+        excludes_tori,
+        lyapunov_many,
+        lyapunov_spectrum,
+        separatrices,
+        stable_manifold,
+        zero_one_test,
+    )
     from saltus.config import load_study
-    from saltus.errors import MotionError, ParameterError, SaltusError, TraceError
+    from saltus.errors import MotionError, ParameterError, SaltusError, SweepError, TraceError
     from saltus.flow import EventKind, Motion, Sensitivities, Stop, capture_speed, sensitivities, simulate, simulate_many
     from saltus.orbits import (
         Branch,
@@ -25,7 +38,7 @@ if TYPE_CHECKING:
         search_orbits,
         switch_branch,
     )
-    from saltus.studies import bifurcation_diagram, response_spectrum
+    from saltus.studies import bifurcation_diagram, chaotic_bands, phase_portrait, response_spectrum, stability_chart
     from saltus.systems import (
         EnergyRestitution,
         Harmonic,
@@ -45,7 +58,20 @@ if TYPE_CHECKING:
     )
 
 _HOMES = {
-    "saltus.errors": ("MotionError", "ParameterError", "SaltusError", "TraceError"),
+    "saltus.errors": ("MotionError", "ParameterError", "SaltusError", "SweepError", "TraceError"),
+    "saltus.attractors": (
+        "Exponents",
+        "Verdict",
+        "attractors_along",
+        "basins",
+        "classify",
+        "excludes_tori",
+        "lyapunov_many",
+        "lyapunov_spectrum",
+        "separatrices",
+        "stable_manifold",
+        "zero_one_test",
+    ),
     "saltus.config": ("load_study",),
     "saltus.flow": (
         "EventKind",
@@ -69,7 +95,7 @@ _HOMES = {
         "search_orbits",
         "switch_branch",
     ),
-    "saltus.studies": ("bifurcation_diagram", "response_spectrum"),
+    "saltus.studies": ("bifurcation_diagram", "chaotic_bands", "phase_portrait", "response_spectrum", "stability_chart"),
     "saltus.systems": (
         "EnergyRestitution",
         "Harmonic",
@@ -89,12 +115,13 @@ _HOMES = {
     ),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
-_ROOMS = ("flow", "orbits", "studies", "systems", "theory")
+_ROOMS = ("attractors", "flow", "orbits", "studies", "sweep", "systems", "theory")
 
 __all__ = [
     "Branch",
     "EnergyRestitution",
     "EventKind",
+    "Exponents",
     "Harmonic",
     "InelasticImpact",
     "Load",
@@ -112,31 +139,47 @@ __all__ = [
     "Sensitivities",
     "SpecialPoint",
     "Stop",
+    "SweepError",
     "System",
     "TraceError",
     "TwoLayer",
     "UnitCell",
     "VelocityReduction",
+    "Verdict",
     "WallOscillator",
+    "attractors",
+    "attractors_along",
+    "basins",
     "bifurcation_diagram",
     "capture_speed",
+    "chaotic_bands",
+    "classify",
     "continue_orbit",
     "continue_special",
     "doubling_cascade",
+    "excludes_tori",
     "find_orbit",
     "flow",
     "load_study",
+    "lyapunov_many",
+    "lyapunov_spectrum",
     "orbits",
+    "phase_portrait",
     "register",
     "response_spectrum",
     "search_orbits",
     "sensitivities",
+    "separatrices",
     "simulate",
     "simulate_many",
+    "stability_chart",
+    "stable_manifold",
     "studies",
+    "sweep",
     "switch_branch",
     "systems",
     "theory",
+    "zero_one_test",
 ]
 
 

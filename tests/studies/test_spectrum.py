@@ -156,7 +156,7 @@ def test_progress_grows_to_one_and_says_what_is_done():
     assert (np.diff(shares) >= 0).all()
     assert shares[0] == 0.0
     assert shares[-1] == 1.0
-    assert {what.split(",")[0] for _, what in heard} == {"searching", "following", "confirming", "done"}
+    assert {what.split(",")[0] for _, what in heard} == {"searching", "following", "looking for chaos", "confirming", "done"}
 
 
 def test_where_everything_rests_there_is_no_branch():

@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.attractors.pieces import first_frame, piece_count
 from saltus.flow import layout as k
-from saltus.flow.ensemble import _lanes as compiled_lanes
+from saltus.flow.ensemble import compiled_lanes
 from saltus.flow.ensemble_dataset import Wanted
 from saltus.flow.lanes.compile import load_advance, load_driver, load_helpers
 from saltus.flow.lanes.run import Jobs, Lanes, available_cores

@@ -46,7 +46,7 @@ def largest_exponents(
     """
     name, n = system.model.coordinates[0], len(states)
     states, direction = np.array(states, dtype=float), np.tile(np.sqrt([0.5, 0.5]), (n, 1))
-    frequency = np.broadcast_to(parameters.get("load.frequency", system.load.frequency), n)
+    frequency = np.broadcast_to(parameters.get("load.frequency", np.array(system.load.frequency, dtype=float)), n)
     growth = np.full((STRETCHES, n), np.nan)
     for stretch in range(STRETCHES):
         here = np.flatnonzero(np.isfinite(states).all(axis=1))

@@ -104,7 +104,7 @@ def simulate_many(
         jobs.numbers[:, 3] = _capture(system, inputs.parameters, wanted.limits)
     spans = jobs.labels[:, 1] - jobs.labels[:, 0]
     legs = int(np.max(spans + (jobs.numbers[:, 2] > jobs.numbers[:, 0]), initial=1))
-    lanes = _lanes(system, run, wanted, _kept(last, legs))
+    lanes = compiled_lanes(system, run, wanted, _kept(last, legs))
     if aside is not None:
         load_helpers(), load_advance()
         aside.wait()
@@ -165,7 +165,7 @@ def _threads(threads: Any) -> int:
     return int(threads)
 
 
-def _lanes(system: System, run: Program, wanted: Wanted, kept: int) -> Lanes:
+def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> Lanes:
     """The compiled lanes of a system and what they are to keep."""
     key = run.structure.module.__name__
     if key not in _functions:

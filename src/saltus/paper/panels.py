@@ -21,7 +21,7 @@ def each(make: Callable[..., Any], values: Mapping[str, float], **options: Any) 
     if cores < 2:
         return {name: make(value, **options) for name, value in values.items()}
     with ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("spawn")) as pool:
-        made = {name: pool.submit(partial(make, value, **options)) for name, value in reversed(values.items())}
+        made = {name: pool.submit(partial(make, value, **options)) for name, value in reversed(list(values.items()))}
         try:
             return {name: made[name].result() for name in values}
         except BaseException:  # interrupted, or a panel failed: what has not begun is of no use any more

@@ -179,7 +179,7 @@ class _Search:
             there = tried.strobes[line, kept[1][kept[0] == line]].reshape(-1, 2)
             states[i] = there[np.linspace(0, len(there) - 1, companions).astype(int)] + APART * np.arange(companions)[:, None]
         later = self._run(tried.values[lines], states, CONFIRMED)
-        stays = dict(zip(lines.tolist(), later.moving.all(axis=1), strict=True))
+        stays = dict(zip(lines.tolist(), np.all(later.moving, axis=1).tolist(), strict=True))
         for line, start in zip(*kept, strict=True):
             tried.chaotic[line, start], tried.undecided[line, start] = stays[line], not stays[line]
 

@@ -9,6 +9,7 @@ from saltus.systems.load import Channel, Load
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model
 from saltus.systems.registry import IMPACTS, MODELS, register
+from saltus.systems.reversed import reversed_system
 from saltus.systems.rocking_block import RockingBlock
 from saltus.systems.scenarios import Impact, LayerState, Scenario, TableRow, name_impact, other_impulse, table_1
 from saltus.systems.si_units import PhysicalCell
@@ -48,5 +49,6 @@ __all__ = [
     "name_impact",
     "other_impulse",
     "register",
+    "reversed_system",
     "table_1",
 ]
