@@ -155,8 +155,8 @@ def agreement(name: str, data: Any) -> Claim:
         WHERE,
         "The border of the region where rest is alone is where motions of the exact equation are born or lose their stability",
         printed=total > 0 and beside == 0,
-        evidence=f"of {total} changes between neighbouring cells {total - left} lie on the followed curves; {left} lie on others, of "
-        f"which {wide} are ends of motions that fill {WIDE} cells or more, and {beside} of these have rest alone beside them",
+        evidence=f"of {total} changes between neighbouring cells {total - left} lie on the followed curves, {left} on others, "
+        f"of which {wide} are ends of motions that fill {WIDE} cells or more, and {beside} of these have rest alone beside them",
     )
 
 

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 KINDS = ("LP", "PD", "BPC", "GR")
 EQUAL = 1e-3  # of the amplitude, between the orbit followed to a neighbour and the motion that is there
 MOST = 24  # curves
-LOOKS = 3  # times as many changes are looked into as curves are wanted, at most
+LOOKS = 3  # times as many changes may be looked into in vain as curves are wanted
+EASY = 10  # times as many may turn out to be none: the same motion a little further
 BESIDE_REST = 10  # times as much as others do the changes matter where the neighbour has rest alone
 CONTINUED, SHRINKS, MEETS = "the motion goes on", "becomes too small to count", "ends on a known curve"
 HARMLESS = (CONTINUED, SHRINKS, MEETS)
@@ -68,16 +69,17 @@ def exact_borders(
     Args:
         system: that of the chart.
         chart: as `stability_chart` returns it.
-        most: how many curves at most; three times as many changes are looked into at most.
+        most: how many curves at most; three times as many changes are looked into in vain at most.
         progress: called with the share of the changes that are explained.
     """
     found, cells = Borders(), read(chart)
     waiting = ends_of(cells)
     total = max(len(waiting), 1)
-    for _ in range(LOOKS * most):
+    for _ in range((LOOKS + EASY) * most):
         if progress is not None:
             progress(1 - len(waiting) / total)
-        if not len(waiting) or len(found.curves) >= most:
+        vain = sum(said not in HARMLESS for said in found.ends.values())
+        if not len(waiting) or len(found.curves) >= most or vain >= LOOKS * most:
             break
         first, before = _most_urgent(cells, waiting), len(found.curves)
         _look(system, chart, cells, waiting.only(first), found)
