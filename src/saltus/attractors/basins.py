@@ -19,6 +19,7 @@ from saltus.orbits.find import check_whole
 from saltus.orbits.search import REGION
 from saltus.systems import System
 from saltus.systems.checks import check_number
+from saltus.systems.reversed import reversed_system
 
 if TYPE_CHECKING:
     import xarray
@@ -40,6 +41,7 @@ def basins(
     within: float = WITHIN,
     curves: bool = False,
     tol: float = 1e-11,
+    compute: Callable[[dict[str, Any], dict[str, np.ndarray]], tuple[np.ndarray, np.ndarray]] | None = None,
     progress: Callable[[float], object] | None = None,
     **coordinates: Any,
 ) -> xarray.Dataset:
@@ -59,7 +61,9 @@ def basins(
         curves: adds the curves at which basins meet, computed by the backward flow (see `boundaries`), as `boundary_...` over
             `boundary_point`, nan between pieces.
         tol: the error of a step.
-        progress: called with the fraction done.
+        compute: computes the labels and times of the grid from the arguments of `cells` and the axes, such as by a sweep; by
+            default they are computed here.
+        progress: called with the fraction done, first when all arguments have been checked.
         coordinates: the coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201).
 
     Returns:
@@ -76,11 +80,18 @@ def basins(
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     if found is not None and found.system != system:
         raise ParameterError("found holds the attractors of another system; leave it out, or compute it for this one")
+    if curves:
+        _check_curves(system, grid)
     say = progress or (lambda _: None)
+    say(0.0)
     if found is None:
         widths = tuple(float(max(np.abs(a - m).max(), 1e-6)) for a, m in zip(grid[::-1], _middle(clock), strict=True))
         found = attractors(system, region=(widths[0], widths[1]), tol=tol, progress=lambda done: say(0.1 * done))
-    label, time = _all_cells(clock, found.targets, grid, periods, within, tol, lambda done: say(0.1 + 0.8 * done))
+    if compute is None:
+        label, time = _all_cells(clock, found.targets, grid, periods, within, tol, lambda done: say(0.1 + 0.8 * done))
+    else:
+        arguments = cell_arguments(found, periods=periods, within=within, tol=tol)
+        label, time = map(np.array, compute(arguments, {"velocity": grid[0], system.model.coordinates[0]: grid[1]}))
     members, label, time, reasons = _with_new(system, found, grid, label, time, periods, within, tol)
     numbers = {"periods": periods, "within": within, "tol": tol, "reasons": reasons}
     data = _dataset(system, members, grid, label, time, numbers)
@@ -170,6 +181,14 @@ def _meeting(found: Attractors, grid: Grid, label: np.ndarray, periods: int, wit
         f"boundary_{name}": ("boundary_point", points[:, 0], {"units": unit, "long_name": f"{name} {text}"}),
         "boundary_velocity": ("boundary_point", points[:, 1], {"units": "1", "long_name": f"velocity {text}"}),
     }
+
+
+def _check_curves(system: System, grid: Grid) -> None:
+    """Refuse, before cells are computed, what has no curves: a grid that is a line, impacts that cannot be undone."""
+    for name, values in zip(("velocity", system.model.coordinates[0]), grid, strict=True):
+        if len(values) < 2:
+            raise ParameterError(f"{name} must be at least two numbers where the curves between basins are asked for")
+    reversed_system(system)
 
 
 def _same(one: Target, other: Target) -> bool:

@@ -52,7 +52,7 @@ def attractors(
         known: stable orbits, or branches of which those at the system's parameter are taken, that count as attractors too.
         also: further initial states (n, 2), which do not count in the shares.
         tol: the error of a step, as for `simulate_many`.
-        progress: called with the fraction done.
+        progress: called with the fraction done, first when all arguments have been checked.
 
     Raises:
         ParameterError: several coordinates, a load that never repeats, known orbits of another system, numbers without meaning.
@@ -64,7 +64,9 @@ def attractors(
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     widths = check_region(region)
     given = _known(system, known)
+    check_whole("seed", seed, 0)
     say = progress or (lambda _: None)
+    say(0.0)
     states = initial_states(clock, starts, widths, seed)
     collection = Collection(clock)
     for orbit in given:

@@ -1,32 +1,26 @@
 """Separatrices of the phase plane under a constant load: the stable manifolds of its saddles, by the exact backward flow.
 
-At an equilibrium (theta*, 0) on a side the flow is theta'' = a_theta (theta - theta*) + a_v theta', with the rates
-lambda^2 - a_v lambda - a_theta = 0: a saddle where a_theta > 0, left and approached along (1, lambda).
+A saddle is left and approached along (1, lambda), lambda its eigenvalues (see `equilibria`).
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from saltus.attractors.equilibria import equilibria
 from saltus.attractors.grow import Window
 from saltus.attractors.manifolds import check_window
-from saltus.attractors.settling import clocked
-from saltus.errors import ParameterError
 from saltus.flow import Motion, simulate
-from saltus.systems import Constant, System, VelocityReduction
+from saltus.systems import System, VelocityReduction
 from saltus.systems.checks import check_number
 from saltus.systems.reversed import reversed_system
 
 OFFSET = 1e-6  # from the saddle; the curve leaves its tangent by the square of this
 CLOSE = 1e-4  # distance at which a separatrix is said to end at a saddle
 PIECE = 2.0  # of time that is followed at once
-GRID = 2001  # points of the window between which equilibria are looked for
-SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # of a derivative by central differences
-DIFFERENCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -58,25 +52,12 @@ def saddles(system: System, window: Any = ((-3.0, 3.0), (-3.0, 3.0))) -> tuple[S
     Raises:
         ParameterError: a load that is not constant; a window without meaning.
     """
-    from scipy.optimize import brentq
+    points = equilibria(system, window)
+    return tuple(Saddle(p.place, p.side, _rates(p.eigenvalues)) for p in points if p.saddle and p.eigenvalues)
 
-    frame = check_window(window, 0.1)
-    _check_constant(system)
-    model = system.model
-    found = []
-    for side in model.sides or (1,):
-        grid = frame.centre[0] + frame.half[0] * np.linspace(-1.0, 1.0, GRID)
-        grid = grid[np.asarray(model.gap(grid, side)) > 0.0] if model.sides else grid
 
-        def pull(theta: float, side: int = side) -> float:
-            return float(model.acceleration(0.0, theta, 0.0, float(side), system.load))
-
-        values = np.array([pull(theta) for theta in grid])
-        for i in np.flatnonzero(values[:-1] * values[1:] < 0.0):
-            theta = float(brentq(pull, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-15))
-            rates = _rates(system, theta, side)
-            found += [] if rates is None else [Saddle(theta, side, rates)]
-    return tuple(sorted(found, key=lambda saddle: saddle.theta))
+def _rates(values: tuple[complex, complex]) -> tuple[float, float]:
+    return values[0].real, values[1].real
 
 
 def separatrices(
@@ -96,28 +77,6 @@ def separatrices(
     points = saddles(system, window)
     backward = reversed_system(system)
     return tuple(_branch(backward, saddle, away, points, frame, span, step) for saddle in points for away in (1.0, -1.0))
-
-
-def _check_constant(system: System) -> None:
-    clocked(system)
-    for name, signal in system.load.channels.items():
-        if not isinstance(signal, Constant):
-            raise ParameterError(f"load.{name} varies, so there is no phase plane; use stable_manifold of its saddle orbits")
-
-
-def _rates(system: System, theta: float, side: int) -> tuple[float, float] | None:
-    """The eigenvalues of a saddle, None of any other equilibrium."""
-
-    def pull(q: float, v: float) -> float:
-        return float(system.model.acceleration(0.0, q, v, float(side), system.load))
-
-    h = DIFFERENCE
-    slope = sum(w * (pull(theta + j * h, 0.0) - pull(theta - j * h, 0.0)) for j, w in SIXTH_ORDER) / h
-    loss = sum(w * (pull(theta, j * h) - pull(theta, -j * h)) for j, w in SIXTH_ORDER) / h
-    if slope <= 0.0:
-        return None
-    root = math.sqrt(0.25 * loss * loss + slope)
-    return 0.5 * loss + root, 0.5 * loss - root
 
 
 def _branch(

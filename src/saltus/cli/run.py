@@ -1,27 +1,36 @@
-"""`saltus run`: everything that a study asks for, computed, written and drawn."""
+"""`saltus run`: everything that a study asks for, checked first, then computed, written and drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+from saltus.errors import ParameterError
+
 if TYPE_CHECKING:
     from saltus.config import Study
     from saltus.config.asks import Ask
 
-Tell = Callable[[float, str], None]
+SWEPT = ("basins", "stability_chart")  # computed chunk by chunk into a store, from which a run that was stopped goes on
+
+Tell = Callable[..., None]  # of the share that is done, None where it is not known, and of what is being done
+
+
+class _BeginningError(Exception):
+    """All arguments have been checked, and computing would begin."""
 
 
 def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None) -> None:
     """Answer every question of the study at `path` into `output`, the motion first.
 
     Raises:
-        SaltusError: a bad study or one that asks nothing, a folder that cannot be written to, what a question's function raises.
+        SaltusError: a bad study or one that asks nothing, a folder that cannot be written to, a scheduler that does not answer,
+            all before anything is computed; then what a question's function raises.
     """
     from saltus.cli.simulate import simulate_study
     from saltus.config import load_study
@@ -34,20 +43,86 @@ def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None
         )
     output = Path("results") / study.name if output is None else output
     check_writable(output)
+    for ask in study.asks:
+        check(study, ask, output)
+    if scheduler is not None:
+        check_scheduler(study, scheduler)
     if study.simulate is not None:
         simulate_study(path, output, plot)
     console = Console(highlight=False)
     for ask in study.asks:
         with _progress(ask.kind.replace("_", " ")) as tell:
-            store, data = ANSWERS[ask.kind](study, ask, output, tell, scheduler)
-            files = [store]
-            if plot:
-                from saltus.cli.plot import draw_file
-
-                files += draw_file(store, output / ask.kind, data)
+            data = computed(study, ask, output, tell, scheduler)
+            tell(None, "writing")
+            files = written(ask, data, output, plot)
         for line in said(ask.kind, data):
             console.print(line, markup=False, soft_wrap=True)
         console.print(f"Results are in {output}: {', '.join(file.name for file in files)}", markup=False, soft_wrap=True)
+
+
+def check(study: Study, ask: Ask, output: Path) -> None:
+    """Refuse what the function of a question would refuse: it is called until it first tells of progress.
+
+    Raises:
+        ParameterError: an argument without meaning, or in `output` the store of something else.
+    """
+
+    def beginning(*_: Any) -> None:
+        raise _BeginningError
+
+    with suppress(_BeginningError):
+        computed(study, ask, output, beginning, None, only_there=True)
+
+
+def check_scheduler(study: Study, scheduler: str) -> None:
+    """Refuse a scheduler that does not answer, or for which there is nothing to do."""
+    from collections import deque
+
+    from saltus.sweep.cluster import on_cluster
+
+    if "://" not in scheduler:
+        raise ParameterError(f"--scheduler must be an address such as tcp://host:8786, got {scheduler!r}")
+    if not any(ask.kind in SWEPT for ask in study.asks):
+        raise ParameterError("--scheduler is for [stability_chart] and [basins], of which the study has none; leave it out")
+    unused: Any = None
+    next(on_cluster(unused, deque(), scheduler), None)  # connects, and has no chunk to compute
+
+
+def computed(study: Study, ask: Ask, output: Path, tell: Tell, scheduler: str | None, only_there: bool = False) -> Any:
+    """The Dataset or DataTree that answers a question; `only_there` makes no store that is not there."""
+    from saltus import attractors, studies
+
+    if ask.kind == "attractors":
+        return study.answer(ask, attractors.attractors, progress=tell).to_xarray()
+    function = studies.basin_sweep if ask.kind == "basins" else getattr(studies, ask.kind)
+    if ask.kind not in SWEPT:
+        return study.answer(ask, function, progress=tell)
+    store = output / f"{ask.kind}.zarr"
+    place = None if only_there and not store.exists() else store
+    return study.answer(ask, function, store=place, scheduler=scheduler, progress=lambda *done: _chunks(tell, *done))
+
+
+def _chunks(tell: Tell, done: int, total: int, left: float | None) -> None:
+    """Tell of chunks; within one there is nothing to tell."""
+    text = f"{done} of {total} chunks" + (f", {left:.0f} s left" if left else "")
+    tell(done / total if total > 1 else None, text if total > 1 else "computing")
+
+
+def written(ask: Ask, data: Any, output: Path, plot: bool) -> list[Path]:
+    """The files of an answer: its data, if no store keeps them, and with `plot` the picture."""
+    from saltus.files import write_dataset
+
+    store = output / f"{ask.kind}.zarr"
+    if ask.kind == "stability_chart":
+        files = [store]
+    else:
+        data.attrs["kind"] = ask.kind
+        files = [write_dataset(output / f"{ask.kind}.nc", data)] + ([store] if ask.kind in SWEPT else [])
+    if plot:
+        from saltus.cli.plot import draw_file
+
+        files += draw_file(files[0], output / ask.kind, data)
+    return files
 
 
 @contextmanager
@@ -56,71 +131,18 @@ def _progress(what: str) -> Iterator[Tell]:
     messages = Console(stderr=True, highlight=False)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn())
     with Progress(*columns, console=messages, transient=True, disable=not messages.is_terminal) as progress:
-        task, last = progress.add_task(what, total=1.0), ""
+        task, last = progress.add_task(what, total=None), ""
 
-        def tell(share: float, doing: str = "") -> None:
+        def tell(share: float | None, doing: str = "computing") -> None:
             nonlocal last
-            progress.update(task, completed=share, description=f"{what}: {doing}" if doing else what)
+            progress.update(task, total=None if share is None else 1.0, completed=share or 0.0, description=f"{what}: {doing}")
             words = doing.split(",")[0]
             if not messages.is_terminal and words != last:
                 print(f"{what}: {words}", file=messages.file, flush=True)
                 last = words
 
-        tell(0.0, "computing")
+        tell(None)
         yield tell
-
-
-def _diagram(study: Study, ask: Ask, output: Path, tell: Tell, scheduler: str | None) -> tuple[Path, Any]:
-    from saltus import studies
-    from saltus.files import write_dataset
-
-    tree = study.answer(ask, getattr(studies, ask.kind), progress=tell)
-    tree.attrs["kind"] = ask.kind
-    return write_dataset(output / f"{ask.kind}.nc", tree), tree
-
-
-def _portrait(study: Study, ask: Ask, output: Path, tell: Tell, scheduler: str | None) -> tuple[Path, Any]:
-    from saltus.files import write_dataset
-    from saltus.studies import phase_portrait
-
-    data = study.answer(ask, phase_portrait)
-    return write_dataset(output / "phase_portrait.nc", data), data
-
-
-def _attractors(study: Study, ask: Ask, output: Path, tell: Tell, scheduler: str | None) -> tuple[Path, Any]:
-    from saltus.attractors.found import attractors
-    from saltus.files import write_dataset
-
-    data = study.answer(ask, attractors, progress=lambda share: tell(share, "computing")).to_xarray()
-    return write_dataset(output / "attractors.nc", data), data
-
-
-def _basins(study: Study, ask: Ask, output: Path, tell: Tell, scheduler: str | None) -> tuple[Path, Any]:
-    from saltus.attractors.basins import basins
-    from saltus.files import write_dataset
-
-    data = study.answer(ask, basins, progress=lambda share: tell(share, "computing"))
-    return write_dataset(output / "basins.nc", data), data
-
-
-def _chart(study: Study, ask: Ask, output: Path, tell: Tell, scheduler: str | None) -> tuple[Path, Any]:
-    from saltus.studies import stability_chart
-
-    def chunks(done: int, total: int, left: float | None) -> None:
-        tell(done / total, f"{done} of {total} chunks" + ("" if not left else f", {left:.0f} s left"))
-
-    store = output / "stability_chart.zarr"
-    return store, study.answer(ask, stability_chart, store=store, scheduler=scheduler, progress=chunks)
-
-
-ANSWERS: dict[str, Callable[..., tuple[Path, Any]]] = {
-    "phase_portrait": _portrait,
-    "response_spectrum": _diagram,
-    "bifurcation_diagram": _diagram,
-    "attractors": _attractors,
-    "basins": _basins,
-    "stability_chart": _chart,
-}
 
 
 def said(kind: str, data: Any) -> Iterator[str]:
@@ -130,11 +152,21 @@ def said(kind: str, data: Any) -> Iterator[str]:
     elif kind in ("attractors", "basins"):
         yield from _said_of_attractors(data)
     elif kind == "stability_chart":
-        moving = int((data["count"] > 0).sum())
-        largest = float(data["amplitude"].max())
-        yield f"Stable motions beside rest in {moving} of {data['count'].size} cells, up to {largest:.4g} rad."
+        yield from _said_of_chart(data)
     else:
-        yield f"{data.sizes['motion']} motions, {data.sizes['equilibrium']} saddles."
+        stable = int(data["stable"].sum())
+        unstable = data.sizes["equilibrium"] - stable
+        yield f"{data.sizes['motion']} motions, {stable} stable and {unstable} unstable equilibria, separatrices " + (
+            "computed" if data.attrs["separatrices"] == "computed" else str(data.attrs["separatrices"])
+        )
+
+
+def _said_of_chart(data: Any) -> Iterator[str]:
+    moving, wild = int((data["count"] > 0).sum()), int((data["unsettled"] > 0).sum())
+    text = f"Stable motions beside rest in {moving} of {data['count'].size} cells"
+    yield text + (f", the largest amplitude is {float(data['amplitude'].max()):.4g} rad." if moving else ".")
+    if wild:
+        yield f"In {wild} cells some motion does not settle."
 
 
 def _said_of_diagram(tree: Any) -> Iterator[str]:
@@ -157,9 +189,12 @@ def _said_of_diagram(tree: Any) -> Iterator[str]:
 
 
 def _said_of_attractors(data: Any) -> Iterator[str]:
-    share = "cells" if "cells" in data else "fraction"
+    share, of = ("cells", "cells") if "cells" in data else ("fraction", "starts")
     for i, label in enumerate(data["attractor"].values):
         periods = int(data["attractor_periods"][i])
-        kind = str(data["attractor_kind"].values[i]) + (f" {periods}" if periods else "")
+        kind = str(data["attractor_kind"].values[i]) + (f", period {periods}" if periods else "")
         part, size = 100 * float(data[share][i]), float(data["amplitude"][i])
-        yield f"{int(label)}: {kind}, amplitude {size:.4g}, {part:.1f} % of the states"
+        yield f"{int(label)}: {kind}, amplitude {size:.4g}, {part:.3g} % of the {of}"
+    left = float(data.attrs.get("undecided", 0.0))
+    if left:
+        yield f"undecided: {100 * left:.3g} % of the {of}"

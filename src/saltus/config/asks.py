@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, create_model
 
-from saltus.config.fields import Number, Switch, Table, Text, Whole, check_table, read_angle, read_number, show
+from saltus.config.fields import Number, Switch, Table, Text, Whole, check_table, read_angle, read_whole, show
 from saltus.config.source import Source
+from saltus.errors import near
 from saltus.systems import System
+
+SPACED = ("from", "to", "count")
+EXAMPLE = "{ from = 0, to = 0.5, count = 101 }"
+MOST = 100_000  # points along an axis
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,18 +27,45 @@ class Ask:
     options: dict[str, Any]
 
 
-def read_grid(value: Any) -> np.ndarray:
+def read_values(value: Any) -> np.ndarray:
     """Numbers (or angles) from a list, or from a table such as { from = 0, to = 0.5, count = 101 }."""
     if isinstance(value, list) and value:
         return np.array([read_angle(item) for item in value])
     if isinstance(value, dict):
-        if sorted(value) != ["count", "from", "to"]:
-            raise ValueError(f"needs from, to and count, and has {', '.join(map(str, value)) or 'none of them'}")
-        count = read_number(value["count"])
-        if count != int(count) or not 2 <= count <= 100_000:
-            raise ValueError(f"needs a whole count from 2 to 100000, got {show(value['count'])}")
-        return np.linspace(read_angle(value["from"]), read_angle(value["to"]), int(count))
-    raise ValueError(f"must be a list of numbers or a table such as {{ from = 0, to = 0.5, count = 101 }}, got {show(value)}")
+        return _spaced(value)
+    given = "an empty list" if value == [] else show(value)
+    raise ValueError(f"must be a list of numbers or a table such as {EXAMPLE}, got {given}")
+
+
+def read_grid(value: Any) -> np.ndarray:
+    """The same, for numbers that rise."""
+    values = read_values(value)
+    if (np.diff(values) <= 0).any():
+        raise ValueError("must be numbers that rise, each above the one before")
+    return values
+
+
+def _spaced(table: dict[str, Any]) -> np.ndarray:
+    """`count` numbers evenly spaced between the two ends in a table."""
+    unknown = [name for name in table if name not in SPACED]
+    if unknown:
+        raise ValueError(f"has the unknown key {unknown[0]!r}; {near(str(unknown[0]), SPACED)}")
+    missing = [name for name in SPACED if name not in table]
+    if missing:
+        raise ValueError(f"needs from, to and count, such as {EXAMPLE}, and has no {' and no '.join(missing)}")
+    low, high, count = _part(table, "from", read_angle), _part(table, "to", read_angle), _part(table, "count", read_whole)
+    if not 2 <= count <= MOST:
+        raise ValueError(f"needs a count from 2 to {MOST}, got {show(table['count'])}")
+    if low >= high:
+        raise ValueError(f"must go from the smaller number to the larger one, got from = {low:g}, to = {high:g}")
+    return np.linspace(low, high, count)
+
+
+def _part(table: dict[str, Any], name: str, read: Callable[[Any], Any]) -> Any:
+    try:
+        return read(table[name])
+    except ValueError as error:
+        raise ValueError(f"has a {name} that {error}") from None
 
 
 def read_pair(value: Any) -> tuple[float, float]:
@@ -56,6 +89,7 @@ def read_paths(value: Any) -> tuple[str, str]:
     return value[0], value[1]
 
 
+Values = Annotated[Any, BeforeValidator(read_values)]
 Grid = Annotated[Any, BeforeValidator(read_grid)]
 Pair = Annotated[Any, BeforeValidator(read_pair)]
 Pairs = Annotated[Any, BeforeValidator(read_pairs)]
@@ -65,7 +99,7 @@ DIAGRAM: dict[str, Any] = {
     "path": Text,
     "bounds": Pair,
     "max_period": Whole,
-    "values": Grid,
+    "values": Values,
     "starts": Whole,
     "region": Pair,
     "seed": Whole,
@@ -79,7 +113,7 @@ ASKS: dict[str, dict[str, Any]] = {
     "response_spectrum": DIAGRAM,
     "bifurcation_diagram": DIAGRAM,
     "attractors": {"region": Pair, "starts": Whole, "longest": Whole, "seed": Whole, "tol": Number},
-    "basins": {"velocity": Grid, "periods": Whole, "within": Number, "tol": Number},
+    "basins": {"velocity": Grid, "periods": Whole, "within": Number, "curves": Switch, "tol": Number, "rows": Whole},
     "stability_chart": {
         "horizontal": Grid,
         "vertical": Grid,

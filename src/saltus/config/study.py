@@ -69,11 +69,22 @@ class Study:
         try:
             return function(self.system, **ask.options, **more)
         except ParameterError as error:
-            named = re.findall(r"\w+", str(error))
-            key = next((name for name in named if name in ask.options), None)
+            key = _named(ask, str(error))
             self.source.refuse((ask.kind,) if key is None else (ask.kind, key), f"{ask.kind}: {error}")
         except (MotionError, TraceError, SweepError) as error:
             raise type(error)(f"{self.source.path}, {ask.kind}: {error}") from error
+
+
+def _named(ask: Ask, sentence: str) -> str | None:
+    """The key of a question that a refusal is about: the one that it begins with, or else whose text or name is in it."""
+    words = re.findall(r"\w+", sentence)
+    if words and words[0] in ask.options:
+        return words[0]
+    for key, value in ask.options.items():
+        texts = [value] if isinstance(value, str) else value if isinstance(value, tuple) else []
+        if any(isinstance(text, str) and text in sentence for text in texts):
+            return key
+    return next((word for word in words if word in ask.options), None)
 
 
 def load_study(path: Path | str) -> Study:

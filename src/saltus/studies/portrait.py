@@ -2,122 +2,181 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.separatrices import saddles, separatrices
+from saltus.attractors.equilibria import Equilibrium, equilibria
+from saltus.attractors.separatrices import Separatrix, separatrices
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.orbits.search import initial_states
+from saltus.orbits.find import check_whole
+from saltus.orbits.search import EVEN
 from saltus.systems import System, VelocityReduction
 from saltus.systems.checks import check_number
 
 if TYPE_CHECKING:
     import xarray
 
-WINDOW = ((-3.0, 3.0), (-3.0, 3.0))
+Bounds = tuple[tuple[float, float], tuple[float, float]]
+
+WINDOW: Bounds = ((-3.0, 3.0), (-3.0, 3.0))
 MOTIONS = 24  # from states spread evenly over the window, unless they are given
+BESIDE = (0.35, 0.75)  # and from beside each stable equilibrium, at these shares of the way to the next one
+TRIED = 100  # times as many places are tried where a wall takes a part of the window
 
 
 def phase_portrait(
     system: System,
     *,
-    window: tuple[tuple[float, float], tuple[float, float]] = WINDOW,
+    window: Bounds = WINDOW,
     starts: Iterable[tuple[float, float]] | None = None,
     duration: float = 30.0,
     samples: int = 1500,
     seed: int = 0,
+    progress: Callable[[float], object] | None = None,
 ) -> xarray.Dataset:
     """The phase plane of a system with one coordinate under a constant load (the paper's Figs. 4 and 5).
 
     Args:
         system: what moves.
         window: the least and the largest coordinate, then velocity.
-        starts: states (coordinate, velocity) from which motions are followed; by default 24 spread over the window.
+        starts: states (coordinate, velocity) from which motions are followed; by default two beside each stable equilibrium, and
+            24 spread over the window.
         duration: how long, in dimensionless time.
-        samples: instants at which each motion is given; the two sides of an impact apart, so that the velocity may jump.
+        samples: instants at which each motion is given, besides its impacts.
         seed: of the spread.
+        progress: called with the fraction done, first when all arguments have been checked.
 
     Returns:
-        A Dataset: `time`, the coordinate and `velocity` over (motion, sample), nan between the pieces that impacts part; the
-        `saddle`s; `separatrix_<coordinate>` and `separatrix_velocity` over (separatrix, point), where the impact law has an
-        inverse.
+        A Dataset: `time`, the coordinate and `velocity` over (motion, sample), with the velocities before and after each impact,
+        and nan between them where they differ; `equilibrium`, the coordinates of all equilibria in the window, with `stable`
+        and, over (equilibrium, root), the real and imaginary part of the `eigenvalue`s, nan at the contact;
+        `separatrix_<coordinate>` and `separatrix_velocity` over (separatrix, point): the stable manifolds of the saddles, none
+        where the impact law has no inverse (the attribute `separatrices` says why).
 
     Raises:
-        ParameterError: a load that varies, several coordinates, a window or starts without meaning.
+        ParameterError: a load that varies, several coordinates, numbers, a window or starts without meaning.
+        MotionError: a motion that cannot be continued.
     """
     check_number("duration", duration, above=0.0)
-    points = saddles(system, window)  # which refuses what has no phase plane
-    (left, right), (low, high) = window
-    if starts is None:
-        half = (0.5 * (right - left), 0.5 * (high - low))
-        states = initial_states(system, MOTIONS, half, seed)
-    else:
-        states = _states(starts)
-    name = system.model.coordinates[0]
-    rows = [_sampled(system, name, state, duration, samples) for state in states]
-    parting = separatrices(system, window) if _invertible(system) else ()
-    return _dataset(system, name, rows, [p.theta for p in points], parting, window)
+    check_whole("samples", samples, 2)
+    check_whole("seed", seed, 0)
+    points = equilibria(system, window)  # which refuses what has no phase plane
+    states = _spread(system, window, points, seed) if starts is None else _states(system, starts)
+    say = progress or (lambda _: None)
+    say(0.0)
+    rows = []
+    for i, state in enumerate(states):
+        rows.append(_sampled(system, state, duration, samples))
+        say(0.8 * (i + 1) / len(states))
+    why = _no_inverse(system)
+    parting = () if why else separatrices(system, window)
+    said: dict[str, Any] = {"window": [float(x) for pair in window for x in pair], "duration": float(duration)}
+    said |= {"starts": "spread" if starts is None else "given", "separatrices": why or "computed"}
+    say(1.0)
+    return _dataset(system, rows, points, parting, said)
 
 
-def _states(starts: Any) -> np.ndarray:
+def _spread(system: System, window: Bounds, points: tuple[Equilibrium, ...], seed: int) -> np.ndarray:
+    """States (n, 2) beside the stable equilibria, and spread evenly over the part of the window in which the system can be."""
+    middle, half = np.mean(window, axis=1), 0.5 * np.diff(window, axis=1)[:, 0]
+    shifts = np.arange(1, TRIED * MOTIONS + 1)[:, None] * EVEN
+    shares = 2.0 * ((np.random.default_rng(seed).random(2) + shifts) % 1.0) - 1.0
+    states = middle + half * shares
+    states = states[_possible(system, states[:, 0])][:MOTIONS]
+    if not len(states):
+        raise ParameterError(f"window must reach to where the system can be, got {window!r}: all of it is beyond the contact")
+    ends = [*(point.place for point in points), *window[0]]
+    near = [(_beside(point.place, ends, share), 0.0) for point in points if point.stable for share in BESIDE]
+    return np.concatenate([np.array(near).reshape(-1, 2), states])
+
+
+def _beside(place: float, ends: list[float], share: float) -> float:
+    """A coordinate at a share of the way from an equilibrium to the nearest other one, or the end of the window."""
+    nearest = min((end for end in ends if end != place), key=lambda end: abs(end - place))
+    return place + share * (nearest - place)
+
+
+def _possible(system: System, places: np.ndarray) -> np.ndarray:
+    """Which coordinates are within the mode of some side."""
+    model = system.model
+    sides = [np.asarray(model.gap(places, side)) > 0.0 for side in model.sides]
+    return np.any(sides, axis=0) if sides else np.ones(len(places), dtype=bool)
+
+
+def _states(system: System, starts: Any) -> np.ndarray:
+    """Given states (n, 2)."""
     try:
         states = np.array([[float(x) for x in state] for state in starts])
     except (TypeError, ValueError):
         states = np.empty(0)
     if states.ndim != 2 or states.shape[1] != 2 or not len(states) or not np.isfinite(states).all():
         raise ParameterError(f"starts must be states (coordinate, velocity), such as [[0.3, 0.0]], got {starts!r:.80}")
+    beyond = states[~(_possible(system, states[:, 0]) | (states[:, 0] == float(system.model.contact)))]
+    if len(beyond):
+        raise ParameterError(f"starts must lie where the system can be, and {beyond[0].tolist()} is beyond the contact")
     return states
 
 
-def _invertible(system: System) -> bool:
-    """Whether a motion can be followed back through impacts."""
-    return not system.model.sides or (isinstance(system.impact, VelocityReduction) and system.impact.e > 0.0)
+def _no_inverse(system: System) -> str:
+    """Why motions cannot be followed back through impacts, or nothing."""
+    if not system.model.sides or (isinstance(system.impact, VelocityReduction) and system.impact.e > 0.0):
+        return ""
+    return f"none: {type(system.impact).__name__} cannot be followed backward"
 
 
-def _sampled(system: System, name: str, state: np.ndarray, duration: float, samples: int) -> np.ndarray:
-    """(3, n): times, coordinate and velocity; nan at each impact."""
-    begin: dict[str, Any] = {name: float(state[0])}
+def _sampled(system: System, state: np.ndarray, duration: float, samples: int) -> np.ndarray:
+    """(3, n): times, coordinate and velocity of a motion, with both sides of its impacts."""
+    begin: dict[str, Any] = {system.model.coordinates[0]: float(state[0])}
     motion = simulate(system, **begin, velocity=float(state[1]), duration=duration)
     times = np.linspace(0.0, motion.time, samples)
-    position, velocity = (np.asarray(x, dtype=float) for x in motion.at(times))
-    row = np.stack([times, position.reshape(samples, -1)[:, 0], velocity.reshape(samples, -1)[:, 0]])
-    impacts = np.searchsorted(times, motion.crossings.time)
-    jumps = np.abs(motion.crossings.velocity_after - motion.crossings.velocity_before) > 0.0
-    return np.asarray(np.insert(row, np.unique(impacts[jumps]), np.nan, axis=1))
+    position, velocity = (np.asarray(x, dtype=float).reshape(samples, -1)[:, 0] for x in motion.at(times))
+    impacts = motion.crossings
+    before, after = impacts.velocity_before, impacts.velocity_after
+    at, gap = np.full(len(impacts), float(system.model.contact)), np.full(len(impacts), np.nan)
+    parts = [(times, position, velocity), (impacts.time, at, before)]
+    parts += [(impacts.time, gap, gap), (impacts.time, at, after)] if (before != after).any() else []
+    row = np.concatenate([np.stack(part) for part in parts], axis=1)
+    return np.asarray(row[:, np.argsort(row[0], kind="stable")])
 
 
-def _dataset(system: System, name: str, rows: Any, points: list[float], parting: Any, window: Any) -> xarray.Dataset:
+def _dataset(
+    system: System,
+    rows: list[np.ndarray],
+    points: tuple[Equilibrium, ...],
+    parting: tuple[Separatrix, ...],
+    said: dict[str, Any],
+) -> xarray.Dataset:
     import xarray
 
     from saltus import __version__
 
-    unit = "rad" if name.startswith("theta") else "1"
-    motions = _padded(rows)
+    name = system.model.coordinates[0]
+    unit, motions = "rad" if name.startswith("theta") else "1", _padded(rows)
     curves = _padded([np.stack([s.theta, s.velocity]) for s in parting]) if parting else np.empty((0, 2, 0))
+    roots = np.array([p.eigenvalues or (complex(np.nan, np.nan),) * 2 for p in points], dtype=complex).reshape(-1, 2)
+
+    def column(dims: tuple[str, ...], values: Any, units: str, text: str) -> Any:
+        return dims, values, {"units": units, "long_name": text}
+
+    over, curve, each = ("motion", "sample"), ("separatrix", "point"), ("equilibrium", "root")
     columns = {
-        "time": (("motion", "sample"), motions[:, 0], {"units": "1", "long_name": "dimensionless time"}),
-        name: (("motion", "sample"), motions[:, 1], {"units": unit, "long_name": name}),
-        "velocity": (("motion", "sample"), motions[:, 2], {"units": "1", "long_name": f"d {name} / d tau"}),
-        "saddle": ("equilibrium", np.array(points), {"units": unit, "long_name": "saddle equilibria"}),
-        f"separatrix_{name}": (
-            ("separatrix", "point"),
-            curves[:, 0],
-            {"units": unit, "long_name": "stable manifolds of the saddles"},
-        ),
-        "separatrix_velocity": (("separatrix", "point"), curves[:, 1], {"units": "1", "long_name": "velocity on them"}),
+        "time": column(over, motions[:, 0], "1", "dimensionless time"),
+        name: column(over, motions[:, 1], unit, name),
+        "velocity": column(over, motions[:, 2], "1", f"d {name} / d tau"),
+        "stable": column(("equilibrium",), np.array([p.stable for p in points], dtype=bool), "1", "no disturbance grows"),
+        "eigenvalue_real": column(each, roots.real, "1", "real part of the eigenvalues, nan at the contact"),
+        "eigenvalue_imaginary": column(each, roots.imag, "1", "their imaginary part"),
+        f"separatrix_{name}": column(curve, curves[:, 0], unit, "stable manifolds of the saddles"),
+        "separatrix_velocity": column(curve, curves[:, 1], "1", "velocity on them"),
     }
-    attributes = {
-        "title": "phase portrait computed by saltus",
-        "kind": "phase_portrait",
-        "system": system.to_json(),
-        "saltus_version": __version__,
-        "coordinate": name,
-        "window": [float(x) for pair in window for x in pair],
-    }
-    return xarray.Dataset(columns, attrs=attributes)
+    places = column(("equilibrium",), np.array([p.place for p in points], dtype=float), unit, f"{name} of the equilibria")
+    attributes: dict[str, Any] = {"title": "phase portrait computed by saltus", "kind": "phase_portrait", "coordinate": name}
+    attributes |= {"system": system.to_json(), "saltus_version": __version__}
+    attributes |= {"contact": float(system.model.contact)} if system.model.sides else {}
+    return xarray.Dataset(columns, {"equilibrium": places}, attributes | said)
 
 
 def _padded(rows: list[np.ndarray]) -> np.ndarray:
