@@ -13,7 +13,7 @@ from saltus.paper.statements_charts import over_frequency
 PANELS: dict[str, dict[str, Any]] = {
     name: {"beta0": 80.0, "damping": 0.1, "frequency": frequency, "widest": widest, "curves": curves}
     for name, frequency, widest, curves in (
-        *(("a", 0.1, charts.WIDEST, 2), ("b", 0.5, charts.WIDEST, 4)),  # slow loads: chaos, and orbits of many impacts
+        *(("a", 0.1, charts.WIDEST, 2), ("b", 0.5, charts.WIDEST, 8)),  # slow loads: chaos, and orbits of many impacts
         *(("c", 0.75, charts.WIDEST, 12), ("d", 1.0, charts.WIDEST, 20), ("e", 1.5, charts.WIDEST, 16)),
         ("f", 4.0, 0.2, 20),  # all borders are at small Hhat
     )

@@ -114,7 +114,7 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
         A Dataset with the changes along `change` that no curve explains: `horizontal` and `vertical` halfway between the cells,
         `amplitude` and `period` of the motion that ends, `cells` of its family, and whether the neighbour has rest alone,
         `beside_rest`; and along `unseen` the places on the curves of folds beside which no cell has the motions that end
-        there. The attribute `changes` counts all that there are.
+        there. The attributes `changes` and `changes_beside_rest` count all that there are.
     """
     import xarray as xr
 
@@ -133,7 +133,8 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     for i, (name, axis) in enumerate((("vertical", cells.vertical), ("horizontal", cells.horizontal))):
         data[name] = ("change", np.interp(middle[:, i], np.arange(len(axis)), axis))
         data[f"unseen_{name}"] = ("unseen", np.interp(lonely[:, i], np.arange(len(axis)), axis))
-    return xr.Dataset(data, attrs={"changes": len(ends)})
+    beside = int(cells.empty[tuple(ends.target.T)].sum())
+    return xr.Dataset(data, attrs={"changes": len(ends), "changes_beside_rest": beside})
 
 
 def _curve(
