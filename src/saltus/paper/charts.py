@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.paper import spectra
+from saltus.paper.panels import each
 from saltus.paper.provenance import dataset
 from saltus.plots.chart import draw_borders, draw_chart, draw_closed_form, draw_static, legend
 from saltus.plots.style import DOUBLE_COLUMN, new_figure, panel_label, styled
@@ -30,8 +31,14 @@ def system(beta0: float = 80.0, damping: float = 0.1, frequency: float = 1.0) ->
 
 def compute(panels: Mapping[str, Mapping[str, Any]], size: int, curves: int = CURVES, **options: Any) -> Any:
     """A chart of `size` x `size` cells for each panel; options are those of `stability_chart`."""
-    made = {name: panel(**({"curves": curves} | dict(values)), size=size, **options) for name, values in panels.items()}
+    made = each(
+        _panel, {name: {"curves": curves} | dict(values) for name, values in panels.items()}, "first", size=size, **options
+    )
     return spectra.together(made, what="stability charts under load (i)")
+
+
+def _panel(values: Mapping[str, Any], **options: Any) -> Any:
+    return panel(**values, **options)
 
 
 def panel(

@@ -11,17 +11,18 @@ from typing import Any
 from saltus.flow.lanes.run import available_cores
 
 
-def each(make: Callable[..., Any], values: Mapping[str, float], **options: Any) -> dict[str, Any]:
+def each(make: Callable[..., Any], values: Mapping[str, Any], longest: str = "last", **options: Any) -> dict[str, Any]:
     """`make(value, **options)` for every value, by the value's name.
 
-    The last are begun first: amplitudes rise along a figure, and with them the number of branches. Branches are followed by one
-    core, so panels beside one another use what each of them alone would leave idle.
+    Those that take `longest` are begun first: the "first" or the "last" of the figure. Branches are followed by one core, so
+    panels beside one another use what each of them alone would leave idle.
     """
     cores = min(available_cores(), len(values))
     if cores < 2:
         return {name: make(value, **options) for name, value in values.items()}
     with ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("spawn")) as pool:
-        made = {name: pool.submit(partial(make, value, **options)) for name, value in reversed(list(values.items()))}
+        order = list(values.items()) if longest == "first" else list(values.items())[::-1]
+        made = {name: pool.submit(partial(make, value, **options)) for name, value in order}
         try:
             return {name: made[name].result() for name in values}
         except BaseException:  # interrupted, or a panel failed: what has not begun is of no use any more

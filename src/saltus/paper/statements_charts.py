@@ -82,7 +82,7 @@ def _largest_amplitude(panels: dict[float, Any]) -> Claim:
 
 
 def _second_motion(panels: dict[float, Any]) -> Claim:
-    """As printed: in a narrow region. Erratum 31: in a strip of six impacts below Hcr, and wide ones of longer periods."""
+    """As printed: in a narrow region. Erratum 33: in a strip of six impacts below Hcr, and wide ones of longer periods."""
     fast = max(panels)
     here = cells(panels[fast])
     domain = here["static"]
@@ -98,7 +98,7 @@ def _second_motion(panels: dict[float, Any]) -> Claim:
         "At Ω = 4 a second motion beside rest appears in a narrow region of the loads",
         printed=bool(several.any()) and share < NARROW,
         corrected=bool(several.any()) and share >= NARROW and six > 0.0,
-        erratum=31,
+        erratum=33,
         evidence=f"at Ω = {fast:g} {share:.1%} of the quasi-static monostable domain has several motions: with six impacts "
         f"a period {six:.1%}, of three periods {three:.1%}; the latter, "
         f"from Ĥ = {first:.3f} on, goes on far beyond the domain",

@@ -11,7 +11,7 @@ from saltus.orbits import Branch, PeriodicOrbit, SpecialPoint, continue_orbit, s
 
 FOLLOWED = 20.0  # times the range's upper end: how far families of a longer period are followed along a frequency,
 BEYOND = 1.3  # and along anything else, where few of them close
-MOST_BRANCHES = 40  # beyond which nothing more is followed that is born on another branch
+MOST_BRANCHES = 30  # beyond which nothing more is followed that is born on another branch
 NARROW = 0.02  # of the range: on a narrower branch nothing is followed that is born there
 SAME_PLACE = 1e-6  # between a branch's end and the special point of another one that it is
 BRANCHING = ("PD", "BPC")

@@ -95,7 +95,7 @@ def diagram(
         brackets of their edges and the special points there, `exponents` and `strobes` (the stroboscopic points of what was
         simulated to find them: the brute-force diagram). The attribute `left` counts the special points at which a family is born
         that was not followed: within the bounds the branch covers less than a fiftieth of the range, or the orbits have less than
-        a hundredth of its largest amplitude, or there were 40 branches already. An orbit that its multipliers call stable, but
+        a hundredth of its largest amplitude, or there were 30 branches already. An orbit that its multipliers call stable, but
         that does not stay where it is for 20 periods, is not called so; `unconfirmed` counts these on each branch.
 
     Raises:
@@ -138,6 +138,9 @@ def _checked(system: System, path: str, bounds: tuple[float, float], **efforts: 
         raise ParameterError(f"a diagram takes a System(model=..., load=..., impact=...), got {system!r}")
     if system.load.frequency is None:
         raise ParameterError("a load without a frequency has no periodic orbits to draw; give the Load a frequency")
+    if len(system.model.coordinates) > 1:
+        names = ", ".join(system.model.coordinates)
+        raise ParameterError(f"diagrams are for models with one coordinate, and this one has {names}; see continue_orbit")
     low, high = check_bounds(bounds)
     if path not in system.parameters:
         system.get(path)  # refuses what leads nowhere
