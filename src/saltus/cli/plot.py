@@ -53,7 +53,7 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     draw = getattr(import_module(f"saltus.plots.{module}"), name)
     try:
         figure = draw(data)
-    except (KeyError, AttributeError, StopIteration) as error:
+    except (LookupError, AttributeError, StopIteration) as error:
         raise ParameterError(f"{path} says that it is of the kind {kind!r}, but lacks {error}; compute it again") from error
     with style():
         return write_figure(stem, figure)

@@ -174,10 +174,8 @@ def _said_of_diagram(tree: Any) -> Iterator[str]:
     for name in sorted(tree.children):
         if name.startswith("branch_"):
             branch = tree[name]
-            kinds = [
-                f"{kind} {value:.6g}"
-                for kind, value in zip(branch["kind"].values, branch["special_parameter"].values, strict=True)
-            ]
+            special = [branch[key].values for key in ("kind", "special_parameter") if key in branch]  # a branch may have none
+            kinds = [f"{kind} {value:.6g}" for kind, value in zip(*special, strict=True)]
             more = f" and {len(kinds) - 8} more" if len(kinds) > 8 else ""
             x = branch["parameter"].values
             yield (

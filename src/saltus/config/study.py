@@ -70,7 +70,9 @@ class Study:
             return function(self.system, **ask.options, **more)
         except ParameterError as error:
             key = _named(ask, str(error))
-            self.source.refuse((ask.kind,) if key is None else (ask.kind, key), f"{ask.kind}: {error}")
+            place = (ask.kind,) if key is None else (ask.kind, key)
+            said = f".{error}" if str(error).startswith(f"{key} ") else f": {error}"
+            self.source.refuse(place, (ask.kind if said[0] == "." else ".".join(place)) + said)
         except (MotionError, TraceError, SweepError) as error:
             raise type(error)(f"{self.source.path}, {ask.kind}: {error}") from error
 

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import Normal, Stroke
 
-from saltus.plots.basins import AT_REST, MARK, MARKERS
+from saltus.plots.basins import AT_REST, MARK, MARKERS, MOST_NAMED, POINT
 from saltus.plots.diagram import axis_name
 from saltus.plots.style import INK, SINGLE_COLUMN, new_figure, shades, styled
 
@@ -20,6 +22,7 @@ START: dict[str, Any] = {
     "zorder": 3,
 }
 UNDECIDED = "white"
+HALO = [Stroke(linewidth=2.2, foreground="white"), Normal()]  # so that an attractor stands out among the starts
 
 
 @styled
@@ -38,15 +41,36 @@ def draw_attractors(dataset: Any, width: float = 1.3 * SINGLE_COLUMN) -> Figure:
         ax.plot(dataset[f"start_{name}"].values[here], dataset["start_velocity"].values[here], color=colour, **START)
     for i, n in enumerate(numbers):
         points = (dataset[f"strobe_{name}"].values[i], dataset["strobe_velocity"].values[i])
-        ax.plot(*points, marker=MARKERS[i % len(MARKERS)], label=_words(dataset, i, n), **{**MARK, "markerfacecolor": colours[n]})
-    ax.set_xlabel(rf"${symbol}$ at phase 0{unit}")
-    ax.set_ylabel(rf"${symbol}'$ at phase 0")
-    figure.legend(loc="outside lower center", ncols=2, columnspacing=1.2, handletextpad=0.4)
+        shape = MARKERS[i % len(MARKERS)]
+        mark = POINT if str(dataset["attractor_kind"].values[i]) not in ("rest", "periodic") else MARK | {"marker": shape}
+        ax.plot(*points, path_effects=HALO, **{**mark, "markerfacecolor": colours[n]})
+    when = "" if _steady(dataset) else " at phase 0"
+    ax.set_xlabel(rf"${symbol}${when}{unit}")
+    ax.set_ylabel(rf"$\dot{{{symbol}}}${when}")
+    _legend(figure, dataset, numbers, colours, bool((ends == -1).any()))
     return figure
+
+
+def _steady(dataset: Any) -> bool:
+    """Whether the load is constant: there are no phases then."""
+    return bool(dataset.attrs.get("load") == "constant")
+
+
+def _legend(figure: Figure, dataset: Any, numbers: list[int], colours: dict[int, Any], undecided: bool) -> None:
+    """What each colour and mark stands for, and its share of the starts."""
+    handles = [_handle(MARKERS[i % len(MARKERS)], colours[n], _words(dataset, i, n)) for i, n in enumerate(numbers[:MOST_NAMED])]
+    if undecided:
+        handles.append(_handle("o", UNDECIDED, f"undecided, {100 * float(dataset.attrs['undecided']):.3g} %"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.2, handletextpad=0.4)
+
+
+def _handle(marker: str, colour: Any, text: str) -> Line2D:
+    return Line2D([], [], linestyle="none", marker=marker, markersize=6, markerfacecolor=colour, markeredgecolor=INK, label=text)
 
 
 def _words(dataset: Any, i: int, label: int) -> str:
     kind, periods = str(dataset["attractor_kind"].values[i]), int(dataset["attractor_periods"].values[i])
     share, error = (100 * float(dataset[v].values[i]) for v in ("fraction", "fraction_error"))
-    name = f"{label}: {kind}" + (f", period {periods}" if periods else "")
-    return name if np.isnan(share) else f"{name}, {share:.1f} ± {error:.1f} %"
+    what = kind if kind != "periodic" else "equilibrium" if _steady(dataset) else f"period {periods}"
+    text = f"{label}: {what}"
+    return text if np.isnan(share) else f"{text}, {share:.3g} %" if error == 0.0 else f"{text}, {share:.1f} ± {error:.1f} %"

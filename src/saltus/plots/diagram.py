@@ -2,45 +2,65 @@
 
 from __future__ import annotations
 
+import json
+import math
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from saltus.plots.response import draw_bands, draw_response, highest, legend
+from saltus.plots.response import branches, draw_bands, draw_limits, draw_response, legend
 from saltus.plots.style import DOUBLE_COLUMN, INK, new_figure, styled
 
 NAMES = {"load.frequency": r"frequency $\Omega$", "load.horizontal.amplitude": r"load amplitude $\widehat{\mathcal{H}}$"}
-POINTS: dict[str, Any] = {
-    "color": INK,
-    "linestyle": "none",
-    "marker": ".",
-    "markersize": 1.3,
-    "markeredgewidth": 0.0,
-    "rasterized": True,
-}
+POINTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
+FINEST, COARSEST = 1.3, 3.5  # sizes of these points: as large as the step between values lets them be
 AT_REST = 1e-9  # of the largest: a motion that is smaller in every period is left out
 
 
 @styled
 def draw_diagram(tree: Any) -> Figure:
     """A Figure from the DataTree of `response_spectrum` or `bifurcation_diagram`."""
-    low, high = tree.attrs["bounds"]
+    low, high = (float(x) for x in tree.attrs["bounds"])
     symbol, unit = axis_name(tree.attrs["coordinate"])
     brute = "strobes" in tree.children
     figure = new_figure(DOUBLE_COLUMN, 150.0 if brute else 95.0)
     axes = figure.subplots(1 + brute, 1, sharex=True, squeeze=False, height_ratios=[3, 2][: 1 + brute])[:, 0]
     axes[0].set_xlim(low, high)
-    top = highest(tree, low, high) if any(name.startswith("branch_") for name in tree.children) else 1.0
-    axes[0].set_ylim(0.0, 1.08 * top)
+    top = _top(tree, low, high)
+    axes[0].set_ylim(-0.02 * top, 1.08 * top)  # so that marks on the axis are seen whole
     axes[0].set_ylabel(rf"$\max_\tau|{symbol}|${unit}")
+    limits = _limits(tree)
     draw_response(axes[0], tree)
+    draw_limits(axes[0], *limits)
     if brute:
         draw_strobes(axes[1], tree)
         axes[1].set_ylabel(rf"${symbol}$ at phase 0{unit}")
+        axes[1].set_title("stroboscopic points of direct simulation", loc="left", pad=3)
     axes[-1].set_xlabel(NAMES.get(tree.attrs["path"], tree.attrs["path"]))
-    legend(figure, [tree], limits=False)
+    legend(figure, [tree], limits=limits[0] < 1.08 * top)
     return figure
+
+
+def _top(tree: Any, low: float, high: float) -> float:
+    """The largest amplitude within the bounds, or 1 where there is none."""
+    inside = [branch["amplitude"].values[_within(branch["parameter"].values, low, high)] for branch in branches(tree)]
+    found = [float(values.max()) for values in inside if values.size]
+    dots = tree["attractors"]["amplitude"].values
+    return max([*found, *dots[np.isfinite(dots)], 0.0]) or 1.0
+
+
+def _within(x: np.ndarray, low: float, high: float) -> np.ndarray:
+    return np.asarray((x >= low) & (x <= high))
+
+
+def _limits(tree: Any) -> tuple[float, float]:
+    """The straight line and the kinematic limit of a metainterface; infinite where there are none, or where they vary."""
+    model = json.loads(tree.attrs["system"])["model"]
+    if model.get("type") != "Metainterface" or tree.attrs["path"] == "model.beta0":
+        return math.inf, math.inf
+    straight = math.pi - float(model["beta0"])
+    return straight, 2.0 * straight
 
 
 def draw_strobes(ax: Any, tree: Any) -> None:
@@ -50,7 +70,11 @@ def draw_strobes(ax: Any, tree: Any) -> None:
     places = strobes["position"].values
     moving = np.nanmax(strobes["peak"].values, axis=2, initial=0.0) > AT_REST
     values = np.broadcast_to(strobes["value"].values[:, None, None], places.shape)
-    ax.plot(values[moving].ravel(), places[moving].ravel(), **POINTS)
+    low, high = ax.get_xlim()
+    width = ax.get_window_extent().width / ax.figure.dpi * 72.0  # points
+    size = np.clip(0.5 * width / max(len(strobes["value"]), 1), FINEST, COARSEST)
+    ax.plot(values[moving].ravel(), places[moving].ravel(), markersize=size, **POINTS)
+    ax.set_xlim(low, high)
 
 
 def axis_name(coordinate: str) -> tuple[str, str]:

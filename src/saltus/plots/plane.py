@@ -61,7 +61,7 @@ def _lines(places: np.ndarray, velocities: np.ndarray, window: np.ndarray, apart
             inside = ((scaled >= 0.0) & (scaled < 1.0)).all(axis=1)
             travelled = _travelled(scaled)
             end = min(_first_near(scaled, inside, taken), _own_lap(scaled, inside, travelled))
-            if travelled[end - 1] < LEAST:
+            if end == 0 or travelled[end - 1] < LEAST:
                 continue
             here = (scaled[:end][inside[:end]] * CELLS).astype(int)
             taken[here[:, 0], here[:, 1]] = True

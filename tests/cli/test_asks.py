@@ -1,0 +1,108 @@
+"""The questions of a study file: every key is an argument of its function, and every argument a file can give is a key."""
+
+import inspect
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from saltus.attractors import attractors, basins
+from saltus.config import load_study
+from saltus.config.asks import ASKS, read_grid, read_pairs, read_values
+from saltus.errors import ParameterError
+from saltus.studies import basin_sweep, phase_portrait, stability_chart
+from saltus.studies.spectrum import diagram
+
+FUNCTIONS = {
+    "phase_portrait": phase_portrait,
+    "response_spectrum": diagram,
+    "bifurcation_diagram": diagram,
+    "attractors": attractors,
+    "basins": basins,
+    "stability_chart": stability_chart,
+}
+NOT_IN_FILES = {
+    "system",
+    "progress",
+    "store",
+    "workers",
+    "scheduler",
+    "compute",
+    "options",
+    "coordinates",
+    "found",
+    "known",
+    "also",
+}
+
+
+@pytest.mark.parametrize("kind", ASKS)
+def test_the_keys_of_a_question_are_the_arguments_of_its_function(kind):
+    arguments = set(inspect.signature(FUNCTIONS[kind]).parameters) - NOT_IN_FILES
+    if kind == "basins":
+        arguments |= set(inspect.signature(basin_sweep).parameters) - NOT_IN_FILES
+    assert set(ASKS[kind]) == arguments
+
+
+def test_a_grid_is_evenly_spaced_or_a_list():
+    np.testing.assert_array_equal(read_grid({"from": 0, "to": 0.5, "count": 101}), np.linspace(0, 0.5, 101))
+    np.testing.assert_allclose(read_grid(["-10 deg", 0, "10 deg"]), np.deg2rad([-10, 0, 10]))
+    np.testing.assert_array_equal(read_values([3, 1, 2]), [3, 1, 2])
+    assert read_pairs([[1, "90 deg"]]) == [(1.0, np.pi / 2)]
+
+
+@pytest.mark.parametrize(
+    ("value", "problem"),
+    [
+        ({}, "has no from and no to and no count"),
+        ({"from": 0, "to": 1}, "has no count"),
+        ({"from": 0, "to": 1, "count": 2.5}, "has a count that must be a whole number, got 2.5"),
+        ({"from": 0, "to": 1, "count": 1}, "needs a count from 2 to 100000, got 1"),
+        ({"from": 0, "to": 1, "count": 10**9}, "needs a count from 2 to 100000"),
+        ({"from": 0, "to": float("inf"), "count": 3}, "has a to that must be a finite number"),
+        ({"from": "a", "to": 1, "count": 3}, "has a from that must be an angle"),
+        ({"from": 1, "to": 1, "count": 3}, "must go from the smaller number to the larger one, got from = 1, to = 1"),
+        ({"from": 0, "to": 1, "step": 0.1}, "has the unknown key 'step'"),
+        ([1, 1], "must be numbers that rise"),
+        ([], "got an empty list"),
+        (1.0, "must be a list of numbers or a table such as"),
+        ([[1]], "must be a number, got a list"),
+        (None, "must be a list of numbers"),
+    ],
+)
+def test_what_is_no_grid_is_told(value, problem):
+    with pytest.raises(ValueError, match=r"^(has|needs|must)") as told:
+        read_grid(value)
+    assert problem in str(told.value)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("asks")
+
+
+JUNK = st.one_of(
+    st.integers(),
+    st.floats(),
+    st.text(max_size=4),
+    st.booleans(),
+    st.lists(st.floats(), max_size=3),
+    st.just({"from": 0, "to": 1}),
+)
+
+
+@settings(deadline=None, max_examples=150)
+@given(kind=st.sampled_from(sorted(ASKS)), data=st.data())
+def test_junk_in_a_question_is_read_or_refused_in_one_sentence(folder, kind, data):
+    import tomli_w
+
+    key = data.draw(st.sampled_from([*sorted(ASKS[kind]), "theta", "other"]))
+    tables = {"model": {"type": "Metainterface", "beta0": 1.4}, kind: {key: data.draw(JUNK)}}
+    path = folder / "study.toml"
+    path.write_bytes(tomli_w.dumps(tables).encode("utf-8", "surrogatepass"))
+    try:
+        told = key in load_study(path).asks[0].options
+    except ParameterError as error:
+        told = str(error).startswith(str(path)) and len(str(error).splitlines()) == 1
+    assert told

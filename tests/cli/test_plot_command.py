@@ -1,0 +1,93 @@
+"""`saltus plot`: a picture of every kind of result again, and what is no result."""
+
+import numpy as np
+import pytest
+import xarray
+
+from saltus.sweep import Plan, Variable, files, run
+
+MODEL = '[model]\ntype = "Metainterface"\nbeta0 = "80 deg"\ndamping = 0.1\n'
+FORCED = MODEL + "[load]\nfrequency = 1.0\nhorizontal = { amplitude = 0.5 }\nvertical = -0.5\n"
+ASKS = {
+    "motion": "[simulate]\ntheta = 0.3\nperiods = 3\n",
+    "phase_portrait": "[phase_portrait]\nstarts = [[0.3, 0.0]]\nduration = 2\n",
+    "bifurcation_diagram": "[bifurcation_diagram]\nbounds = [0.4, 0.5]\nmax_period = 1\nvalues = [0.45]\nstarts = 4\nbands = 0\n",
+    "attractors": "[attractors]\nstarts = 8\n",
+    "basins": "[basins]\ntheta = [-1, 0, 1]\nvelocity = [0, 1]\n",
+    "stability_chart": "[stability_chart]\nhorizontal = [0.1, 0.3]\nvertical = [-1, -0.5]\n",
+}
+
+
+@pytest.mark.parametrize("kind", ASKS)
+def test_every_kind_of_result_is_drawn_again_as_it_was(kind, saltus, tmp_path):
+    system = FORCED if kind != "phase_portrait" else MODEL + "[load]\nvertical = -0.5\n"
+    (tmp_path / "study.toml").write_text(system + ASKS[kind])
+    assert saltus("run", tmp_path / "study.toml", "-o", tmp_path / "out").exit_code == 0
+    store = tmp_path / "out" / f"{kind}.{'zarr' if kind == 'stability_chart' else 'nc'}"
+    result = saltus("plot", store, "-o", tmp_path / "again")
+    assert result.stdout == f"The picture is in {tmp_path / 'again'}: {kind}.png, {kind}.pdf\n"
+    first, second = (tmp_path / folder / f"{kind}.png" for folder in ("out", "again"))
+    assert first.read_bytes() == second.read_bytes()
+
+
+def netcdf(path, attrs=None, **variables):
+    xarray.Dataset(variables, attrs=attrs).to_netcdf(path, engine="h5netcdf")
+
+
+def test_what_is_no_result_is_told(refused, tmp_path):
+    (tmp_path / "text.nc").write_text("no netCDF")
+    (tmp_path / "empty.nc").touch()
+    (tmp_path / "folder").mkdir()
+    netcdf(tmp_path / "foreign.nc", rain=("day", [1.0, 2.0]))
+    netcdf(tmp_path / "other.nc", {"kind": "rain fall"}, rain=("day", [1.0, 2.0]))
+    (tmp_path / "cut.nc").write_bytes((tmp_path / "foreign.nc").read_bytes()[:700])
+    for name, problem in (
+        ("nothing.nc", "there is no file or folder"),
+        ("text.nc", "is no netCDF file that can be read"),
+        ("empty.nc", "is no netCDF file that can be read"),
+        ("cut.nc", "is no netCDF file that can be read"),
+        ("folder", "is not a store: it has no zarr.json"),
+        ("foreign.nc", "it does not say of what kind it is; it draws motion, phase_portrait"),
+        ("other.nc", "its kind is 'rain_fall'"),
+    ):
+        assert problem in refused("plot", tmp_path / name)
+
+
+@pytest.mark.parametrize("kind", ASKS)
+def test_a_result_that_lacks_what_its_kind_has_is_told(kind, refused, tmp_path):
+    netcdf(tmp_path / "broken.nc", {"kind": kind}, x=("day", [1.0]))
+    assert f"of the kind '{kind}', but lacks" in refused("plot", tmp_path / "broken.nc")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["broken.nc"]
+
+
+def test_a_picture_is_beside_its_data_unless_another_folder_is_named(saltus, tmp_path, monkeypatch):
+    (tmp_path / "study.toml").write_text(FORCED + ASKS["motion"])
+    saltus("run", tmp_path / "study.toml", "-o", tmp_path, "--no-plot")
+    monkeypatch.chdir(tmp_path)
+    assert saltus("plot", "motion.nc").stdout == "The picture is in .: motion.png, motion.pdf\n"
+
+
+def test_a_folder_that_cannot_be_written_to_is_told(refused, tmp_path):
+    netcdf(tmp_path / "a.nc", {"kind": "motion"}, x=("day", [1.0]))
+    assert "a.nc is a file; name another with --output" in refused("plot", tmp_path / "a.nc", "-o", tmp_path / "a.nc")
+
+
+def squares(arguments, block):
+    return {"c": block["a"] ** 2}
+
+
+def plan(kind):
+    variables = {"c": Variable()}
+    return Plan(
+        function=f"{__name__}:squares", axes={"a": np.arange(4.0)}, chunk={"a": 2}, variables=variables, attrs={"kind": kind}
+    )
+
+
+def test_sweeps_that_have_no_picture_are_told(refused, tmp_path):
+    run(plan("stability_chart"), tmp_path / "half.zarr")
+    files.chunk_file(tmp_path / "half.zarr", "c", (1,), 0).unlink()
+    assert "half.zarr has 1 of 2 chunks; run the study again to go on, then plot it" in refused("plot", tmp_path / "half.zarr")
+    run(plan("basin_cells"), tmp_path / "basins.zarr")
+    assert "plot basins.nc beside it" in refused("plot", tmp_path / "basins.zarr")
+    run(plan("squares"), tmp_path / "mine.zarr")
+    assert "its kind is 'squares'" in refused("plot", tmp_path / "mine.zarr")

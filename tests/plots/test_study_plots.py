@@ -1,0 +1,206 @@
+"""The pictures of studies show what their datasets hold, and nothing else."""
+
+import functools
+import json
+
+import numpy as np
+import pytest
+import xarray
+from matplotlib.colors import same_color
+
+from saltus.plots.attractors import draw_attractors
+from saltus.plots.diagram import draw_diagram
+from saltus.plots.plane import draw_plane
+from saltus.plots.style import LIMIT, STABLE, UNSTABLE
+from saltus.studies import phase_portrait
+from saltus.systems import Load, Metainterface, System
+
+
+@functools.cache
+def portrait(starts=None, H=0.05):
+    system = System(model=Metainterface(beta0=np.deg2rad(80), damping=0.1), load=Load(horizontal=H, vertical=-1.5))
+    return phase_portrait(system, window=((-2.5, 2.5), (-1.5, 1.5)), starts=starts, duration=20.0, samples=500)
+
+
+def drawn(figure, color, marker="None"):
+    """The lines of the first axes in a colour, with a marker or without."""
+    return [line for line in figure.axes[0].lines if line.get_marker() == marker and same_color(line.get_color(), color)]
+
+
+def marks(figure, face):
+    """The places of the round marks with a face of some colour."""
+    round_ = [line for line in figure.axes[0].lines if line.get_marker() == "o" and same_color(line.get_markerfacecolor(), face)]
+    return np.concatenate([line.get_xdata() for line in round_])
+
+
+# --- the phase plane ---------------------------------------------------------------------------------------------------------
+
+
+def test_stable_equilibria_are_filled_and_unstable_ones_open():
+    data, figure = portrait(), draw_plane(portrait())
+    stable = data["stable"].values
+    np.testing.assert_array_equal(marks(figure, STABLE), data["equilibrium"].values[stable])
+    np.testing.assert_array_equal(marks(figure, "white"), data["equilibrium"].values[~stable])
+    assert {text.get_text() for text in figure.legends[0].get_texts()} == {
+        "motion",
+        "stable equilibrium",
+        "unstable equilibrium",
+        "separatrix",
+    }
+
+
+def test_motions_that_were_spread_stay_apart():
+    """No two of them run on beside one another: few of their points are as near to another motion as lines are wide."""
+    figure = draw_plane(portrait())
+    lines = [np.stack(line.get_data(), axis=1) / [5.0, 3.0] for line in drawn(figure, STABLE)]
+    assert 8 < len(lines) <= portrait().sizes["motion"]
+    near = 0
+    for i, line in enumerate(lines):
+        others = np.concatenate([other for j, other in enumerate(lines) if j != i])
+        others = others[np.isfinite(others).all(axis=1)]
+        apart = np.linalg.norm(line[::10, None] - others[None], axis=2).min(axis=1)
+        near += int((apart < 0.003).sum())
+    assert near < 0.02 * sum(len(line) for line in lines) / 10 + 1
+
+
+def test_given_motions_are_drawn_whole():
+    data = portrait(starts=((0.3, 0.0), (0.301, 0.0)))
+    lines = drawn(draw_plane(data), STABLE)
+    assert len(lines) == 2
+    for line, theta in zip(lines, data["theta"].values, strict=True):
+        np.testing.assert_array_equal(line.get_xdata(), theta)
+
+
+def test_a_closed_motion_is_drawn_closed():
+    system = System(model=Metainterface(beta0=np.deg2rad(80)), load=Load(vertical=-1.5))
+    figure = draw_plane(phase_portrait(system, window=((-2.5, 2.5), (-1.5, 1.5)), duration=30.0))
+    closed = 0
+    for line in drawn(figure, STABLE):
+        points = np.stack(line.get_data(), axis=1) / [5.0, 3.0]
+        points = points[np.isfinite(points).all(axis=1)]
+        later = points[len(points) // 2 :]
+        closed += np.linalg.norm(later - points[0], axis=1).min() < 2e-3
+    assert closed >= 6
+
+
+def test_arrows_point_along_the_motion():
+    """To the right above the axis and to the left below it: velocity is the rate of the coordinate."""
+    figure = draw_plane(portrait())
+    arrows = figure.axes[0].texts
+    assert len(arrows) > 10
+    for arrow in arrows:
+        (x0, _), (x1, v) = arrow.get_position(), arrow.xy
+        assert (x1 - x0) * v > 0
+
+
+# --- diagrams ----------------------------------------------------------------------------------------------------------------
+
+
+def diagram(amplitudes=(0.5, 1.0), beta0=1.4, path="load.frequency", kind="Metainterface"):
+    """A tree as small as they come: one branch without special points."""
+    n = len(amplitudes)
+    branch = xarray.Dataset(
+        {
+            "parameter": ("point", np.linspace(0.5, 1.0, n)),
+            "amplitude": ("point", np.array(amplitudes)),
+            "stable": ("point", np.ones(n, dtype=bool)),
+            "crossings": ("point", np.full(n, 2)),
+        }
+    )
+    empty = np.empty(0)
+    bands = xarray.Dataset(dict.fromkeys(("low", "high"), ("band", empty)) | {"kind": ("band", np.empty(0, dtype="U2"))})
+    dots = xarray.Dataset({"parameter": ("dot", empty), "amplitude": ("dot", empty)})
+    values = np.array([0.6, 0.9])
+    shape = (2, 1, 3)
+    strobes = xarray.Dataset(
+        {name: (("value", "start", "period"), np.full(shape, x)) for name, x in (("position", 0.3), ("peak", 0.5))},
+        {"value": values},
+    )
+    attrs = {
+        "bounds": [0.5, 1.0],
+        "coordinate": "theta",
+        "path": path,
+        "system": json.dumps({"model": {"type": kind, "beta0": beta0}}),
+    }
+    return xarray.DataTree.from_dict(
+        {"/": xarray.Dataset(attrs=attrs), "branch_000": branch, "attractors": dots, "bands": bands, "strobes": strobes}
+    )
+
+
+@pytest.mark.parametrize(
+    ("beta0", "top", "lines"), [(1.4, 1.0, 0), (2.4, 1.0, 2), (2.4, 2.0, 4)]
+)  # pi - beta0 = 1.74 and 0.74; both limits where the branch goes beyond them
+def test_the_limits_of_the_mechanism_are_drawn_where_they_are_reached(beta0, top, lines):
+    figure = draw_diagram(diagram((0.5, top), beta0))
+    places = sorted({float(line.get_ydata()[0]) for line in drawn(figure, LIMIT)})
+    inside = [limit for limit in (np.pi - beta0, 2 * (np.pi - beta0)) if limit < 1.08 * top]
+    np.testing.assert_allclose(places, inside)
+    assert len(inside) == lines // 2
+
+
+@pytest.mark.parametrize("changes", [{"kind": "WallOscillator"}, {"path": "model.beta0"}])
+def test_no_limit_is_drawn_where_there_is_none_or_it_varies(changes):
+    assert not drawn(draw_diagram(diagram((0.5, 3.0), 2.4, **changes)), LIMIT)
+
+
+def test_a_diagram_of_nothing_but_rest_is_drawn():
+    tree = diagram()
+    del tree["branch_000"]
+    tree["strobes"]["peak"][:] = 0.0
+    figure = draw_diagram(tree)
+    low, high = figure.axes[0].get_ylim()
+    assert low <= 0.0 < high
+    assert not len(figure.axes[1].lines[0].get_xdata())
+
+
+def test_branches_beyond_the_bounds_do_not_set_the_scale():
+    tree = diagram()
+    far = tree["branch_000"].to_dataset().assign(parameter=("point", [2.0, 3.0]), amplitude=("point", [40.0, 50.0]))
+    tree["branch_001"] = xarray.DataTree(far)
+    assert draw_diagram(tree).axes[0].get_ylim()[1] == pytest.approx(1.08)
+
+
+def test_stroboscopic_points_of_motions_stand_at_their_values():
+    points = draw_diagram(diagram()).axes[1].lines[0]
+    np.testing.assert_allclose(np.unique(points.get_xdata()), [0.6, 0.9])
+    np.testing.assert_allclose(points.get_ydata(), 0.3)
+
+
+# --- attractors --------------------------------------------------------------------------------------------------------------
+
+
+def found(load="periodic", undecided=0.25):
+    """Two attractors, a cycle of two periods and rest, and four starts, one of them undecided."""
+    columns = {
+        "attractor_kind": ("attractor", ["rest", "periodic"]),
+        "attractor_periods": ("attractor", [0, 2]),
+        "fraction": ("attractor", [0.25, 0.5]),
+        "fraction_error": ("attractor", [0.217, 0.25]),
+        "strobe_theta": (("attractor", "strobe"), [[0.0, np.nan], [0.5, -0.5]]),
+        "strobe_velocity": (("attractor", "strobe"), [[0.0, np.nan], [1.0, -1.0]]),
+        "start_theta": ("start", [0.1, 0.2, 0.3, 0.4]),
+        "start_velocity": ("start", [1.0, 1.0, 1.0, 1.0]),
+        "end": ("start", [0, 1, 1, -1]),
+    }
+    return xarray.Dataset(columns, {"attractor": [0, 1]}, {"load": load, "undecided": undecided})
+
+
+def test_attractors_are_named_with_their_shares_and_errors():
+    figure = draw_attractors(found())
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["0: rest, 25.0 ± 21.7 %", "1: period 2, 50.0 ± 25.0 %", "undecided, 25 %"]
+    assert "phase 0" in figure.axes[0].get_xlabel()
+
+
+def test_under_a_constant_load_there_are_equilibria_and_no_phases():
+    figure = draw_attractors(found("constant"))
+    assert figure.legends[0].get_texts()[1].get_text().startswith("1: equilibrium")
+    assert "phase" not in figure.axes[0].get_xlabel()
+
+
+def test_starts_have_the_colour_of_the_attractor_that_they_lead_to():
+    lines = figure_lines = draw_attractors(found()).axes[0].lines
+    cycle = next(line for line in lines if list(line.get_xdata()) == [0.5, -0.5])
+    starts = next(line for line in figure_lines if list(line.get_xdata()) == [0.2, 0.3])
+    assert same_color(cycle.get_markerfacecolor(), starts.get_markerfacecolor())
+    assert not same_color(starts.get_markerfacecolor(), UNSTABLE)
