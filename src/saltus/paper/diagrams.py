@@ -58,7 +58,7 @@ def draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
         ax.set_title(rf"$\Omega={frequencies[name]:g}$", pad=4)
         ax.set_ylabel(r"$\max_\tau|\theta|$ (rad)")
         draw_response(ax, tree)
-        inset = draw_zoom(ax, tree, (0.06, 0.56, 0.24, 0.39), (0.0, zoomed, 0.0, 1.1 * highest(tree, 0.0, zoomed)))
+        inset = draw_zoom(ax, tree, (0.24, 0.39), (0.0, zoomed, 0.0, 1.1 * highest(tree, 0.0, zoomed)))
         draw_critical(inset, tree.attrs["critical"])
     legend(figure, list(panels.values()), critical=True)
     return figure

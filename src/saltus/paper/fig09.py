@@ -60,7 +60,7 @@ def zoom(ax: Any, tree: Any, window: tuple[float, float]) -> None:
     """An inset with the superharmonic resonances."""
     scale = tree.attrs["scale"]
     top = highest(tree, *window) / scale
-    draw_zoom(ax, tree, (0.42, 0.44, 0.40, 0.44), (*window, 0.45 * top, 1.06 * top), scale=scale)
+    draw_zoom(ax, tree, (0.40, 0.44), (*window, 0.45 * top, 1.06 * top), scale=scale)
 
 
 def claims(data: Any) -> list[Claim]:

@@ -46,7 +46,7 @@ def zoom(ax: Any, tree: Any) -> None:
     """An inset with what lies between rest and the steady motions of the main branch."""
     begin, scale = float(main_branch(tree)["parameter"].min()), tree.attrs["scale"]
     window = (0.96 * begin, 1.26 * begin)
-    draw_zoom(ax, tree, (0.09, 0.56, 0.34, 0.38), (*window, 0.0, 0.6 * highest(tree, *window) / scale), scale=scale)
+    draw_zoom(ax, tree, (0.34, 0.38), (*window, 0.0, 0.6 * highest(tree, *window) / scale), scale=scale)
 
 
 def claims(data: Any) -> list[Claim]:

@@ -14,6 +14,7 @@ import numpy as np
 from saltus.plots.style import INK, LIMIT, LIMIT_LINE, STABLE_LINE, UNSTABLE_LINE
 
 DENSER = 6  # parts into which a step of a branch is divided when it is drawn
+PLACES, AROUND = 24, 0.05  # tried for an inset along each side, and what its ticks take, in shares of the axes
 LEAST_MARK = 1.5  # mm between two marks of one kind: nearer ones are left to the zooms and to the data
 CHANGES = ("LP", "PD", "BPC", "GR", "NS")  # the kinds at which the number or the stability of motions can change
 
@@ -197,13 +198,13 @@ def draw_response(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: fl
 def draw_zoom(
     ax: Any,
     spectrum: Any,
-    place: tuple[float, float, float, float],
+    size: tuple[float, float],
     window: tuple[float, float, float, float],
     quantity: str = "amplitude",
     scale: float = 1.0,
 ) -> Any:
-    """An inset at `place` (x, y, width, height as shares of the axes) with the part `window` (x from, to, y from, to)."""
-    inset = ax.inset_axes(place)
+    """An inset of a `size` (shares of the axes) where there is room, with the part `window` (x from, to, y from, to)."""
+    inset = ax.inset_axes(free_place(ax, spectrum, size, quantity, scale))
     inset.set_xlim(window[:2])
     inset.set_ylim(window[2:])
     inset.tick_params(labelsize=6, length=2, pad=1.5)
@@ -213,6 +214,28 @@ def draw_zoom(
     for connector in box.connectors:
         connector.set_visible(False)  # they would cross the curves
     return inset
+
+
+def free_place(
+    ax: Any, spectrum: Any, size: tuple[float, float], quantity: str = "amplitude", scale: float = 1.0
+) -> tuple[float, float, float, float]:
+    """Where in the axes an inset of a size (shares of the axes) covers least of the branches and lines."""
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    marks = [np.empty((0, 2))]
+    for branch in branches(spectrum):
+        for _, x, y in pieces(branch, quantity):
+            marks.append(np.stack([(x - left) / (right - left), (y / scale - low) / (high - low)], axis=1))
+    points = np.concatenate(marks)
+    lines = [(line.get_ydata()[0] - low) / (high - low) for line in ax.get_lines() if len(set(line.get_ydata())) == 1]
+    best, least = (0.1, 0.1), np.inf
+    for y in np.linspace(0.07, 0.96 - size[1], PLACES):
+        for x in np.linspace(0.07, 0.98 - size[0], PLACES):
+            inside = (np.abs(points - np.array([x + size[0] / 2, y + size[1] / 2])) < np.array(size) / 2 + AROUND).all(axis=1)
+            crossed = sum(y - AROUND < line < y + size[1] + AROUND for line in lines)
+            cost = inside.sum() + 0.5 * crossed - 1e-3 * y  # rather a line than a branch, and rather above
+            if cost < least:
+                best, least = (x, y), cost
+    return (*best, *size)
 
 
 def legend(figure: Any, spectra: list[Any], *, limits: bool = True, critical: bool = False, columns: int = 4) -> None:
