@@ -1,6 +1,8 @@
 """The questions of a study file: every key is an argument of its function, and every argument a file can give is a key."""
 
 import inspect
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from saltus.attractors import attractors, basins
+from saltus.cli.run import check
 from saltus.config import load_study
 from saltus.config.asks import ASKS, read_grid, read_pairs, read_values
 from saltus.errors import ParameterError
@@ -106,3 +109,55 @@ def test_junk_in_a_question_is_read_or_refused_in_one_sentence(folder, kind, dat
     except ParameterError as error:
         told = str(error).startswith(str(path)) and len(str(error).splitlines()) == 1
     assert told
+
+
+# --- the page and the examples -----------------------------------------------------------------------------------------------
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
+HEADS = re.compile(r"^((?:`\[\w+\]`(?: and )?)+)\n\n\| key \| default \| \|\n\|[-|]*\n((?:\|.*\n)+)", re.MULTILINE)
+
+
+def tables():
+    """The rows of the page's table for each question: the keys and the text of the defaults."""
+    for heads, rows in HEADS.findall(PAGE):
+        cells = [row.split("|")[1:3] for row in rows.splitlines()]
+        for kind in re.findall(r"`\[(\w+)\]`", heads):
+            yield kind, [(re.findall(r"`(\w+)`", keys), default.strip()) for keys, default in cells]
+
+
+def test_the_page_names_every_key_of_every_question():
+    found = dict(tables())
+    assert set(found) == set(ASKS)
+    for kind, rows in found.items():
+        named = [key for keys, _ in rows for key in keys]
+        assert set(named) - {"theta"} == set(ASKS[kind])
+        assert f"| `[{kind}]` |" in PAGE
+
+
+def test_the_numbers_on_the_page_are_the_defaults():
+    compared = 0
+    for kind, rows in tables():
+        signature = inspect.signature(FUNCTIONS[kind]).parameters
+        for keys, default in rows:
+            if len(keys) == 1 and keys[0] in signature and re.fullmatch(r"[\d.e-]+", default):
+                assert signature[keys[0]].default == pytest.approx(float(default))
+                compared += 1
+    assert compared > 15
+
+
+def test_the_questions_shown_on_the_page_can_be_asked(tmp_path):
+    block = next(text for text in re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL) if "[phase_portrait]" in text)
+    system = '[model]\ntype = "Metainterface"\nbeta0 = 1.4\n[load]\nfrequency = 1\nhorizontal = { amplitude = 0.1 }\n'
+    (tmp_path / "study.toml").write_text(system + block)
+    asked = load_study(tmp_path / "study.toml").asks
+    assert {ask.kind for ask in asked} == set(ASKS) - {"response_spectrum"}
+
+
+@pytest.mark.parametrize("name", ["phase_portrait", "resonance", "chart"])
+def test_the_examples_ask_what_can_be_answered(name, tmp_path):
+    study = load_study(ROOT / "examples" / f"{name}.toml")
+    assert study.asks
+    for ask in study.asks:
+        check(study, ask, tmp_path / "out")
+    assert not (tmp_path / "out").exists()

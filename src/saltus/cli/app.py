@@ -93,14 +93,15 @@ def run(
     plot: Annotated[bool, typer.Option(help="Draw what is computed.")] = True,
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786, whose workers compute charts."),
+        typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786, for charts and basins."),
     ] = None,
 ) -> None:
     r"""Answer all that a study asks: a motion, a diagram, a chart, basins, ...
 
     The study's tables say what: \[simulate], \[phase_portrait],
     \[response_spectrum], \[bifurcation_diagram], \[attractors], \[basins],
-    \[stability_chart]. A chart that was stopped goes on where it was.
+    \[stability_chart]. All is checked before anything is computed. A chart,
+    or basins, that were stopped go on where they were.
 
     Example: [cyan]saltus run study.toml --output runs/first[/]
     """
@@ -117,7 +118,9 @@ def plot(
         Path | None, typer.Option("--output", "-o", help="The folder to write to.", show_default="beside it")
     ] = None,
 ) -> None:
-    """Draw a result again.
+    """Draw a result of `saltus run` or `saltus simulate` again.
+
+    Writes a PNG and a PDF file. Of basins, plot basins.nc.
 
     Example: [cyan]saltus plot results/study/stability_chart.zarr[/]
     """
