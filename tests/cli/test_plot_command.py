@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray
 
+from saltus.cli.plot import open_result
 from saltus.sweep import Plan, Variable, files, run
 
 MODEL = '[model]\ntype = "Metainterface"\nbeta0 = "80 deg"\ndamping = 0.1\n'
@@ -14,7 +15,7 @@ ASKS = {
     "bifurcation_diagram": "[bifurcation_diagram]\nbounds = [0.4, 0.5]\nmax_period = 1\nvalues = [0.45]\nstarts = 4\nbands = 0\n",
     "attractors": "[attractors]\nstarts = 8\n",
     "basins": "[basins]\ntheta = [-1, 0, 1]\nvelocity = [0, 1]\n",
-    "stability_chart": "[stability_chart]\nhorizontal = [0.1, 0.3]\nvertical = [-1, -0.5]\n",
+    "stability_chart": "[stability_chart]\nhorizontal = [0.1, 0.3]\nvertical = [-1.9, -0.5]\n",
 }
 
 
@@ -28,6 +29,14 @@ def test_every_kind_of_result_is_drawn_again_as_it_was(kind, saltus, tmp_path):
     assert result.stdout == f"The picture is in {tmp_path / 'again'}: {kind}.png, {kind}.pdf\n"
     first, second = (tmp_path / folder / f"{kind}.png" for folder in ("out", "again"))
     assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_chart_from_its_store_shows_where_motions_pass_the_straight_line(saltus, tmp_path):
+    (tmp_path / "study.toml").write_text(FORCED + ASKS["stability_chart"])
+    saltus("run", tmp_path / "study.toml", "-o", tmp_path, "--no-plot")
+    chart = open_result(tmp_path / "stability_chart.zarr")
+    assert chart["amplitude"].sel(vertical=-1.9).max() > np.pi - np.deg2rad(80)
+    np.testing.assert_array_equal(chart["beyond_line"], chart["amplitude"] > np.pi - np.deg2rad(80))
 
 
 def netcdf(path, attrs=None, **variables):

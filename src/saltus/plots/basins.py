@@ -59,7 +59,7 @@ def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), width: float = SING
     unit = " (rad)" if name.startswith("theta") else ""
     when = "" if _steady(dataset) else " at phase 0"
     ax.set_xlabel(rf"${symbol}${when}{unit}")
-    ax.set_ylabel(rf"${symbol}'${when}")
+    ax.set_ylabel(rf"$\dot{{{symbol}}}${when}")
     handles = _legend(dataset, numbers, colours)
     figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.2, handletextpad=0.4)
     return figure

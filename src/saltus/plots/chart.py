@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 
+from saltus.plots.diagram import parameter_name
 from saltus.plots.style import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, new_figure, styled
 
 COLOURS = "viridis_r"  # large amplitudes dark, beside the white of rest small ones light
@@ -19,16 +20,40 @@ NAMES = {"LP": "fold", "PD": "period doubling", "BPC": "symmetry breaking", "GR"
 
 @styled
 def draw_stability_chart(data: Any) -> Any:
-    """One chart as it is stored, with its scale; without borders."""
-    figure = new_figure(SINGLE_COLUMN, 85.0)
+    """One chart as it is stored, with its scale and what its marks mean; without borders."""
+    figure = new_figure(1.2 * SINGLE_COLUMN, 98.0)
     ax = figure.subplots()
     cells = draw_chart(ax, data)
     path = list(data.attrs.get("path", ("horizontal", "vertical")))
-    ax.set_xlabel(path[0])
-    ax.set_ylabel(path[1])
+    ax.set_xlabel(parameter_name(path[0]))
+    ax.set_ylabel(parameter_name(path[1]))
     if cells is not None:
-        figure.colorbar(cells, ax=ax, label="largest amplitude (rad)")
+        ticks = cells.norm.boundaries[::2]
+        figure.colorbar(cells, ax=ax, label=r"largest amplitude $\max_\tau|\theta|$ (rad)", ticks=ticks, format="%.2g")
+    handles = list(_marks(data))
+    if handles:
+        figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.4, handletextpad=0.6)
     return figure
+
+
+def _marks(chart: Any) -> Iterator[Any]:
+    """What the marks in a chart mean, those that are there."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    resting = (chart["count"] == 0) & (chart["unsettled"] == 0)
+    if bool(resting.any()):
+        yield Patch(facecolor="white", edgecolor=INK, linewidth=0.4, label="rest alone")
+    if bool((chart["count"] >= 2).any()):
+        with mpl.rc_context({"hatch.linewidth": 0.3}):
+            yield Patch(facecolor="#7fb8a8", edgecolor="white", hatch="......", label="several motions")
+    if bool(((chart["count"] == 0) & (chart["unsettled"] > 0)).any()):
+        yield Patch(facecolor=CHAOS, label="none settles")
+    if "beyond_line" in chart and int(chart["beyond_line"].sum()) > 0:
+        yield Line2D([], [], color=LIMIT, lw=0.9, label=r"$\max_\tau|\theta|=\pi-\beta_0$")
+    if "beyond_kinematic" in chart and bool(chart["beyond_kinematic"].any()):
+        cross: dict[str, Any] = {"marker": "x", "markersize": 4, "markeredgewidth": 0.8, "color": UNSTABLE, "linestyle": "none"}
+        yield Line2D([], [], label="beyond the kinematic limit", **cross)
 
 
 def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:

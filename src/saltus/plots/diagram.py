@@ -12,7 +12,14 @@ from matplotlib.figure import Figure
 from saltus.plots.response import branches, draw_bands, draw_limits, draw_response, legend
 from saltus.plots.style import DOUBLE_COLUMN, INK, new_figure, styled
 
-NAMES = {"load.frequency": r"frequency $\Omega$", "load.horizontal.amplitude": r"load amplitude $\widehat{\mathcal{H}}$"}
+NAMES = {
+    "load.frequency": r"frequency $\Omega$",
+    "load.horizontal.amplitude": r"load amplitude $\widehat{\mathcal{H}}$",
+    "load.vertical": r"vertical load $\overline{\mathcal{V}}$",
+    "load.vertical.mean": r"mean vertical load $\overline{\mathcal{V}}$",
+    "model.damping": r"damping $\mathcal{C}$",
+    "model.beta0": r"$\beta_0$ (rad)",
+}
 POINTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
 FINEST, COARSEST = 1.3, 3.5  # sizes of these points: as large as the step between values lets them be
 AT_REST = 1e-9  # of the largest: a motion that is smaller in every period is left out
@@ -37,7 +44,7 @@ def draw_diagram(tree: Any) -> Figure:
         draw_strobes(axes[1], tree)
         axes[1].set_ylabel(rf"${symbol}$ at phase 0{unit}")
         axes[1].set_title("stroboscopic points of direct simulation", loc="left", pad=3)
-    axes[-1].set_xlabel(NAMES.get(tree.attrs["path"], tree.attrs["path"]))
+    axes[-1].set_xlabel(parameter_name(tree.attrs["path"]))
     legend(figure, [tree], limits=limits[0] < 1.08 * top)
     return figure
 
@@ -75,6 +82,11 @@ def draw_strobes(ax: Any, tree: Any) -> None:
     size = np.clip(0.5 * width / max(len(strobes["value"]), 1), FINEST, COARSEST)
     ax.plot(values[moving].ravel(), places[moving].ravel(), markersize=size, **POINTS)
     ax.set_xlim(low, high)
+
+
+def parameter_name(path: str) -> str:
+    """What a parameter is called on an axis; its dotted path where it has no name."""
+    return NAMES.get(path, path)
 
 
 def axis_name(coordinate: str) -> tuple[str, str]:
