@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.attractors.basins import basins
+from saltus.errors import ParameterError
 from saltus.orbits.find import check_whole
 from saltus.systems import System
 
@@ -49,6 +52,8 @@ def basin_sweep(
     from saltus.sweep import run
 
     check_whole("rows", rows, 1)
+    if store is not None and Path(store).exists():
+        _check_store(Path(store), system)
     say = progress or (lambda *_: None)
 
     def computed(arguments: dict[str, Any], axes: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -56,6 +61,15 @@ def basin_sweep(
         return data["label"].values, data["time"].values
 
     return basins(system, compute=computed, progress=lambda _: say(0, 1, None), **options)
+
+
+def _check_store(path: Path, system: System) -> None:
+    """Refuse, before attractors are looked for, what is surely not the store of these basins."""
+    from saltus.sweep.status import read_plan
+
+    kept = read_plan(path)
+    if kept["function"] != CELLS or kept["arguments"]["system"] != json.loads(json.dumps(system.to_dict())):
+        raise ParameterError(f"{path} is the store of another sweep, or of the basins of another system; name another store")
 
 
 def plan(arguments: dict[str, Any], axes: dict[str, np.ndarray], rows: int) -> Plan:
