@@ -20,6 +20,7 @@ from saltus.paper import (
     fig13,
     fig14,
     fig15,
+    quasi,
     statements,
     table1,
 )
@@ -32,7 +33,7 @@ FIGURES: dict[str, PaperFigure] = {
     for part in (
         *(fig01c, fig02, fig03, fig04, fig05, fig06, fig07, fig08),
         *(fig09, fig10, fig11, fig12, fig13),
-        *(fig14, fig15),
+        *(fig14, fig15, quasi),
         *(table1, appendix, statements),
     )
 }
