@@ -50,7 +50,8 @@ def test_a_study_asks_for_a_motion_a_portrait_and_attractors_at_once(saltus, stu
     assert files(tmp_path / "out") == [f"{kind}.{end}" for kind in kinds for end in ("nc", "pdf", "png")]
     known = equilibria(load_study(path).system)
     stable = [one.theta for one in known if one.stable]
-    assert f"{len(stable)} stable and {len(known) - len(stable)} unstable equilibria, separatrices computed" in result.stdout
+    saddles = len(known) - len(stable)  # each with two branches of its stable manifold
+    assert f"{len(stable)} stable and {saddles} unstable equilibria, {2 * saddles} separatrices.\n" in result.stdout
     assert result.stdout.endswith(f"Results are in {tmp_path / 'out'}: attractors.nc, attractors.png, attractors.pdf\n")
     with xarray.open_dataset(tmp_path / "out" / "attractors.nc", engine="h5netcdf") as data:
         places = np.sort(np.append(data["strobe_theta"].values[data["attractor"].values > 0, 0], 0.0))

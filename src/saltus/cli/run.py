@@ -156,8 +156,9 @@ def said(kind: str, data: Any) -> Iterator[str]:
     else:
         stable = int(data["stable"].sum())
         unstable = data.sizes["equilibrium"] - stable
-        yield f"{data.sizes['motion']} motions, {stable} stable and {unstable} unstable equilibria, separatrices " + (
-            "computed" if data.attrs["separatrices"] == "computed" else str(data.attrs["separatrices"])
+        why = data.attrs["separatrices"].removeprefix("none: ")
+        yield f"{data.sizes['motion']} motions, {stable} stable and {unstable} unstable equilibria, " + (
+            f"{data.sizes['separatrix']} separatrices." if why == "computed" else f"no separatrices ({why})."
         )
 
 
