@@ -86,8 +86,8 @@ class Lanes:
         chunks, lock = iter(range(0, n, CHUNK)), threading.Lock()
         load_driver(), load_helpers(), load_advance()  # compiled here, not by each thread
         with ThreadPoolExecutor(threads) as pool:
-            workers = [pool.submit(self._work, jobs, ends, chunks, lock, control) for control in controls]
-            try:
+            try:  # an interrupt while they are begun must stop them too, or the pool would wait for their end
+                workers = [pool.submit(self._work, jobs, ends, chunks, lock, control) for control in controls]
                 while wait(workers, PATIENCE).not_done:
                     if progress is not None and total > 0:
                         progress(min(1.0, sum(int(c[1]) for c in controls) / total))
