@@ -26,7 +26,10 @@ MAY_IMPORT = {
     "paper": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots", "files"},
     "cli": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots", "config", "paper", "files"},
 }
-HEAVY = ("scipy", "numba", "xarray", "matplotlib", "pydantic", "h5netcdf", "zarr", "distributed", "saltus.flow", "saltus.sweep", "saltus.paper")
+HEAVY = (
+    *("scipy", "numba", "xarray", "matplotlib", "pydantic", "h5netcdf", "zarr", "distributed"),
+    *("saltus.flow", "saltus.sweep", "saltus.paper"),
+)
 
 
 def imported_rooms(path: Path) -> set[str]:

@@ -13,6 +13,7 @@ from saltus.orbits.problem import Problem
 
 MOST_STRETCHED = 3.0  # times the last step, beyond which its curvature says nothing about the next one
 
+
 @dataclass(frozen=True, eq=False)
 class Curve:
     """The solutions of one problem along its first parameter, measured by a norm that depends neither on the number of impacts
