@@ -30,6 +30,7 @@ def label(found: Attractors, states: np.ndarray) -> np.ndarray:
     return label_states(found.system, found.targets, states, 500, 1e-2, 1e-11)[0]
 
 
+@pytest.mark.thorough
 def test_the_edge_is_between_two_ends_as_near_as_rounding_lets_it_be(found: Attractors, picture: xarray.Dataset) -> None:
     low, high = edges(lambda states: label(found, states), picture["label"].values, GRID, GRID)
     assert len(low) == 12
@@ -37,6 +38,7 @@ def test_the_edge_is_between_two_ends_as_near_as_rounding_lets_it_be(found: Attr
     assert (label(found, low) != label(found, high)).all()
 
 
+@pytest.mark.thorough
 def test_it_leads_to_the_saddle_of_the_branch(found: Attractors, picture: xarray.Dataset) -> None:
     low, high = edges(lambda states: label(found, states), picture["label"].values, GRID, GRID)
     (saddle,) = edge_saddles(SYSTEM, low, high)
@@ -45,6 +47,7 @@ def test_it_leads_to_the_saddle_of_the_branch(found: Attractors, picture: xarray
     assert saddle.amplitude == pytest.approx(expected.amplitude, rel=1e-9)
 
 
+@pytest.mark.thorough
 def test_a_picture_brings_the_curves_where_its_basins_meet(picture: xarray.Dataset) -> None:
     labels = picture["label"].values
     rows, columns = np.nonzero(labels[:, 1:] != labels[:, :-1])

@@ -116,6 +116,7 @@ CASES = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", CASES)
 def test_the_determinant_is_the_product_of_the_saltations_and_of_the_damping(name):
     build, impact, count = CASES[name]
@@ -152,6 +153,7 @@ def trace_integral(system, motion):
     return motion.time / 2 * weights @ total
 
 
+@pytest.mark.thorough
 def test_both_layers_open_obey_liouville():
     rng, used = np.random.default_rng(4), 0
     for _ in range(40):

@@ -15,7 +15,10 @@ def orbit_of(name):
     return find_orbit(system, parameters=paths, **start)
 
 
-@pytest.fixture(params=ORBITS)
+ELSEWHERE = ("ground, restitution of energy", "a user's smooth model", "smoothed", "rocking block")  # each compiles for itself
+
+
+@pytest.fixture(params=[pytest.param(n, marks=[pytest.mark.thorough] * (n in ELSEWHERE)) for n in ORBITS])
 def name(request):
     """The name of a case."""
     return request.param

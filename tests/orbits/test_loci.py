@@ -91,6 +91,7 @@ def closed_form(point: LocusPoint, kind: str) -> float:
     return float(family.amplitude(speed or 0.0))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["GR", "LP", "PD"])
 def test_curves_of_the_impact_oscillator_are_the_closed_forms(kind: str) -> None:
     locus = wall_locus(kind)
@@ -202,6 +203,7 @@ def test_the_unsymmetric_orbits_change_sides_at_a_degenerate_symmetry_breaking()
     assert ratio[0] * ratio[1] > 0  # the sign of the normal form says the side
 
 
+@pytest.mark.thorough
 def test_a_fold_of_symmetric_orbits_goes_on_without_the_symmetry() -> None:
     fold = resonance_fold()
     assert fold.orbit.symmetric

@@ -75,7 +75,10 @@ def family_of(name, path, bounds):
     return continue_orbit(orbit_of(name), path, bounds)
 
 
-@pytest.fixture(params=CASES)
+ELSEWHERE = ("restitution of energy", "inelastic", "rocking block")  # each compiles for itself
+
+
+@pytest.fixture(params=[pytest.param(n, marks=[pytest.mark.thorough] * (n in ELSEWHERE)) for n in CASES])
 def name(request):
     return request.param
 

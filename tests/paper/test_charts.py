@@ -23,6 +23,7 @@ def data():
     return FIGURES["fig14"].compute(panels=QUICK, size=9, curves=3, starts=6)
 
 
+@pytest.mark.thorough
 def test_the_data_say_what_they_are_and_claims_follow_from_disk_too(tmp_path):
     figure = FIGURES["fig14"]
     check_provenance("fig14", data())
@@ -83,6 +84,7 @@ def test_the_onset_read_from_curves_is_the_closed_form_and_so_is_the_share():
     assert np.isnan(chart_measures.onset(panel, np.array([-3.0]))).all()
 
 
+@pytest.mark.thorough
 def test_statements_on_parameters_compare_charts_of_the_same_cells():
     reference = QUICK["d"] | {"widest": 0.04}
     quick = {"a": reference | {"beta0": 60.0}, "b": reference | {"damping": 0.05}, "reference": reference}

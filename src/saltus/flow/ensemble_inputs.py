@@ -13,7 +13,7 @@ from saltus.flow.ensemble_dataset import rate_name, result_names
 from saltus.systems import System
 from saltus.systems.parameters import numbers
 
-MOST_CHECKED = 1000  # rows of parameters; of more, those with a least or largest value and as many more, evenly
+MOST_CHECKED = 200  # rows of parameters; of more, those with a least or largest value and as many more, evenly
 
 
 @dataclass(frozen=True)
