@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 STARTS = 12  # initial states in each cell
 LONGEST = 6  # forcing periods of a motion that counts
 LEAST = 1e-3  # rad: smaller motions are not told from rest
-DECAY = 100.0  # a motion settles, or counts as unsettled, while exp(-C tau / 2) falls to exp(-100), as a rule
+DECAY = 75.0  # a motion settles, or counts as unsettled, while exp(-C tau / 2) falls to exp(-75), as a rule
 FEWEST, MOST = 40, 1200  # but within so many forcing periods
 TOL = 1e-10  # with larger errors the motion beside an equilibrium would not come to a halt
 ROWS = 101  # of the chart in one chunk: more chunks keep more of a run that is killed, and know less of their neighbours
