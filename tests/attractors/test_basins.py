@@ -89,6 +89,7 @@ def test_too_few_periods_leave_cells_undecided_and_say_so(found: Attractors) -> 
     assert picture.attrs["undecided"] == 1.0
 
 
+@pytest.mark.thorough
 def test_the_basins_of_mirrored_equilibria_are_mirror_images() -> None:
     theta, velocity = np.linspace(-2.0, 2.0, 21), np.linspace(-1.5, 1.5, 15)
     label = basins(steady(), theta=theta, velocity=velocity)["label"].values

@@ -51,6 +51,7 @@ class Chain(saltus.Model):
         return load.force(t) - q[0] + pull - self.damping * v[0], -pull - q[1] - self.damping * v[1]
 
 
+@pytest.mark.thorough
 def test_they_are_exact_with_two_coordinates():
     """The masses together have s^2 + c s + 1, against each other s^2 + (c + 2 d) s + 1 + 2 k: real parts -c/2, -(c + 2 d)/2."""
     force = saltus.Load(frequency=1.7, force=saltus.Harmonic(amplitude=0.2))

@@ -109,6 +109,7 @@ def one(parameters, i):
     return BASE.with_({path: float(values[i]) for path, values in parameters.items()})
 
 
+@pytest.mark.thorough
 def test_motions_that_lose_speed_at_impacts_come_to_rest_from_below_the_threshold_and_stay():
     """500 random systems, each from a random side and phase; slow flights take many periods, so their time is scaled."""
     rng = np.random.default_rng(21)

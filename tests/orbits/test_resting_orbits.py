@@ -286,6 +286,7 @@ def test_a_release_lost_on_one_side_and_born_on_it_is_the_same_point():
     assert one.orbits[-1].amplitude == pytest.approx(both.orbits[0].amplitude, abs=1e-9)
 
 
+@pytest.mark.thorough
 def test_a_symmetric_orbit_goes_on_where_the_symmetry_ends():
     """Along a mean load: as far either way, to where the releases of one side are lost, at Hhat - Hcr."""
     family = family_of("metainterface", "load.horizontal.mean", (-0.2, 0.2))
@@ -453,6 +454,7 @@ def test_a_family_ends_at_its_bounds_and_solves_between_its_points():
     assert family.at(1.2) == []
 
 
+@pytest.mark.thorough
 def test_the_energy_restituted_is_continued_too():
     family = continue_orbit(orbit_of("restitution of energy"), "impact.r", (0.25, 0.35))
     assert family.ends == ("bound 0.25", "bound 0.35")

@@ -63,6 +63,7 @@ def test_erratum_28_at_the_papers_highest_frequency():
     assert onset == pytest.approx(critical_horizontal(BETA, -0.5) * 0.1 * math.pi**3 / 96)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("order", "power"), [(1, 2), (2, 4)])
 def test_erratum_28_order_of_the_relative_error(order, power):
     frequencies = (6.0, 9.0, 13.5)

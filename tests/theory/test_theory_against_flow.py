@@ -164,6 +164,7 @@ def test_erratum_28_motions_live_on_above_the_onset_and_die_below():
     assert final[0.9] < 0.3 * amplitude
 
 
+@pytest.mark.thorough
 def test_upright_cell_moves_as_the_pendulum():
     load = Load(
         frequency=1.3, horizontal=Harmonic(0.4), vertical=Harmonic(0.2, mean=-0.8), ground_horizontal=Harmonic(0.1, phase=1.0)
