@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
@@ -20,11 +21,18 @@ def each(make: Callable[..., Any], values: Mapping[str, Any], longest: str = "la
     cores = min(available_cores(), len(values))
     if cores < 2:
         return {name: make(value, **options) for name, value in values.items()}
-    with ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("spawn")) as pool:
+    with ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("spawn"), initializer=_deaf) as pool:
         order = list(values.items()) if longest == "first" else list(values.items())[::-1]
         made = {name: pool.submit(partial(make, value, **options)) for name, value in order}
         try:
             return {name: made[name].result() for name in values}
-        except BaseException:  # interrupted, or a panel failed: what has not begun is of no use any more
+        except BaseException:  # interrupted, or a panel failed: the others are of no use any more
             pool.shutdown(wait=False, cancel_futures=True)
+            for child in multiprocessing.active_children():
+                child.terminate()
             raise
+
+
+def _deaf() -> None:
+    """Leave Ctrl-C, which reaches every process of a terminal, to the one that knows what to say."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -147,7 +147,7 @@ def _at_high_frequency(data: Any, amplitudes: dict[str, float]) -> Claim:
         erratum=31,
         evidence="values of Ω above 1 at which motions still wander after 400 periods, with a positive exponent, "
         + ", ".join(f"ζ̂ = {z:g}: {n}" for z, n in seen.items())
-        + "; bands in which none of 12 companions settles within 4000 periods have a total width of "
+        + "; bands, in which at no value tried one of the companions settles, have a total width of "
         + ", ".join(f"{w:.3f}" for w in widths),
     )
 
@@ -203,11 +203,7 @@ def _two_regions(name: str, data: Any, frequencies: dict[str, float]) -> Claim:
 
 def _first(spectrum: Any) -> float:
     """The least value at which motions wander with a positive exponent, inf where none do."""
-    table = spectrum["exponents"]
-    positive = (table["exponent"].values - table["error"].values > 0.0) & (
-        table["chaotic"].values + table["undecided"].values > 0
-    )
-    return float(table["value"].values[positive.any(axis=1)].min(initial=np.inf))
+    return float(_wandering(spectrum).min(initial=np.inf))
 
 
 def _shifts(name: str, data: Any, frequencies: dict[str, float]) -> Claim:

@@ -58,8 +58,8 @@ class Band:
 
     low: float
     high: float
-    before: float  # the largest value below at which none is; `low` itself at the edge of the range
-    after: float  # the least value above
+    before: float  # the largest value below that was tried, at which none is shown to be; `low` itself at the range's edge
+    after: float  # the least one above
     exponent: float  # the largest one found in it
     error: float
     low_mark: str = ""  # the kind of the special point at this edge
@@ -130,6 +130,7 @@ class _Search:
     region: tuple[float, float]
     seed: int
     states: np.ndarray = field(init=False)
+    asked: set[tuple[int, int]] = field(default_factory=set)  # from which value of the grid to which chaos was carried on
 
     def __post_init__(self) -> None:
         self.states = initial_states(self.system, self.starts, self.region, self.seed)
@@ -138,9 +139,8 @@ class _Search:
         self, values: np.ndarray, states: np.ndarray | None = None, progress: Callable[[float], object] | None = None
     ) -> Tried:
         """Follow motions from states (starts, 2), or (n, starts, 2) of each value's own."""
-        begin = np.broadcast_to(
-            self.states if states is None else states, (len(values), *np.shape(self.states if states is None else states)[-2:])
-        )
+        given = self.states if states is None else states
+        begin = np.broadcast_to(given, (len(values), *given.shape[-2:]))
         ends = self._run(values, begin, SETTLING, progress)
         shape = begin.shape[:2]
         tried = Tried(
@@ -216,19 +216,15 @@ class _Search:
             edges = [
                 (i, j) for i, j in _neighbours(len(found)) if found[i] and not found[j] and not np.isnan(tried.strobes[j]).all()
             ]
-            news = [(i, j) for i, j in edges if (i, j) not in self._asked]
+            news = [(i, j) for i, j in edges if (i, j) not in self.asked]
             if not news:
                 return tried
-            self._asked.update(news)
+            self.asked.update(news)
             states = np.stack([tried.seeds(i) for i, _ in news])
             more = self.at(tried.values[[j for _, j in news]], states)
             for row, (_, j) in enumerate(news):
                 if more.found[row]:
                     _adopt(tried, j, more, row)
-
-    @property
-    def _asked(self) -> set[tuple[int, int]]:
-        return self.__dict__.setdefault("asked", set())
 
     def edges(self, tried: Tried) -> tuple[Band, ...]:
         """The bands between runs of values with chaos, their edges in brackets."""
@@ -246,7 +242,8 @@ class _Search:
             inside = np.where(tried.chaotic[a : b + 1], tried.exponent[a : b + 1], -np.inf)
             top = np.unravel_index(int(inside.argmax()), inside.shape)
             error = float(tried.error[a : b + 1][top])
-            bands.append(Band(inner[k], inner[half + k], outer[k], outer[half + k], float(inside[top]), error))
+            low, high, before, after = (float(x) for x in (inner[k], inner[half + k], outer[k], outer[half + k]))
+            bands.append(Band(low, high, before, after, float(inside[top]), error))
         return tuple(bands)
 
     def _halve(self, tried: Tried, rows: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -305,8 +302,8 @@ def band_dataset(bands: tuple[Band, ...] = ()) -> xarray.Dataset:
     texts = {
         "low": "least value with chaos",
         "high": "largest value with chaos",
-        "before": "next value below that was tried, without",
-        "after": "next value above that was tried, without",
+        "before": "next value below that was tried, at which no motion is shown to be chaotic",
+        "after": "next value above that was tried, at which no motion is shown to be chaotic",
         "exponent": "largest Lyapunov exponent found in it, per unit of dimensionless time",
         "error": "of that exponent, half width of its 95 % interval",
     }
