@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from study_cases import forced
 
-from saltus import WallOscillator
+from saltus import ParameterError, WallOscillator
 from saltus.studies.bands import Band, Bands, Tried, band_dataset, chaotic_bands
 from saltus.systems import Harmonic, Load, System
 
@@ -64,6 +64,24 @@ def test_results_do_not_depend_on_the_run(quasi_periodic_band):
     again = bands(forced(0.2), "load.frequency", (0.35, 0.43))
     assert again.bands == quasi_periodic_band.bands
     assert np.array_equal(again.tried.strobes, quasi_periodic_band.tried.strobes, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"path": "load.freq"}, "did you mean 'load.frequency'"),
+        ({"bounds": (2.0, 1.0)}, "the smaller one first"),
+        ({"bounds": (0.5, np.nan)}, "the smaller one first"),
+        ({"count": 0}, "count must"),
+        ({"starts": 1.5}, "starts must be a whole number"),
+        ({"region": 3}, "region must be two half widths"),
+        ({"system": System(model=forced().model, load=Load(vertical=-0.5))}, "give the Load a frequency"),
+    ],
+)
+def test_bad_use_is_answered_with_a_sentence(change, says):
+    given = {"system": forced(), "path": "load.frequency", "bounds": (0.5, 2.0)} | change
+    with pytest.raises(ParameterError, match=says):
+        chaotic_bands(**given)
 
 
 def hand_made(*spans):

@@ -14,7 +14,7 @@ from saltus.attractors.settling import Ends, clocked, settle
 from saltus.errors import ParameterError
 from saltus.orbits import Branch, PeriodicOrbit
 from saltus.orbits.find import check_whole
-from saltus.orbits.search import REGION, initial_states
+from saltus.orbits.search import REGION, check_region, initial_states
 from saltus.systems import System
 from saltus.systems.checks import check_number
 
@@ -123,17 +123,6 @@ def order(collection: Collection) -> dict[int, int]:
     moving = [place for place, target in enumerate(collection.targets) if target.kind != "rest"]
     labels = {place: i + 1 for i, place in enumerate(sorted(moving, key=rank))}
     return labels | {place: REST for place, target in enumerate(collection.targets) if target.kind == "rest"}
-
-
-def check_region(region: Any) -> tuple[float, float]:
-    """Two positive half widths."""
-    try:
-        widths = tuple(float(x) for x in region)
-    except (TypeError, ValueError):
-        widths = ()
-    if len(widths) != 2 or not all(0.0 < w < np.inf for w in widths):
-        raise ParameterError(f"region must be two half widths above 0, of the coordinate and of the velocity, got {region!r}")
-    return widths[0], widths[1]
 
 
 def check_states(states: Any) -> np.ndarray:

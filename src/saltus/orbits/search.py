@@ -88,6 +88,7 @@ def search_orbits(
     """
     for name, number in (("longest", longest), ("starts", starts)):
         check_whole(name, number, 1)
+    region = check_region(region)
     system.get(path)
     grid = np.atleast_1d(np.asarray(list(values), dtype=float))
     if not grid.size or not np.isfinite(grid).all():
@@ -115,6 +116,17 @@ def search_orbits(
     columns = np.array(settled, dtype=float).reshape(-1, 4).T
     dots = Settled(columns[0], columns[1].astype(int), columns[2], columns[3])
     return Search(path, tuple(found), grid, starts, longest, region, seed, unsettled, at_rest, dots)
+
+
+def check_region(region: Any) -> tuple[float, float]:
+    """The half widths of a region of initial states: two finite numbers above 0."""
+    try:
+        widths = tuple(float(x) for x in region)
+    except (TypeError, ValueError):
+        widths = ()
+    if len(widths) != 2 or not all(0.0 < w < np.inf for w in widths):
+        raise ParameterError(f"region must be two half widths above 0, of the coordinate and of the velocity, got {region!r}")
+    return widths[0], widths[1]
 
 
 def initial_states(system: System, count: int, region: tuple[float, float], seed: int) -> np.ndarray:

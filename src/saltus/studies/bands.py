@@ -11,7 +11,9 @@ import numpy as np
 
 from saltus.attractors.largest import largest_exponents
 from saltus.flow import simulate_many
-from saltus.orbits.search import initial_states
+from saltus.orbits.find import check_whole
+from saltus.orbits.search import REGION, check_region, initial_states
+from saltus.studies.checks import check_diagram
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -99,7 +101,7 @@ def chaotic_bands(
     *,
     count: int = 121,
     starts: int = 8,
-    region: tuple[float, float],
+    region: tuple[float, float] = REGION,
     seed: int = 0,
     progress: Callable[[float], object] | None = None,
 ) -> Bands:
@@ -112,7 +114,20 @@ def chaotic_bands(
     for chaos nevertheless. Every band is carried on to its neighbours by motions begun on it, and each edge is then halved
     seven times between a value with chaos and one without. Windows of periodic motion between two values of the grid are not
     seen; attractors whose basins hold no start are not either.
+
+    Args:
+        system: what moves, with one coordinate, under a load with a frequency.
+        path, bounds: dotted path of the parameter, and its range.
+        count: of values, evenly from the first bound to the last.
+        starts, region, seed: initial states, as `search_orbits` takes them.
+        progress: called with the fraction done.
+
+    Raises:
+        ParameterError: an argument without meaning.
     """
+    bounds = check_diagram(system, path, bounds, starts=starts, seed=seed)
+    check_whole("count", count, 1)
+    region = check_region(region)
     say = progress or (lambda share: None)
     search = _Search(system, path, starts, region, seed)
     tried = search.spread(search.at(np.linspace(*bounds, count), progress=lambda share: say(0.7 * share)))

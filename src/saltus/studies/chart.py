@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.orbits.find import check_whole
-from saltus.orbits.search import REGION
+from saltus.orbits.search import REGION, check_region
 from saltus.studies.chart_cells import MOTIONS
 from saltus.systems import System
 from saltus.systems.checks import check_number
@@ -178,8 +178,7 @@ def check_options(system: Any, paths: Any, axes: dict[str, np.ndarray], **option
         raise ParameterError(f"longest must be at most 16 forcing periods, got {options['longest']}")
     check_number("least", options["least"], above=0.0)
     check_number("tol", options["tol"], at_least=1e-15, at_most=1e-6)
-    if np.shape(options["region"]) != (2,) or not (np.asarray(options["region"], dtype=float) > 0).all():
-        raise ParameterError(f"region must be two half widths, of the coordinate and its velocity, got {options['region']!r}")
+    check_region(options["region"])
 
 
 def _axis(name: str, values: Any) -> np.ndarray:

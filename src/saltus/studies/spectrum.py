@@ -9,11 +9,11 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.orbits import search_orbits
-from saltus.orbits.branch import STEP, check_bounds
-from saltus.orbits.find import check_whole
-from saltus.orbits.search import REGION
+from saltus.orbits.branch import STEP
+from saltus.orbits.search import REGION, check_region
 from saltus.studies.atlas import Atlas
 from saltus.studies.bands import chaotic_bands
+from saltus.studies.checks import check_diagram
 from saltus.studies.tree import diagram_tree
 from saltus.systems import System
 from saltus.systems.checks import check_number
@@ -101,9 +101,11 @@ def diagram(
     Raises:
         ParameterError: an argument without meaning.
     """
-    low, high = _checked(system, path, bounds, max_period=max_period, starts=starts, seed=seed, repelling=repelling, bands=bands)
+    low, high = check_diagram(
+        system, path, bounds, max_period=max_period, starts=starts, seed=seed, repelling=repelling, bands=bands
+    )
     check_number("step", step, above=0.0)
-    grid, region = _values((low, high), values), _region(region)
+    grid, region = _values((low, high), values), check_region(region)
     if not (progress is None or callable(progress)):
         raise ParameterError(f"progress must be a function of the fraction done and of what is being done, got {progress!r}")
     say = progress or (lambda share, what: None)
@@ -132,26 +134,6 @@ def diagram(
     return tree
 
 
-def _checked(system: System, path: str, bounds: tuple[float, float], **efforts: int) -> tuple[float, float]:
-    """The bounds; refuses, before anything is computed, what would fail later."""
-    if not isinstance(system, System):
-        raise ParameterError(f"a diagram takes a System(model=..., load=..., impact=...), got {system!r}")
-    if system.load.frequency is None:
-        raise ParameterError("a load without a frequency has no periodic orbits to draw; give the Load a frequency")
-    if len(system.model.coordinates) > 1:
-        names = ", ".join(system.model.coordinates)
-        raise ParameterError(f"diagrams are for models with one coordinate, and this one has {names}; see continue_orbit")
-    low, high = check_bounds(bounds)
-    if path not in system.parameters:
-        system.get(path)  # refuses what leads nowhere
-        raise ParameterError(f"{path} is not a number, so there is no diagram along it")
-    for bound in (low, high):
-        system.with_({path: bound})  # refuses bounds beyond what the system allows
-    for name, effort in efforts.items():
-        check_whole(name, effort, 1 if name in ("max_period", "starts") else 0)
-    return low, high
-
-
 def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.ndarray:
     """Where is searched: given values, all within the bounds, or 25 spread evenly between them."""
     if values is None:
@@ -166,14 +148,3 @@ def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.n
     if outside.size:
         raise ParameterError(f"values must lie within the bounds {bounds}, got {outside[0]:g}; widen the bounds or leave it out")
     return grid
-
-
-def _region(region: tuple[float, float]) -> tuple[float, float]:
-    """The half widths of the region of initial states."""
-    try:
-        widths = tuple(float(width) for width in region)
-    except (TypeError, ValueError):
-        widths = ()
-    if len(widths) != 2 or not all(0.0 < width < np.inf for width in widths):
-        raise ParameterError(f"region must be two half widths, of the first coordinate and of its velocity, got {region!r}")
-    return widths[0], widths[1]
