@@ -1,19 +1,7 @@
 """Orbits that several tests look at are found once."""
 
-import functools
-
 import pytest
-from orbit_cases import ORBITS
-
-from saltus import find_orbit
-
-
-@functools.cache
-def orbit_of(name):
-    """The orbit of one of the cases."""
-    system, paths, start = ORBITS[name]
-    return find_orbit(system, parameters=paths, **start)
-
+from orbit_cases import ORBITS, orbit_of
 
 ELSEWHERE = ("ground, restitution of energy", "a user's smooth model", "smoothed", "rocking block")  # each compiles for itself
 

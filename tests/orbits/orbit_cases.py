@@ -1,5 +1,6 @@
 """Systems of the orbit tests, few structures among them: what differs is numbers, and each structure is compiled once."""
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -16,6 +17,7 @@ from saltus import (
     System,
     VelocityReduction,
     WallOscillator,
+    find_orbit,
 )
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
@@ -191,3 +193,10 @@ ORBITS = {  # system, paths, start: one of each kind
     "a user's smooth model": (paired(), PAIRED, PAIRED_START),
     "smoothed": (smoothed(), SMOOTHED, {"theta": 0.3}),
 }
+
+
+@functools.cache
+def orbit_of(name):
+    """The orbit of one of the cases."""
+    system, paths, start = ORBITS[name]
+    return find_orbit(system, parameters=paths, **start)

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import orbit_of
-from orbit_cases import FORCED, forced, walled
+from orbit_cases import FORCED, forced, orbit_of, walled
 
 from saltus import find_orbit, sensitivities, simulate
 
