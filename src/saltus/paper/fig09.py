@@ -78,7 +78,8 @@ FIGURE = PaperFigure(
         "every branch is one of the exact non-smooth equation, followed through its grazings. Dots are attractors that direct "
         "simulation from many starts settled on. Green: the straight line at 100° (erratum 19), dash-dotted, and the kinematic "
         "limit at 200° (erratum 20), dotted, beyond which solutions of the equation are no motions of the mechanism. Insets: "
-        "superharmonic resonances. Motions of up to 6 forcing periods."
+        "superharmonic resonances. Motions of up to 6 forcing periods. Orange: bands in which a motion is chaotic; "
+        "none is quasi-periodic (erratum 22)."
     ),
     compute=compute,
     draw=draw,
