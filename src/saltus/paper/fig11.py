@@ -35,8 +35,8 @@ FIGURE = PaperFigure(
     title="Fig. 11: bifurcation diagrams under load (i), Ω = 0.5 and 1",
     caption=(
         "Largest rotation over one period of the motion against the amplitude Ĥ of the horizontal force H = Ĥ sin Ωτ, V = −0.5, "
-        "β₀ = 80°, C = 0.1, lines, dots and bands as in Fig. 9. Purple: the quasi-static bifurcation at Hcr = |V/tan β₀|, below which "
-        "the undeformed state is held; stable motions exist beside it from far smaller amplitudes on (insets)."
+        "β₀ = 80°, C = 0.1, lines, dots and bands as in Fig. 9. Purple: the quasi-static bifurcation at Hcr = |V/tan β₀|, below "
+        "which the undeformed state is held; stable motions exist beside it from far smaller amplitudes on (insets)."
     ),
     compute=compute,
     draw=draw,

@@ -81,8 +81,8 @@ FIGURE = PaperFigure(
     title="Fig. 13: bifurcation diagram under load (iii)",
     caption=(
         "Largest (above) and least rotation (below) over one period of the motion against Ĥ under H = Ĥ sin Ωτ and "
-        "V = V̄ + V̂ cos Ωτ, V̄ = −0.5, V̂ = 0.25, Ω = 1, β₀ = 80°, C = 0.1; lines, dots and bands as in Fig. 11. The load is no longer "
-        "symmetric, and no motion is its own mirror image."
+        "V = V̄ + V̂ cos Ωτ, V̄ = −0.5, V̂ = 0.25, Ω = 1, β₀ = 80°, C = 0.1; lines, dots and bands as in Fig. 11. The load is no "
+        "longer symmetric, and no motion is its own mirror image."
     ),
     compute=compute,
     draw=draw,
