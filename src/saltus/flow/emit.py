@@ -1,4 +1,4 @@
-"""From a trace to the source of its kernel: Taylor recurrences and the contact's functions, as plain loops for numba.
+"""From a trace to the source of its kernel: Taylor recurrences and the contact's functions, as plain loops, see `lowered.py`.
 
 A node of degree 0 in the time is a scalar; every other node is a row of the workspace `w`, whose column k is its k-th Taylor
 coefficient. With u = sum u_k tau^k the recurrences are the classical ones, each from the differential equation that its
@@ -62,7 +62,7 @@ class Emitter:
     def _constants(self) -> str:
         """The function that fills the table `c` from the parameters `p`, once for a motion."""
         names = {node: f"c[{i}]" for node, i in self.constants.items()}
-        lines = ["@cached_jit(CONSTANTS, fused=False)", "def constants(p, c):"]
+        lines = ["@lowered_jit(CONSTANTS, fused=False, python=True)", "def constants(p, c):"]
         for node in ordered(list(self.constants)):
             if node.op in ("number", "parameter"):
                 continue
@@ -79,7 +79,7 @@ class Emitter:
     def _geometry(self) -> str:
         """The function that gives the coordinate at contact and the gap's rate there on both sides."""
         point, rate = self.trace.contact, self.trace.gap_rate
-        lines = ["@cached_jit(GEOMETRY)", "def geometry(env, out):", UNPACK]
+        lines = ["@lowered_jit(GEOMETRY, python=True)", "def geometry(env, out):", UNPACK]
         if point is not None and rate is not None:
             sides = [substitute(rate, {Expr("side"): s}) for s in (1.0, -1.0)]
             lines += [f"    out[{i}] = {self._constant(root)}" for i, root in enumerate([point, *sides])]
@@ -87,7 +87,7 @@ class Emitter:
 
     def _pointwise(self, signature: str, name: str, arguments: str, roots: list[Expr | None]) -> str:
         """A function of one instant that returns the values of `roots`."""
-        decorator = f"@cached_jit({signature}, fused=False)"
+        decorator = f"@lowered_jit({signature}, fused=False)"
         head = f"def {name}({arguments + ', ' if arguments else ''}{CONTEXT}):"
         if roots[0] is None:
             return "\n".join([decorator, head, f"    return {', '.join(['0.0'] * len(roots))}", "", ""])
@@ -163,7 +163,7 @@ class _SeriesWriter:
         self.emitter.most_rows = max(self.emitter.most_rows, self.rows)
         indent = [f"    {line}" for line in [*self.scalars, "k = 0", *self.first]]
         loop = ["    for k in range(1, order + 1):", *(f"        {line}" for line in self.later)] if self.later else []
-        return "\n".join([f"@cached_jit({signature})", head, UNPACK, *indent, *loop, "", ""])
+        return "\n".join([f"@lowered_jit({signature})", head, UNPACK, *indent, *loop, "", ""])
 
     def both(self, line: str) -> None:
         self.first.append(line)

@@ -36,7 +36,7 @@ def tangent_source(emitter: Emitter) -> str:
     how much the event moves.
     """
     trace = emitter.trace
-    lines = ["@cached_jit(TANGENT, fused=False)", "def tangent(kind, detail, t, origin, side, env, piece, state):"]
+    lines = ["@lowered_jit(TANGENT, fused=False)", "def tangent(kind, detail, t, origin, side, env, piece, state):"]
     lines.append("    p, c, breaks, table = env")
     for kind, detail, changes in _events(trace) if trace.columns else []:
         statements, values = emitter.statements(list(changes.values()), lambda node: _place(trace, node), first=len(lines))

@@ -22,13 +22,20 @@ lean_jit: Callable[[Any], Any] = njit(**_LEAN)
 inline_jit: Callable[[Any], Any] = njit(**_LEAN, forceinline=True)  # for what every step of the lanes calls
 
 
-def cached_jit(signature: Any, fused: bool = True, nogil: bool = False) -> Callable[[Any], Any]:
-    """Compile for one signature at once, and keep the result on disk; if asked, without fused multiply-adds or Python's lock.
+def cached_jit(signature: Any, nogil: bool = False) -> Callable[[Any], Any]:
+    """Compile for one signature at once, and keep the result on disk; if asked, without Python's lock."""
+    decorator: Callable[[Any], Any] = njit(signature, cache=True, nogil=nogil, **OPTIONS)
+    return decorator
 
-    A law that takes the difference of two equal products must get 0, not the rounding of one of them.
+
+def pointed_jit(signature: Any, fused: bool = True, python: bool = False) -> Callable[[Any], Any]:
+    """The same for a function that makes no array and is called through pointers, or, if asked, from Python too.
+
+    Not fused, it has no fused multiply-adds: a law that takes the difference of two equal products must get 0, not the rounding
+    of one of them.
     """
     options = OPTIONS if fused else {**OPTIONS, "fastmath": False}
-    decorator: Callable[[Any], Any] = njit(signature, cache=True, nogil=nogil, **options)
+    decorator: Callable[[Any], Any] = njit(signature, cache=True, _nrt=False, no_cpython_wrapper=not python, **options)
     return decorator
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +18,13 @@ from saltus.orbits.problem import Problem
 from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.special import SpecialPoint, UserFunction
 from saltus.orbits.symmetry import half, keeps_symmetry, whole
-from saltus.orbits.walk import CLOSED, STEP, Walk
+from saltus.orbits.walk import CLOSED, STEP, UNSTABLE, Walk
 
 if TYPE_CHECKING:
     import xarray
+
+
+NEARBY = 1.0  # the longest step towards a value not far away, of the way there and of the units of the phases and the speeds
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,15 +117,7 @@ def continue_orbit(
     Raises:
         ParameterError: an unknown parameter, bounds that exclude the orbit.
     """
-    low, high = check_bounds(bounds)
-    value = orbit.system.get(path) if path in orbit.system.parameters else None
-    if value is None:
-        orbit.system.get(path)  # refuses what leads nowhere
-        raise ParameterError(f"{path} is not a number, so an orbit cannot be continued along it")
-    if not low <= value <= high:
-        raise ParameterError(f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range")
-    for bound in (low, high):
-        orbit.system.with_({path: bound})  # refuses bounds beyond what the system allows
+    low, high = _checked(orbit, path, bounds)
     if isinstance(orbit, RestingOrbit):
         from saltus.orbits.resting_branch import continue_resting  # which gives a Branch
 
@@ -151,6 +146,24 @@ def continue_orbit(
     )
 
 
+def follow_stable(orbit: PeriodicOrbit, path: str, target: float) -> Branch:
+    """The branch of a stable orbit towards a value of the parameter not far away, up to there or to just beyond the loss of
+    its stability; in long steps, to find that out."""
+    value = float(orbit.system.get(path))
+    low, high = _checked(orbit, path, (min(value, target), max(value, target)))
+    if isinstance(orbit, RestingOrbit):
+        from saltus.orbits.resting_branch import continue_resting
+
+        branch = continue_resting(orbit, path, (low, high), {}, NEARBY, None)
+        if target > value:
+            return branch
+        return replace(branch, points=branch.points[::-1], special=branch.special[::-1], ends=(branch.ends[1], branch.ends[0]))
+    begin, symmetric = along(orbit, path)
+    walk = Walk((low, high), {}, NEARBY, None, UNSTABLE)
+    walk.follow(start(begin, high - low, symmetric, target > value), step=0.1 * NEARBY)
+    return Branch(path, tuple(walk.points), tuple(walk.special), ("start", walk.reason), missed=tuple(walk.missed))
+
+
 def follow_from(
     first: Point,
     path: str,
@@ -164,6 +177,20 @@ def follow_from(
     walk = Walk(bounds, functions or {}, step, None, until)
     walk.follow(first, born=True)
     return Branch(path, tuple(walk.points), tuple(walk.special), (origin, walk.reason), origin, tuple(walk.missed))
+
+
+def _checked(orbit: PeriodicOrbit, path: str, bounds: Any) -> tuple[float, float]:
+    """Bounds of a parameter that the system allows and between which the orbit lies."""
+    low, high = check_bounds(bounds)
+    value = orbit.system.get(path) if path in orbit.system.parameters else None
+    if value is None:
+        orbit.system.get(path)  # refuses what leads nowhere
+        raise ParameterError(f"{path} is not a number, so an orbit cannot be continued along it")
+    if not low <= value <= high:
+        raise ParameterError(f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range")
+    for bound in (low, high):
+        orbit.system.with_({path: bound})  # refuses bounds beyond what the system allows
+    return low, high
 
 
 def check_bounds(bounds: Any) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from saltus.orbits.problem import Problem
 from saltus.orbits.special import SpecialPoint, UserFunction, asymmetry, grazing, located, parent_point, tests_between
 
 CLOSED = "closes"
+UNSTABLE = "is no longer stable"
 ANGLE = 0.12  # rad between the tangents of neighbouring points that is aimed at,
 SHARPEST = 0.5  # and the most that is accepted
 STEP = 0.1  # the longest step: a thirtieth of the parameter's range, or a tenth of a radian and of a unit of speed
@@ -41,17 +42,17 @@ class Walk:
     functions: dict[str, UserFunction]
     longest: float
     progress: Callable[[float], object] | None
-    until: str | None = None  # the kind of special point at which to stop
+    until: str | None = None  # the kind of special point at which to stop, or UNSTABLE: beyond the loss of stability
     points: list[Point] = field(default_factory=list)
     special: list[SpecialPoint] = field(default_factory=list)
     missed: list[str] = field(default_factory=list)  # test functions that changed their sign where no zero was found
     before: Point | None = None  # from which the last step was made
     reason: str = ""
 
-    def follow(self, first: Point, born: bool = False) -> None:
+    def follow(self, first: Point, born: bool = False, step: float = FIRST_STEP) -> None:
         """Follow the branch from a point until it ends; `born` at a special point, whose kind is not to be found again."""
         self.points.append(first)
-        step, at_birth = min(FIRST_STEP, self.longest), born
+        step, at_birth = min(step, self.longest), born
         while not self.reason:
             point = self.points[-1]
             ahead, step = self._step(point, step)
@@ -131,6 +132,8 @@ class Walk:
                 return None
             self.special.append(graze)
             return self._switch(graze)
+        elif self.until == UNSTABLE and not ahead.orbit.stable:
+            self.reason = UNSTABLE
         if self.progress is not None:
             self.progress(ahead.parameter)
         return None

@@ -6,16 +6,19 @@ Results travel to this process, which writes them: the machines need no disk in 
 from __future__ import annotations
 
 import contextlib
+import time
 from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
 from saltus.errors import SweepError
 from saltus.sweep.chunk import Raised, attempt
+from saltus.sweep.interrupt import remembered
 from saltus.sweep.layout import Index
 from saltus.sweep.plan import Plan
 
 PATIENCE = 5.0  # s, for the scheduler to answer, and for it to have a worker
+POLL = 0.01  # s, between two looks at whether a chunk has come, or an interrupt
 AHEAD = 2  # chunks for each of the cluster's threads: one in work, one waiting; more would only fill memory
 
 
@@ -34,18 +37,23 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
 
         done = as_completed(loop=client.loop, with_results=True, raise_errors=False)
         flying: dict[str, Index] = {}
-        while queue or flying:
-            while queue and len(flying) < max(AHEAD, AHEAD * sum(client.nthreads().values())):
-                index = queue.popleft()
-                # Not pure: Dask would keep what a failed chunk raised, and not try it again.
-                future = client.submit(attempt, plan.function, plan.arguments, plan.block(index), pure=False)
-                flying[future.key] = index
-                done.add(future)
-            future, result = next(done)
-            if future.status in ("cancelled", "lost"):
-                raise OSError("the task was given up")
-            yield flying.pop(future.key), Raised(_said(result)) if future.status == "error" else result
-            del future, result  # so that the cluster forgets them
+        with remembered() as heed:
+            while queue or flying:
+                heed()
+                while queue and len(flying) < max(AHEAD, AHEAD * sum(client.nthreads().values())):
+                    index = queue.popleft()
+                    # Not pure: Dask would keep what a failed chunk raised, and not try it again.
+                    future = client.submit(attempt, plan.function, plan.arguments, plan.block(index), pure=False)
+                    flying[future.key] = index
+                    done.add(future)
+                while not done.has_ready():
+                    heed()
+                    time.sleep(POLL)
+                future, result = next(done)
+                if future.status in ("cancelled", "lost"):
+                    raise OSError("the task was given up")
+                yield flying.pop(future.key), Raised(_said(result)) if future.status == "error" else result
+                del future, result  # so that the cluster forgets them
     except OSError as error:
         raise SweepError(
             f"the Dask scheduler at {address} has gone away ({_first_line(error)}); run the same again to go on"

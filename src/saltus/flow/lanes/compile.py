@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.jit import cached_jit, inline_jit, jit, lean_jit
+from saltus.flow.jit import cached_jit, inline_jit, jit, lean_jit, pointed_jit
 from saltus.flow.lanes.signatures import LANE_FIELD, LANE_IMPACT, LANE_ROOT, LANE_SERIES, RUN_LANES, TURNING_RANGE, VISIT_LANE
 from saltus.flow.lanes.straight import Slots, write_field, write_impact, write_series
 from saltus.flow.lanes.vector import *

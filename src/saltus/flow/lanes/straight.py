@@ -112,7 +112,7 @@ def source(trace: Trace, emitter: Emitter) -> str:
         "_series, _impact, _field = write_series(SLOTS, *SERIES), write_impact(SLOTS, *IMPACT), write_field(SLOTS, *FIELD)",
     ]
     for name, arguments in (("series", "m, order"), ("impact", "m"), ("field", "m")):
-        lines += ["", "", f"@cached_jit(LANE_{name.upper()})", f"def lane_{name}({arguments}):", f"    _{name}({arguments})"]
+        lines += ["", "", f"@pointed_jit(LANE_{name.upper()})", f"def lane_{name}({arguments}):", f"    _{name}({arguments})"]
     return "\n".join([*lines, ""])
 
 

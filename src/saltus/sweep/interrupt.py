@@ -1,0 +1,35 @@
+"""Interrupts that are remembered until they can be heeded."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+
+@contextmanager
+def remembered() -> Iterator[Callable[[], None]]:
+    """Within it an interrupt (Ctrl-C) raises nothing; the function that is given raises KeyboardInterrupt if there was one.
+
+    Python raises it wherever the main thread happens to be: in a destructor of another library, where it is lost, or halfway
+    through one of its locks. Outside the main thread signals do not arrive, and nothing changes.
+    """
+    seen: list[int] = []
+
+    def heed() -> None:
+        if seen:
+            raise KeyboardInterrupt
+
+    def remember(number: int, _: Any) -> None:
+        seen.append(number)
+
+    try:
+        before = signal.signal(signal.SIGINT, remember)
+    except ValueError:
+        yield heed
+        return
+    try:
+        yield heed
+    finally:
+        signal.signal(signal.SIGINT, before)
