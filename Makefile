@@ -18,7 +18,9 @@ help:
 reproduce: $(READY)
 	$(BIN)/saltus reproduce
 
-test: lint
+# On a new machine the compiler and the type checker, of one core each, work beside one another.
+test: $(READY)
+	@$(BIN)/python tests/compile_first.py & $(MAKE) --no-print-directory lint; passed=$$?; wait; exit $$passed
 	$(BIN)/python -m pytest
 
 thorough: $(READY)

@@ -7,10 +7,13 @@ import pytest
 import xarray as xr
 from study_cases import forced
 
+import saltus
 from saltus.orbits import continue_orbit, continue_special, find_orbit
-from saltus.studies.borders import Borders, curve_dataset, disagreements, exact_borders, lost
+from saltus.orbits.branch import follow_stable
+from saltus.studies.borders import HARMLESS, Borders, curve_dataset, disagreements, exact_borders, with_borders
 from saltus.studies.chart import stability_chart
-from saltus.studies.chart_ends import ends_of, explained, read
+from saltus.studies.chart_ends import ends_of, explained, keys_of, read
+from saltus.studies.chart_follow import KINDS, MISSED, Follower, lost
 from saltus.theory import high_frequency_onset, unloaded_fold
 
 H, V = "load.horizontal.amplitude", "load.vertical"
@@ -102,25 +105,108 @@ def test_the_onset_at_high_frequency_is_the_closed_form(W):
 
 def test_borders_are_kept_whole(tmp_path):
     again = Borders.from_xarray(borders().to_xarray())
-    assert again.ends == borders().ends
+    xr.testing.assert_identical(again.to_xarray()["ends"].to_dataset(), borders().to_xarray()["ends"].to_dataset())
+    assert again.ends.keys() == borders().ends.keys()
     for one, two in zip(borders().curves, again.curves, strict=True):
         xr.testing.assert_identical(one, two)
     assert disagreements(chart(), again).identical(disagreements(chart(), borders()))
 
 
-def onset_branch():
-    """The branch through the onset, from its stable end at Hhat = 0.04."""
-    return continue_orbit(find_orbit(forced(H=0.04), theta=0.3), H, (0.0215, 0.04))
+def towards_the_onset():
+    """The stable branch from Hhat = 0.04 down through the onset."""
+    return follow_stable(find_orbit(forced(H=0.04), theta=0.3), H, 0.0215)
 
 
 def test_the_point_where_stability_is_lost_is_found_from_its_stable_end():
-    branch = continue_orbit(find_orbit(forced(H=0.2), theta=0.3), H, (0.06, 0.2))
-    assert "no loss" in lost(branch)  # stable from bound to bound
-    assert "no loss" in lost(branch, backwards=True)
-    special = lost(onset_branch(), backwards=True)
+    orbit = find_orbit(forced(H=0.2), theta=0.3)
+    for target in (0.06, 0.25):
+        branch = follow_stable(orbit, H, target)
+        assert branch.points[-1].parameter == target
+        assert "no loss" in lost(branch)
+    special = lost(towards_the_onset())
     assert special.kind == "LP"
     assert special.parameter == pytest.approx(0.0219879514, abs=1e-10)
-    assert lost(onset_branch()) == "the orbit is not stable to its multipliers"
+    unstable = towards_the_onset().points[-1].orbit
+    assert lost(follow_stable(unstable, H, 0.023)) == "the orbit is not stable to its multipliers"
+
+
+def test_the_stable_part_of_a_branch_is_that_of_the_whole_one():
+    """Its last point but one is stable; no special point of the whole branch lies before the one that it ends at."""
+    part = towards_the_onset()
+    whole = continue_orbit(find_orbit(forced(H=0.04), theta=0.3), H, (0.0215, 0.04))
+    assert not part.points[-1].orbit.stable
+    assert all(point.orbit.stable for point in part.points[:-2])
+    assert [s.kind for s in part.special] == ["LP"]
+    assert part.special[0].parameter == pytest.approx(next(s.parameter for s in whole.special if s.kind == "LP"), rel=1e-12)
+
+
+def test_every_end_without_a_curve_is_a_special_point_between_its_cells():
+    """Without any curve: what is known of each change is known from continuation between its two cells alone."""
+    whole, alone = with_borders(forced(), chart(), most=0)
+    cells = read(whole)
+    assert alone.curves == []
+    assert set(alone.ends) == set(keys_of(cells, ends_of(cells)))
+    left = disagreements(whole, alone)
+    assert left.sizes["change"] == left.attrs["on_curves"] == 0
+    onset, found = of("LP", 2, borders().curves), 0
+    for (row, column, _, to_row, to_column), ending in alone.ends.items():
+        assert ending.said in KINDS + HARMLESS
+        if ending.said in KINDS:
+            for value, axis, ends_at in ((ending.horizontal, cells.horizontal, (column, to_column)),
+                                         (ending.vertical, cells.vertical, (row, to_row))):  # fmt: skip
+                low, high = sorted(axis[list(ends_at)])
+                assert low <= value <= high
+        if ending.said == "LP" and row == to_row and ending.vertical > -1.1 and ending.amplitude > 0.15:
+            found += 1
+            assert ending.horizontal == pytest.approx(at(onset, ending.vertical), rel=1e-3)
+    assert found >= 3
+
+
+def test_what_continuation_adds_to_a_chart_are_motions_that_repeat():
+    """A chart that has lost some of its motions gets them back, in order, from those of their neighbours."""
+    poor, inside = chart().copy(deep=True), (chart()["count"] > 0).values
+    inside[:, :5], inside[:, 6:] = False, False  # one column of cells
+    for name in poor.data_vars:
+        if name.startswith("motion_"):
+            poor[name].values[inside] = np.nan if poor[name].dtype.kind == "f" else 0
+    poor["count"].values[inside] = 0
+    whole, _ = with_borders(forced(), poor, most=0)
+    assert whole.attrs["added_by_continuation"] >= inside.sum()
+    both = (whole["count"].values > 0) & (chart()["count"].values > 0)
+    assert both[inside].mean() > 0.8
+    np.testing.assert_allclose(whole["amplitude"].values[both], chart()["amplitude"].values[both], rtol=1e-4)
+    sizes = whole["motion_amplitude"].values
+    assert (np.diff(np.where(np.isfinite(sizes), sizes, -1.0), axis=2) <= 0).all()
+    np.testing.assert_array_equal(np.isfinite(sizes).sum(axis=2), whole["count"].values)
+    for row, column in np.argwhere(inside & (whole["count"].values > 0)):
+        cell = whole.isel(vertical=row, horizontal=column)
+        system = forced().with_({H: float(cell["horizontal"]), V: float(cell["vertical"])})
+        for i in range(int(cell["count"])):
+            theta, velocity = (float(cell[f"motion_{name}"][i]) for name in ("theta", "velocity"))
+            end = saltus.simulate(system, theta=theta, velocity=velocity, periods=int(cell["motion_period"][i]), dense=False)
+            assert end.theta == pytest.approx(theta, abs=1e-7)
+
+
+def test_a_motion_that_goes_on_where_the_chart_has_none_is_told():
+    cells = read(chart())
+    follower = Follower(forced(), chart(), cells)
+    ends = ends_of(cells)
+    inside = next(
+        i for i in range(len(cells.rank)) if cells.horizontal[cells.cell[i, 1]] > 0.08 and cells.vertical[cells.cell[i, 0]] > -0.9
+    )
+    target = cells.cell[inside] + (0, 1)
+    end = type(ends)(np.array([inside]), cells.cell[[inside]], target[None])
+    assert follower.follow(end)[0].said in HARMLESS
+    without = read(
+        chart().assign(motion_amplitude=chart()["motion_amplitude"].where(chart()["horizontal"] < cells.horizontal[target[1]]))
+    )
+    other = Follower(forced(), chart(), without)
+    same = next(
+        i
+        for i in range(len(without.rank))
+        if (without.cell[i] == cells.cell[inside]).all() and without.rank[i] == cells.rank[inside]
+    )
+    assert other.follow(type(ends)(np.array([same]), end.source, end.target))[0].said == MISSED
 
 
 def test_a_curve_explains_only_what_ends_on_it():
@@ -138,7 +224,7 @@ def test_a_curve_explains_only_what_ends_on_it():
 
 
 def test_a_curve_is_told_in_the_order_of_the_charts_axes():
-    locus = continue_special(lost(onset_branch(), backwards=True), V, bounds=(-0.6, -0.4), first_bounds=(0.02, 0.04))
+    locus = continue_special(lost(towards_the_onset()), V, bounds=(-0.6, -0.4), first_bounds=(0.02, 0.04))
     told = curve_dataset(locus, [H, V])
     turned = curve_dataset(locus, [V, H])
     np.testing.assert_array_equal(told["vertical"], turned["horizontal"])

@@ -34,8 +34,8 @@ def pointed_jit(signature: Any, fused: bool = True, python: bool = False) -> Cal
     Not fused, it has no fused multiply-adds: a law that takes the difference of two equal products must get 0, not the rounding
     of one of them.
     """
-    options = OPTIONS if fused else {**OPTIONS, "fastmath": False}
-    decorator: Callable[[Any], Any] = njit(signature, cache=True, _nrt=False, no_cpython_wrapper=not python, **options)
+    options: Any = {"_nrt": False, "no_cpython_wrapper": not python, **OPTIONS} | ({} if fused else {"fastmath": False})
+    decorator: Callable[[Any], Any] = njit(signature, cache=True, **options)
     return decorator
 
 

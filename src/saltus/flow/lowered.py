@@ -85,7 +85,7 @@ class _Writer:
             return _Array(made.data, tuple(cgutils.unpack_tuple(self.builder, made.shape, kind.ndim)))
         if isinstance(kind, types.BaseTuple):
             parts = cgutils.unpack_tuple(self.builder, value, len(kind))
-            return tuple(self.argument(each, part) for each, part in zip(kind, parts, strict=True))
+            return tuple(self.argument(each, part) for each, part in zip(kind, parts, strict=True))  # type: ignore[call-overload]
         return value
 
     def returned(self, kind: Any, value: Any) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 from saltus.paper import spectra
 from saltus.paper.panels import each
 from saltus.paper.provenance import dataset
-from saltus.plots.chart import draw_borders, draw_chart, draw_closed_form, draw_static, legend
+from saltus.plots.chart import draw_borders, draw_chart, draw_closed_form, draw_ends, draw_static, legend
 from saltus.plots.style import DOUBLE_COLUMN, new_figure, panel_label, styled
 
 REGION = (2.0, 2.0)  # of the initial states
@@ -47,13 +47,13 @@ def panel(
     """Groups `chart`, `borders` (see `saltus.studies.borders`), `disagreements` and `static`."""
     import xarray as xr
 
-    from saltus.studies.borders import disagreements, exact_borders
+    from saltus.studies.borders import disagreements, with_borders
     from saltus.studies.chart import stability_chart
 
     here = system(beta0, damping, frequency)
     horizontal, vertical = np.linspace(0.0, widest, size), np.linspace(LOWEST, 0.0, size)
     chart = stability_chart(here, horizontal=horizontal, vertical=vertical, **({"region": REGION} | options))
-    borders = exact_borders(here, chart, most=curves)
+    chart, borders = with_borders(here, chart, most=curves)
     chart.attrs = {name: value for name, value in chart.attrs.items() if name != "plan"}
     groups = {"chart": chart, "static": static_borders(math.radians(beta0)), "disagreements": disagreements(chart, borders)}
     tree = xr.DataTree.from_dict(groups).assign({"borders": borders.to_xarray()})
@@ -103,6 +103,7 @@ def draw(data: Any, columns: int, height: float) -> Any:
     for ax, (name, tree) in zip(axes, panels, strict=False):
         cells = draw_chart(ax, tree["chart"].to_dataset(), top) or cells
         draw_borders(ax, curves_of(tree))
+        draw_ends(ax, tree["chart"].to_dataset(), tree["borders"]["ends"].to_dataset())
         draw_static(ax, tree["static"])
         fast |= _closed_form(ax, tree)
         panel_label(ax, name)

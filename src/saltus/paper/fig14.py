@@ -43,7 +43,8 @@ FIGURE = PaperFigure(
         "all starts the motion comes to rest. Grey: none settles on a motion of up to six periods (chaos). Dotted: several "
         "such motions, those of at least 0.001 rad counted. Red: quasi-static border, with the fold of equilibria "
         "below V̄ = −sin β₀ (erratum 23); red dots: the rest of the paper's line. Black: exact curves on which motions are born "
-        "(folds) or lose their stability. Green: beyond it the largest motion passes the straight line."
+        "(folds) or lose their stability; dots: such places beside rest through which no curve goes. Green: beyond it the "
+        "largest motion passes the straight line."
     ),
     compute=compute,
     draw=draw,

@@ -15,7 +15,7 @@ WHERE = "section 6, text on the stability charts"
 SHALLOW = -1.0  # V above which no deformed equilibrium is there without a horizontal load, for any of the charts
 PRIMARY = (0.7, 1.6)  # Omega about 1: the frequencies of Fig. 14 beside it
 NARROW = 0.15  # of the quasi-static domain
-FEW = 0.1  # of the changes beside rest: not on a curve, as where chaos ends
+FEW = 0.01  # of the changes: at no special point that could be located
 SLIGHT = 0.15  # relative
 ROWS = np.linspace(-1.2, -0.2, 41)  # V at which the onset is compared
 
@@ -148,25 +148,27 @@ def _closed_form(panels: dict[float, Any]) -> Claim:
 
 
 def agreement(name: str, data: Any) -> Claim:
-    """Charts from simulation against curves from continuation, judged where the border is not that of chaos."""
+    """Charts from simulation against orbits from continuation: every motion of a cell that its neighbour lacks."""
     judged, parts = [], []
     for tree in data.children.values():
         differ, frequency = tree["disagreements"].to_dataset(), float(tree.attrs["frequency"])
-        border, total = int(differ.attrs["changes_beside_rest"]), int(differ.attrs["changes"])
-        beside = int(differ["beside_rest"].astype(bool).sum())
-        judged += [border > 0 and beside <= FEW * border] if frequency >= PRIMARY[0] else []
+        total, border, curves, chaos = (
+            int(differ.attrs[key]) for key in ("changes", "changes_beside_rest", "on_curves", "chaos_beside_rest")
+        )
+        left, beside = differ.sizes["change"], int(differ["beside_rest"].astype(bool).sum())
+        added = int(tree["chart"].attrs.get("added_by_continuation", 0))
+        judged += [left <= FEW * total, beside <= FEW * border]
         parts.append(
-            f"Ω = {frequency:g}: {border - beside} of {border} (of all changes {total - differ.sizes['change']} of {total})"
+            f"Ω = {frequency:g}: {total - left} of {total} ({curves} on curves; beside rest alone {border - beside} of {border}, "
+            f"and {chaos} of chaos; {added} motions of cells from continuation alone)"
         )
     return check(
         f"{name}-agreement",
         WHERE,
-        "For Ω from 0.75 on, the border of the region where rest is alone is where motions are born or lose their stability",
+        "Where a motion is in a cell of a chart and not in its neighbour it is born or loses its stability between them",
         printed=bool(judged) and all(judged),
-        evidence="changes between a cell with motions and a neighbour with rest alone that lie on the exact curves that were "
-        "followed, "
-        + "; ".join(parts)
-        + ". At lower frequencies part of that border is where chaos ends, which no such curve shows",
+        evidence="changes between neighbouring cells at a fold, period doubling, symmetry breaking or grazing that was located "
+        "between them, " + "; ".join(parts),
     )
 
 

@@ -133,6 +133,24 @@ def draw_borders(ax: Any, curves: Sequence[Any]) -> None:
         )
 
 
+def draw_ends(ax: Any, chart: Any, ends: Any) -> None:
+    """The exact places at which a motion ends beside rest alone and no curve was followed, as dots."""
+    kinds = np.isin(ends["said"].values, list(BORDERS))
+    target = ends["key"].values[:, 3:]
+    resting = ((chart["count"] == 0) & (chart["unsettled"] == 0)).transpose("vertical", "horizontal").values
+    shown = kinds & resting[target[:, 0], target[:, 1]]
+    ax.plot(
+        ends["horizontal"].values[shown],
+        ends["vertical"].values[shown],
+        linestyle="none",
+        marker=".",
+        color=INK,
+        markersize=2.0,
+        markeredgewidth=0.0,
+        zorder=5,
+    )
+
+
 def legend(figure: Any, curves: Sequence[Any], closed_form: bool = False) -> None:
     """What the lines and fillings mean, below all panels."""
     from matplotlib.lines import Line2D

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import MotionError, ParameterError
-from saltus.orbits import SpecialPoint, continue_special
+from saltus.orbits import PeriodicOrbit, SpecialPoint, continue_special
+from saltus.studies.chart_complete import ADDED, with_motions
 from saltus.studies.chart_ends import Cells, Ends, ends_of, explained, keys_of, passes, read, unseen
 from saltus.studies.chart_follow import CONTINUED, KINDS, SHRINKS, Ending, Follower
 from saltus.systems import System
@@ -36,9 +37,8 @@ class Borders:
     ends: dict[tuple[int, ...], Ending] = field(default_factory=dict)  # by their keys
 
     def to_xarray(self) -> xarray.DataTree:
-        """The curves as groups, and the changes on none of them in the group `ends`: `key` (row, column and rank of the motion,
-        row and column of the neighbour), what is known of it, `said`, and where it ends: `horizontal`, `vertical`, `amplitude`.
-        """
+        """The curves as groups, and the changes on none of them in the group `ends`: `key` (see `chart_ends.keys_of`), what is
+        known, `said`, and where the motion ends: `horizontal`, `vertical`, `amplitude`."""
         import xarray as xr
 
         keys, rows = list(self.ends), [astuple(ending) for ending in self.ends.values()]
@@ -76,6 +76,35 @@ def exact_borders(
         most: how many curves at most.
         progress: called with the share of the changes that are explained.
     """
+    return _borders(system, chart, most, progress)[0]
+
+
+def with_borders(
+    system: System, chart: xarray.Dataset, *, most: int = MOST, progress: Callable[[float], object] | None = None
+) -> tuple[xarray.Dataset, Borders]:
+    """A chart with the stable motions that go on into a cell where no start has led to them, and the exact borders of it.
+
+    Arguments as of `exact_borders`. The chart's attribute `added_by_continuation` is the number of motions added.
+    """
+    borders, missed = _borders(system, chart, most, progress)
+    chart = chart.assign_attrs({ADDED: 0})
+    while missed:
+        before, chart = chart, with_motions(chart, system, missed)
+        if chart.attrs[ADDED] == before.attrs[ADDED]:
+            break
+        cells, follower = read(chart), Follower(system, chart, read(chart))
+        every = ends_of(cells)
+        borders.ends = {key: borders.ends[key] for key in keys_of(cells, every) if key in borders.ends}
+        fresh = np.array([key not in borders.ends for key in keys_of(cells, every)], dtype=bool)
+        _locate(follower, cells, every.only(fresh & ~explained(cells, every, borders.curves)), borders, None)
+        missed = follower.missed
+    return chart, borders
+
+
+def _borders(
+    system: System, chart: xarray.Dataset, most: int, progress: Callable[[float], object] | None
+) -> tuple[Borders, list[tuple[int, int, PeriodicOrbit]]]:
+    """The borders of a chart, and the orbits that it lacks: row, column, orbit."""
     found, cells = Borders(), read(chart)
     waiting, follower = ends_of(cells), Follower(system, chart, cells)
     total, looks, easy = max(len(waiting), 1), LOOKS * most, EASY * most
@@ -91,12 +120,17 @@ def exact_borders(
         else:
             found.curves.append(curve)
         waiting = waiting.only(~first & ~explained(cells, waiting, found.curves[before:]))
-    for done, i in enumerate(np.argsort(waiting.motion, kind="stable")):  # all changes of a motion, one after the other
-        if progress is not None:
-            progress(1 - (len(waiting) - done) / total)
-        end = waiting.only(np.array([i]))
+    _locate(follower, cells, waiting, found, None if progress is None else lambda left: progress(1 - left / total))
+    return found, follower.missed
+
+
+def _locate(follower: Follower, cells: Cells, ends: Ends, found: Borders, left: Callable[[int], object] | None) -> None:
+    """Follow each of these changes; all of one motion are one after the other."""
+    for done, i in enumerate(np.argsort(ends.motion, kind="stable")):
+        if left is not None:
+            left(len(ends) - done)
+        end = ends.only(np.array([i]))
         found.ends[keys_of(cells, end)[0]] = follower.follow(end)[0]
-    return found
 
 
 def _most_urgent(cells: Cells, waiting: Ends) -> np.ndarray:
@@ -131,7 +165,8 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
         `horizontal` and `vertical` halfway between the cells, `amplitude` and `period` of the motion that ends, `cells` of its
         family, and whether the neighbour has rest alone, `beside_rest`; and along `unseen` the places on the curves of folds
         beside which no cell has the motions that end there. The attributes `changes` and `changes_beside_rest` count all that
-        there are.
+        there are, `on_curves` those that a curve explains; `chaos_beside_rest` counts pairs of neighbouring cells, one with rest
+        alone and one where no start settles, between which no motion ends but chaos.
     """
     import xarray as xr
 
@@ -139,7 +174,8 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     ends = ends_of(cells)
     known = {key for key, ending in borders.ends.items() if ending.said in HARMLESS + KINDS}
     located = np.array([key in known for key in keys_of(cells, ends)], dtype=bool)
-    left = ends.only(~explained(cells, ends, borders.curves) & ~located)
+    on_curves = explained(cells, ends, borders.curves)
+    left = ends.only(~on_curves & ~located)
     middle, lonely = (left.source + left.target) / 2, unseen(cells, borders.curves)
     columns = {
         "amplitude": cells.amplitude[left.motion],
@@ -151,8 +187,21 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     for i, (name, axis) in enumerate((("vertical", cells.vertical), ("horizontal", cells.horizontal))):
         data[name] = ("change", np.interp(middle[:, i], np.arange(len(axis)), axis))
         data[f"unseen_{name}"] = ("unseen", np.interp(lonely[:, i], np.arange(len(axis)), axis))
-    beside = int(cells.empty[tuple(ends.target.T)].sum())
-    return xr.Dataset(data, attrs={"changes": len(ends), "changes_beside_rest": beside})
+    number = chart.transpose("vertical", "horizontal", ...)
+    chaos = ((number["count"] == 0) & (number["unsettled"] > 0)).values
+    attrs = {
+        "changes": len(ends),
+        "changes_beside_rest": int(cells.empty[tuple(ends.target.T)].sum()),
+        "on_curves": int(on_curves.sum()),
+        "chaos_beside_rest": _neighbours(chaos, cells.empty),
+    }
+    return xr.Dataset(data, attrs=attrs)
+
+
+def _neighbours(some: np.ndarray, others: np.ndarray) -> int:
+    """How many pairs of neighbouring cells there are, one of each kind."""
+    pairs = ((some[1:], others[:-1]), (some[:-1], others[1:]), (some[:, 1:], others[:, :-1]), (some[:, :-1], others[:, 1:]))
+    return int(sum((a & b).sum() for a, b in pairs))
 
 
 def curve_dataset(locus: Any, paths: Sequence[str]) -> xarray.Dataset:

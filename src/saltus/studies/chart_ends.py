@@ -53,8 +53,9 @@ class Ends:
 
 
 def keys_of(cells: Cells, ends: Ends) -> list[tuple[int, ...]]:
-    """What tells ends apart: row, column and rank of the motion, row and column of the neighbour."""
-    return [tuple(map(int, (*a, cells.rank[m], *b))) for a, m, b in zip(ends.source, ends.motion, ends.target, strict=True)]
+    """What tells ends apart: row and column, the motion's amplitude in nrad, row and column of the neighbour."""
+    size = np.rint(cells.amplitude[ends.motion] * 1e9).astype(int)
+    return [tuple(map(int, (*a, nrad, *b))) for a, nrad, b in zip(ends.source, size, ends.target, strict=True)]
 
 
 def unseen(cells: Cells, curves: Sequence[xarray.Dataset]) -> np.ndarray:

@@ -38,6 +38,7 @@ class Follower:
 
     def __init__(self, system: System, chart: xarray.Dataset, cells: Cells) -> None:
         self._system, self._chart, self._cells = system, chart, cells
+        self.missed: list[tuple[int, int, PeriodicOrbit]] = []  # row, column and a stable orbit there that the chart lacks
         self._paths: list[str] = list(chart.attrs["path"])
         self._last: tuple[int, PeriodicOrbit] | None = None  # the same motion often ends on several sides
 
@@ -64,8 +65,10 @@ class Follower:
         if reached.amplitude < cells.least:
             return Ending(SHRINKS), None
         there = cells.amplitude[(cells.cell == target).all(axis=1)]
-        same = np.abs(there - reached.amplitude).min(initial=np.inf) < EQUAL * reached.amplitude
-        return Ending(CONTINUED if same else MISSED), None
+        if np.abs(there - reached.amplitude).min(initial=np.inf) < EQUAL * reached.amplitude:
+            return Ending(CONTINUED), None
+        self.missed.append((int(target[0]), int(target[1]), reached))
+        return Ending(MISSED), None
 
     def _values(self, cell: np.ndarray) -> tuple[float, float]:
         """Of the two parameters in the middle of a cell: along the horizontal axis, along the vertical one."""
