@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from numba import njit, types
+from numba.core.caching import FunctionCache
+from numba.core.runtime import rtsys
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
 OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
@@ -22,10 +24,30 @@ lean_jit: Callable[[Any], Any] = njit(**_LEAN)
 inline_jit: Callable[[Any], Any] = njit(**_LEAN, forceinline=True)  # for what every step of the lanes calls
 
 
+class _Kept(FunctionCache):
+    """Compiled code on disk, loaded without the registries of all that numba could compile: they take longer than all else."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The code for a signature, or None."""
+        rtsys.initialize(target_context)  # without which arrays cannot be counted
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
+
+
+def _kept(signature: Any, options: Any) -> Callable[[Any], Any]:
+    def compiled(function: Any) -> Any:
+        dispatcher = njit(**options)(function)
+        dispatcher._cache = _Kept(function)
+        dispatcher.compile(signature)
+        dispatcher.disable_compile()
+        return dispatcher
+
+    return compiled
+
+
 def cached_jit(signature: Any, nogil: bool = False) -> Callable[[Any], Any]:
     """Compile for one signature at once, and keep the result on disk; if asked, without Python's lock."""
-    decorator: Callable[[Any], Any] = njit(signature, cache=True, nogil=nogil, **OPTIONS)
-    return decorator
+    return _kept(signature, OPTIONS | {"nogil": nogil})
 
 
 def pointed_jit(signature: Any, fused: bool = True, python: bool = False) -> Callable[[Any], Any]:
@@ -34,9 +56,7 @@ def pointed_jit(signature: Any, fused: bool = True, python: bool = False) -> Cal
     Not fused, it has no fused multiply-adds: a law that takes the difference of two equal products must get 0, not the rounding
     of one of them.
     """
-    options: Any = {"_nrt": False, "no_cpython_wrapper": not python, **OPTIONS} | ({} if fused else {"fastmath": False})
-    decorator: Callable[[Any], Any] = njit(signature, cache=True, **options)
-    return decorator
+    return _kept(signature, {"_nrt": False, "no_cpython_wrapper": not python, **OPTIONS} | ({} if fused else {"fastmath": False}))
 
 
 def not_here(signature: Any, **options: Any) -> Callable[[Any], Any]:
