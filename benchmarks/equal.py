@@ -11,7 +11,12 @@ from tasks.startup import CACHED, OTHER_NUMBERS, OTHER_STRUCTURE
 TARGETS = (1e-6, 1e-8, 1e-10, 1e-12, 1e-13, 1e-14)
 OURS = "saltus lanes"
 LOST = 1e-2  # an error above this is a motion lost, not a motion followed coarsely
-AT_LEAST = {"heyoka.py batch": 5.0, "SciPy DOP853": 1000.0, "SciPy LSODA": 1000.0}
+AT_LEAST = {
+    "heyoka.py batch": 5.0,
+    "SciPy DOP853": 1000.0,
+    "SciPy LSODA": 1000.0,
+    "prototype lanes": 0.9,  # what proofs and rare states may cost
+}
 
 
 def at_equal_error(work: list[dict[str, Any]]) -> dict[str, list[float]]:

@@ -1,4 +1,4 @@
-"""saltus in lanes: eight motions a vector register, and all cores if asked."""
+"""saltus in lanes: many motions a step, and all cores if asked."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from reference import PERIODS
 import saltus
 from peers.peer import AbsentError, DerivativeFlow, Flow, Peer
 from peers.saltus_scalar import AMPLITUDE_PATH, TOLERANCES, system
+from saltus.flow.lanes.vector import WIDTH
 
 if not hasattr(saltus, "simulate_many"):
     raise AbsentError("this saltus has no simulate_many")
@@ -56,7 +57,7 @@ def derivatives(tol: float) -> DerivativeFlow:
 PEERS = (
     Peer(
         name="saltus lanes",
-        about="eight motions a register; rare states leave for the scalar kernel and come back",
+        about=f"{WIDTH} motions a step; rare states leave for the scalar kernel and come back",
         packages=("saltus", "numba"),
         tolerances=TOLERANCES,
         setup=lambda tol: flow_of("the case", tol),

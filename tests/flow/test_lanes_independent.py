@@ -105,7 +105,7 @@ def run_with_width(width, folder):
 @pytest.mark.thorough
 def test_every_width_of_register_gives_the_same_bits(tmp_path):
     """The host's own and one other; all of them with SALTUS_WIDTHS=all, as each compiles the lanes anew."""
-    widths = (1, 2, 4, 8) if os.environ.get("SALTUS_WIDTHS") == "all" else (WIDTH, 2 if WIDTH != 2 else 1)
+    widths = (1, 2, 4, 8, 16) if os.environ.get("SALTUS_WIDTHS") == "all" else (WIDTH, 2 if WIDTH != 2 else 1)
     results = {width: run_with_width(width, tmp_path) for width in widths}
     assert [int(r["width"]) for r in results.values()] == list(widths)
     one = results[widths[0]]

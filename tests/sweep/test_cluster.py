@@ -39,7 +39,7 @@ def test_a_cluster_gives_the_same_bytes_though_a_worker_is_killed(cluster, waves
     assert done_at == list(range(22))
     run(plan, tmp_path / "here")
     assert tree(tmp_path / "cluster") == tree(tmp_path / "here")
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while victims[0] in [w.process.pid for w in cluster.workers.values() if w.process] and time.monotonic() < deadline:
         time.sleep(0.1)
     assert victims[0] not in [w.process.pid for w in cluster.workers.values() if w.process]  # it was a worker, and is dead

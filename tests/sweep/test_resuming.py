@@ -97,7 +97,7 @@ def test_the_workers_of_a_killed_run_end_too(script, tmp_path):
         pass
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while time.monotonic() < deadline:
         try:
             os.killpg(process.pid, 0)

@@ -50,7 +50,7 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
                     heed()
                     time.sleep(POLL)
                 future, result = next(done)
-                if future.status in ("cancelled", "lost"):
+                if isinstance(result, BaseException):  # the status may be that of a worker lost since, the result is not
                     raise OSError("the task was given up")
                 yield flying.pop(future.key), Raised(_said(result)) if future.status == "error" else result
                 del future, result  # so that the cluster forgets them

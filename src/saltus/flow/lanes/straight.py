@@ -25,6 +25,7 @@ from saltus.flow.tangent import saltation
 from saltus.flow.trace import RECORD_WIDTH, Trace
 
 LOWEST_ORDER = 8  # at which `lane_series` may end
+CACHE_LINE = 64  # bytes
 
 
 @dataclass(frozen=True)
@@ -143,6 +144,7 @@ def write_series(slots: Slots, nodes: Tape, roots: list[int]) -> Any:
     @intrinsic
     def series(typing: Any, m: Any, order: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            _align_stack(builder.function)
             w = Series(slots, context, builder, signature.args[0], args[0])
             end = builder.append_basic_block("end")
             _write_orders(w, slots, nodes, roots, args[1], end)
@@ -153,6 +155,16 @@ def write_series(slots: Slots, nodes: Tape, roots: list[int]) -> Any:
         return types.void(m, types.int64), code
 
     return series
+
+
+def _align_stack(function: Any) -> None:
+    """Have the coefficients that find no register lie in one line of the cache each, or every use would touch two.
+
+    LLVM aligns the stack by itself for variables, but not for what it finds too late to be more than the registers hold. A
+    function taken into its caller would lose the attribute.
+    """
+    function.attributes.alignstack = CACHE_LINE
+    function.attributes.add("noinline")
 
 
 def _write_orders(w: Series, slots: Slots, nodes: Tape, roots: list[int], order: Any, end: Any) -> None:
