@@ -65,7 +65,7 @@ PEERS = (
         packages=("numba",),
         tolerances=tuple(ORDERS),
         setup=setup,
-        batch=4096,
+        batch=16384,
         all_cores=all_cores,
     ),
 )

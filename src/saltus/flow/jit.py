@@ -12,8 +12,8 @@ from typing import Any
 
 from numba import njit, types
 from numba.core.caching import FunctionCache
-from numba.core.runtime import rtsys
 from numba.core.errors import NumbaExperimentalFeatureWarning
+from numba.core.runtime import rtsys
 
 OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
 jit: Callable[[Any], Any] = njit(**OPTIONS | {"_nrt": True})

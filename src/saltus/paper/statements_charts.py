@@ -155,12 +155,13 @@ def agreement(name: str, data: Any) -> Claim:
         total, border, curves, chaos = (
             int(differ.attrs[key]) for key in ("changes", "changes_beside_rest", "on_curves", "chaos_beside_rest")
         )
-        left, beside = differ.sizes["change"], int(differ["beside_rest"].astype(bool).sum())
+        looked, beside = differ["looked_into"].values.astype(bool), differ["beside_rest"].values.astype(bool)
         added = int(tree["chart"].attrs.get("added_by_continuation", 0))
-        judged += [left <= FEW * total, beside <= FEW * border]
+        judged += [looked.sum() <= FEW * total, (looked & beside).sum() <= FEW * border]
         parts.append(
-            f"Ω = {frequency:g}: {total - left} of {total} ({curves} on curves; beside rest alone {border - beside} of {border}, "
-            f"and {chaos} of chaos; {added} motions of cells from continuation alone)"
+            f"Ω = {frequency:g}: {total - len(looked)} of {total - (~looked).sum()} ({curves} on curves; beside rest alone "
+            f"{border - beside.sum()} of {border - (beside & ~looked).sum()}, and {chaos} of chaos; {(~looked).sum()} not looked "
+            f"into; {added} motions of cells from continuation alone)"
         )
     return check(
         f"{name}-agreement",

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 MOST = 24  # curves
 LOOKS = 3  # times as many changes may be looked into in vain as curves are wanted
+MOST_LOOKS = 2000  # changes that are looked into one by one
 EASY = 10  # times as many may turn out to be none: the same motion a little further
 BESIDE_REST = 10  # times as much as others do the changes matter where the neighbour has rest alone
 HARMLESS = (CONTINUED, SHRINKS)
@@ -68,7 +69,7 @@ def exact_borders(
 
     Where a cell has a motion and its neighbour none alike, the orbit is solved for and followed towards the neighbour to the
     special point at which it is lost. The points of the widest families, above all where rest alone is beside them, are followed
-    as curves through the plane of the chart; the changes that a curve explains are passed over.
+    as curves through the plane of the chart; the changes that a curve explains are passed over, and at most 2000 are looked into.
 
     Args:
         system: that of the chart.
@@ -111,7 +112,8 @@ def _borders(
     while len(waiting) and len(found.curves) < most and looks and easy:
         if progress is not None:
             progress(1 - len(waiting) / total)
-        first, before = _most_urgent(cells, waiting), len(found.curves)
+        urgency, before = _urgency(cells, waiting), len(found.curves)
+        first = np.arange(len(waiting)) == np.argmax(urgency)
         ending, special = follower.follow(waiting.only(first))
         curve = None if special is None else _curve(special, waiting.only(first), cells, found.curves, chart.attrs["path"])
         if curve is None:
@@ -125,19 +127,19 @@ def _borders(
 
 
 def _locate(follower: Follower, cells: Cells, ends: Ends, found: Borders, left: Callable[[int], object] | None) -> None:
-    """Follow each of these changes; all of one motion are one after the other."""
-    for done, i in enumerate(np.argsort(ends.motion, kind="stable")):
+    """Follow each of these changes, the most urgent ones if there are too many; all of one motion are one after the other."""
+    chosen = np.argsort(-_urgency(cells, ends), kind="stable")[: max(0, MOST_LOOKS - len(found.ends))]
+    for done, i in enumerate(chosen[np.argsort(ends.motion[chosen], kind="stable")]):
         if left is not None:
-            left(len(ends) - done)
+            left(len(chosen) - done)
         end = ends.only(np.array([i]))
         found.ends[keys_of(cells, end)[0]] = follower.follow(end)[0]
 
 
-def _most_urgent(cells: Cells, waiting: Ends) -> np.ndarray:
-    """The end of the widest family, above all of those with rest alone beside them; as a mask."""
-    size = np.bincount(cells.family)[cells.family[waiting.motion]]
-    weight = size * np.where(cells.empty[tuple(waiting.target.T)], BESIDE_REST, 1)
-    return np.asarray(np.arange(len(waiting)) == np.argmax(weight))
+def _urgency(cells: Cells, ends: Ends) -> np.ndarray:
+    """The larger the family the more, above all with rest alone beside it."""
+    size = np.bincount(cells.family, minlength=1)[cells.family[ends.motion]]
+    return np.asarray(size * np.where(cells.empty[tuple(ends.target.T)], BESIDE_REST, 1))
 
 
 def _curve(
@@ -163,10 +165,11 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     Returns:
         A Dataset with the changes along `change` that neither a curve nor a special point between the two cells explains:
         `horizontal` and `vertical` halfway between the cells, `amplitude` and `period` of the motion that ends, `cells` of its
-        family, and whether the neighbour has rest alone, `beside_rest`; and along `unseen` the places on the curves of folds
-        beside which no cell has the motions that end there. The attributes `changes` and `changes_beside_rest` count all that
-        there are, `on_curves` those that a curve explains; `chaos_beside_rest` counts pairs of neighbouring cells, one with rest
-        alone and one where no start settles, between which no motion ends but chaos.
+        family, whether the neighbour has rest alone, `beside_rest`, and whether the change was `looked_into`; and along
+        `unseen` the places on the curves of folds beside which no cell has the motions that end there. The attributes
+        `changes` and `changes_beside_rest` count all that there are, `on_curves` those that a curve explains;
+        `chaos_beside_rest` counts pairs of neighbouring cells, one with rest alone and one where no start settles, between which
+        no motion ends but chaos.
     """
     import xarray as xr
 
@@ -176,12 +179,14 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     located = np.array([key in known for key in keys_of(cells, ends)], dtype=bool)
     on_curves = explained(cells, ends, borders.curves)
     left = ends.only(~on_curves & ~located)
+    looked = np.array([key in borders.ends for key in keys_of(cells, left)], dtype=bool)
     middle, lonely = (left.source + left.target) / 2, unseen(cells, borders.curves)
     columns = {
         "amplitude": cells.amplitude[left.motion],
         "period": cells.period[left.motion],
         "cells": np.bincount(cells.family, minlength=1)[cells.family[left.motion]],
         "beside_rest": cells.empty[tuple(left.target.T)],
+        "looked_into": looked,
     }
     data = {name: ("change", values) for name, values in columns.items()}
     for i, (name, axis) in enumerate((("vertical", cells.vertical), ("horizontal", cells.horizontal))):

@@ -43,7 +43,7 @@ def _driver_text() -> str:
 
 def compile_driver_aside() -> subprocess.Popen[bytes] | None:
     """Where the driver is not on disk yet, a process that compiles it, as this one has much else to compile; else None."""
-    if is_compiled(module_name("lanes", _driver_text(), _header())):
+    if load_driver.cache_info().currsize or is_compiled(module_name("lanes", _driver_text(), _header())):
         return None
     try:
         found = f"import sys; sys.path[:] = {sys.path!r}; "  # as this process has come to know it

@@ -15,8 +15,6 @@ trajectory. `flags` holds bits of lanes: see `layout.py`.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from saltus.flow.jit import inline_jit, lean_jit
@@ -49,11 +47,11 @@ def expand_records(sizes, at, m, flags, lanes, tables, row):
 
 
 @inline_jit
-def propose(code, sizes, at, m, flags, settings, helpers, poly, gap):
+def propose(code, sizes, at, m, flags, settings, limits, helpers, poly, gap):
     """The step of every lane up to its first contact, put at NEW_*. Returns (bits that hit, bits to visit, h, tau, bend)."""
     order, tol = sizes[LANE_ORDER], settings[TOLERANCE]
     code[SERIES_CODE](m, order)
-    natural, size = natural_step(m, at, sizes, math.log2(tol))
+    natural, size = natural_step(m, at, sizes, limits)
     now, target = load(m, NOW), load(m, TARGET)
     h = minimum(natural, target - now)
     alive = flags[AWAKE] & ~flags[PARKED]
@@ -156,9 +154,9 @@ def commit(at, m, moved, hit):
 
 
 @inline_jit
-def fly(code, sizes, at, m, flags, settings, helpers, poly, gap):
+def fly(code, sizes, at, m, flags, settings, limits, helpers, poly, gap):
     """One step of all lanes. Returns (bits to visit, bits captured)."""
-    hit, away, h, tau, bend = propose(code, sizes, at, m, flags, settings, helpers, poly, gap)
+    hit, away, h, tau, bend = propose(code, sizes, at, m, flags, settings, limits, helpers, poly, gap)
     captured = 0
     new_hit = hit
     if hit:
@@ -176,7 +174,8 @@ def fly(code, sizes, at, m, flags, settings, helpers, poly, gap):
 def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, results, control):
     """Run all jobs. `control` = [whether to stop, forcing periods done so far]."""
     constants_count = at[RECORDS] - at[CONSTANTS_AT]
-    own = sizes[MODEL_ROWS]
+    own, order, tol = sizes[MODEL_ROWS], sizes[LANE_ORDER], settings[TOLERANCE]
+    limits = step_limits(order, tol), step_limits(order, ROUGHER * tol)
     lanes = (
         np.zeros((WIDTH, LANE_LABELS), dtype=np.int64),
         np.zeros((WIDTH, GAUGES)),
@@ -205,7 +204,7 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
                 expand_records(sizes, at, m, flags, lanes, tables, poly)
             away, captured, looking = flags[PARKED], 0, 0
             if flags[AWAKE] != flags[PARKED]:
-                doubtful, captured = fly(code, sizes, at, m, flags, settings, helpers, poly, gap)
+                doubtful, captured = fly(code, sizes, at, m, flags, settings, limits, helpers, poly, gap)
                 away |= doubtful
                 looking = bits(load(m, CROSSINGS) > load(m, NEXT_LOOK)) & flags[AWAKE]
             for lane in range(WIDTH if away | captured | looking else 0):

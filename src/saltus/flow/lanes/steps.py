@@ -22,43 +22,57 @@ LOG_GAP = GAP * math.log2(math.e)
 NEARLY = 1e-5  # of the time, and of the slope: a step of Halley's method below it leaves an error of its cube
 
 
+@lean_jit
+def step_limits(order, tol):
+    """log2 of tol, log2 of how much longer than the step its upper half would allow where it vanishes, and that factor.
+
+    Taken once for a run: a call of the C library in every step would put all registers into memory.
+    """
+    log_tol = math.log2(tol)
+    rarely = -log_tol / order - LOG_GAP
+    return log_tol, rarely, math.exp2(rarely)
+
+
 @inline_jit
-def natural_step(m, at, sizes, log_tol):
-    """The step that every row's series allows, those of the tangent's columns included, and the size of the state."""
+def natural_step(m, at, sizes, limits):
+    """The step that every row's series allows, those of the tangent's columns included, and the size of the state.
+
+    `limits` are `step_limits` of the rows, and of the columns.
+    """
     rows, size = sizes[MODEL_ROWS], splat(SMALLEST)
     for row in range(rows):
         size = maximum(size, maximum(absolute(load(m, at[POSITION] + row)), absolute(load(m, at[VELOCITY] + row))))
-    step = row_step(m, at[VELOCITIES], sizes[LANE_ORDER], size, log_tol)
+    step = row_step(m, at[VELOCITIES], sizes[LANE_ORDER], size, limits[0])
     for row in range(1, rows):
-        step = minimum(step, row_step(m, at[VELOCITIES] + row * STRIDE, sizes[LANE_ORDER], size, log_tol))
+        step = minimum(step, row_step(m, at[VELOCITIES] + row * STRIDE, sizes[LANE_ORDER], size, limits[0]))
     for first in range(rows, rows * (1 + sizes[COLUMN_COUNT]), rows):
-        step = minimum(step, column_step(m, at, sizes, first, log_tol + math.log2(ROUGHER)))
+        step = minimum(step, column_step(m, at, sizes, first, limits[1]))
     return LANE_SAFETY * step, size
 
 
 @lean_jit
-def column_step(m, at, sizes, first, log_tol):
+def column_step(m, at, sizes, first, limits):
     """The step that the series of a column of the tangent allows, relative to its own size (`steps.column_step`)."""
     size, step = splat(ZERO_TERM), splat(np.inf)
     for row in range(first, first + sizes[MODEL_ROWS]):
         size = maximum(size, maximum(absolute(load(m, at[POSITION] + row)), absolute(load(m, at[VELOCITY] + row))))
         size = maximum(size, absolute(load(m, at[VELOCITIES] + row * STRIDE + 1)))
     for row in range(first, first + sizes[MODEL_ROWS]):
-        step = minimum(step, row_step(m, at[VELOCITIES] + row * STRIDE, sizes[LANE_ORDER], size, log_tol))
+        step = minimum(step, row_step(m, at[VELOCITIES] + row * STRIDE, sizes[LANE_ORDER], size, limits))
     return step
 
 
 @inline_jit
-def row_step(m, series, order, size, log_tol):
+def row_step(m, series, order, size, limits):
     """The step of `steps.step_size` for one series: from its last two terms, and from its upper half where they vanish."""
+    log_tol, rarely, factor = limits
     wanted = log_tol + rough_log2(size)
     last = rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + order))))
     before = rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + order - 1))))
     step = minimum((wanted - last) * (1.0 / order), (wanted - before) * (1.0 / (order - 1)))
     step = maximum(minimum(step, splat(500.0)), splat(-500.0))
     natural, half = rough_exp2(step), order // 2
-    rarely = -log_tol / order - LOG_GAP
-    reach, upper = natural * math.exp2(rarely), absolute(load(m, series + order - 2))
+    reach, upper = natural * factor, absolute(load(m, series + order - 2))
     for k in range(order - 3, half - 1, -1):
         upper = fma(upper, reach, absolute(load(m, series + k)))
     vanishing = bits(rough_log2(upper) + half * (step + rarely) > wanted - log_tol + 1.0)
