@@ -8,8 +8,9 @@ import xarray as xr
 from picture_checks import check_provenance, clipped
 
 from saltus.files import write_dataset
-from saltus.paper import FIGURES, Verdict, chart_measures, charts, statements_charts
+from saltus.paper import FIGURES, Verdict, chart_measures, statements_charts
 from saltus.plots.chart import draw_stability_chart
+from saltus.studies.bordered import static_borders
 from saltus.theory import high_frequency_onset, is_monostable
 
 QUICK = {
@@ -55,7 +56,7 @@ def test_claims_fail_where_the_data_do_not_bear_them():
 
 def test_the_static_border_is_that_of_the_equilibria():
     for beta0 in (80.0, 60.0):
-        border = charts.static_borders(np.deg2rad(beta0))
+        border = static_borders(np.deg2rad(beta0), -2.0)
         vertical, true = border["vertical"].values, border["true"].values
         inside = (true > 1e-3) & (vertical < 0)
         assert is_monostable(np.deg2rad(beta0), true[inside] * 0.999, vertical[inside]).all()

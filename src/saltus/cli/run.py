@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,9 +95,11 @@ def computed(study: Study, ask: Ask, output: Path, tell: Tell, scheduler: str | 
 
     if ask.kind == "attractors":
         return study.answer(ask, attractors.attractors, progress=tell).to_xarray()
-    function = studies.basin_sweep if ask.kind == "basins" else getattr(studies, ask.kind)
     if ask.kind not in SWEPT:
-        return study.answer(ask, function, progress=tell)
+        return study.answer(ask, getattr(studies, ask.kind), progress=tell)
+    function: Any = studies.basin_sweep if ask.kind == "basins" else studies.stability_chart
+    if "curves" in ask.options and ask.kind == "stability_chart":
+        function = partial(studies.bordered_chart, exploring=lambda share: tell(share, "exact borders"))
     store = output / f"{ask.kind}.zarr"
     place = None if only_there and not store.exists() else store
     return study.answer(ask, function, store=place, scheduler=scheduler, progress=lambda *done: _chunks(tell, *done))
@@ -111,9 +114,10 @@ def _chunks(tell: Tell, done: int, total: int, left: float | None) -> None:
 def written(ask: Ask, data: Any, output: Path, plot: bool) -> list[Path]:
     """The files of an answer: its data, if no store keeps them, and with `plot` the picture."""
     from saltus.files import write_dataset
+    from saltus.plots.chart import data_is_tree
 
     store = output / f"{ask.kind}.zarr"
-    if ask.kind == "stability_chart":
+    if ask.kind == "stability_chart" and not data_is_tree(data):
         files = [store]
     else:
         data.attrs["kind"] = ask.kind
@@ -163,11 +167,32 @@ def said(kind: str, data: Any) -> Iterator[str]:
 
 
 def _said_of_chart(data: Any) -> Iterator[str]:
+    if "chart" in getattr(data, "children", ()):
+        yield from _said_of_chart(data["chart"].to_dataset())
+        yield from _said_of_borders(data)
+        return
     moving, wild = int((data["count"] > 0).sum()), int((data["unsettled"] > 0).sum())
     text = f"Stable motions beside rest in {moving} of {data['count'].size} cells"
     yield text + (f", the largest amplitude is {float(data['amplitude'].max()):.4g} rad." if moving else ".")
     if wild:
         yield f"In {wild} cells some motion does not settle."
+
+
+def _said_of_borders(tree: Any) -> Iterator[str]:
+    """What is known of the changes between neighbouring cells."""
+    from saltus.plots.chart import curves_of
+
+    left, kinds = tree["disagreements"].to_dataset(), [str(curve.attrs["kind"]) for curve in curves_of(tree)]
+    curves = ", ".join(f"{kinds.count(kind)} {kind}" for kind in sorted(set(kinds))) or "none"
+    total, looked = int(left.attrs["changes"]), int(left["looked_into"].sum())
+    added = int(tree["chart"].attrs["added_by_continuation"])
+    yield (
+        f"Exact borders: {curves} as curves. Of {total} ends of motions between neighbouring cells "
+        f"{int(left.attrs['on_curves'])} lie on them, {total - int(left.attrs['on_curves']) - left.sizes['change']} at other "
+        f"special points, {looked} are not explained and {left.sizes['change'] - looked} were not looked into."
+    )
+    if added:
+        yield f"{added} motions of cells, to which no start leads, are known from their neighbours by continuation."
 
 
 def _said_of_diagram(tree: Any) -> Iterator[str]:

@@ -126,6 +126,7 @@ ASKS: dict[str, dict[str, Any]] = {
         "tol": Number,
         "seed": Whole,
         "rows": Whole,
+        "curves": Whole,
     },
 }
 

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from saltus.plots.chart import curves_of
+
 PERIOD_ONE, TWICE = 1, 2  # the first motion: one forcing period, two impacts in it
 
 
@@ -39,8 +41,6 @@ def gained(panel: Any) -> float:
 
 def onset(panel: Any, vertical: np.ndarray) -> np.ndarray:
     """The least Hhat at V on the folds of the first motion (one period, two impacts), from the exact curves; NaN without one."""
-    from saltus.paper.charts import curves_of
-
     least = np.full(len(vertical), np.nan)
     for curve in curves_of(panel):
         if str(curve.attrs["kind"]) != "LP" or (int(curve.attrs["periods"]), int(curve.attrs["crossings"])) != (

@@ -10,8 +10,7 @@ import numpy as np
 
 from saltus.paper import spectra
 from saltus.paper.panels import each
-from saltus.paper.provenance import dataset
-from saltus.plots.chart import draw_borders, draw_chart, draw_closed_form, draw_ends, draw_static, legend
+from saltus.plots.chart import curves_of, draw_chart, draw_closed_form, draw_lines, legend
 from saltus.plots.style import DOUBLE_COLUMN, new_figure, panel_label, styled
 
 REGION = (2.0, 2.0)  # of the initial states
@@ -44,52 +43,16 @@ def _panel(values: Mapping[str, Any], **options: Any) -> Any:
 def panel(
     *, beta0: float, damping: float, frequency: float, widest: float, size: int, curves: int = CURVES, **options: Any
 ) -> Any:
-    """Groups `chart`, `borders` (see `saltus.studies.borders`), `disagreements` and `static`."""
-    import xarray as xr
-
-    from saltus.studies.borders import disagreements, with_borders
-    from saltus.studies.chart import stability_chart
+    """A `saltus.studies.bordered_chart` of the paper's system."""
+    from saltus.studies.bordered import bordered_chart
 
     here = system(beta0, damping, frequency)
     horizontal, vertical = np.linspace(0.0, widest, size), np.linspace(LOWEST, 0.0, size)
-    chart = stability_chart(here, horizontal=horizontal, vertical=vertical, **({"region": REGION} | options))
-    chart, borders = with_borders(here, chart, most=curves)
-    chart.attrs = {name: value for name, value in chart.attrs.items() if name != "plan"}
-    groups = {"chart": chart, "static": static_borders(math.radians(beta0)), "disagreements": disagreements(chart, borders)}
-    tree = xr.DataTree.from_dict(groups).assign({"borders": borders.to_xarray()})
+    tree = bordered_chart(here, curves=curves, horizontal=horizontal, vertical=vertical, **({"region": REGION} | options))
+    what = {"what": "quasi-static borders", "saltus_version": tree["chart"].attrs["saltus_version"]}
+    tree["static"].attrs |= what
     tree.attrs = {"system": here.to_json(), "beta0_degrees": beta0, "damping": damping, "frequency": frequency}
     return tree
-
-
-def static_borders(beta0: float) -> Any:
-    """Both parts of the quasi-static border over V, `critical` (the paper's) and `fold`; `true` is the lesser (erratum 23)."""
-    from saltus.theory import critical_horizontal, fold_horizontal, subcritical_vertical, unloaded_fold
-
-    start, end = subcritical_vertical(beta0), unloaded_fold(beta0)[0]
-    bend = end + (start - end) * np.linspace(0.0, 1.0, 101) ** 0.5  # the fold leaves the line at V = start as a power 3/2
-    vertical = np.unique(
-        np.concatenate([np.linspace(LOWEST, end, 21), bend, np.linspace(end, start, 101), np.linspace(start, 0.0, 21)])
-    )
-    fold = np.full_like(vertical, np.nan)
-    fold[vertical <= start] = fold_horizontal(beta0, vertical[vertical <= start])
-    critical = critical_horizontal(beta0, vertical)
-    text = "Hhat at the fold of deformed equilibria (erratum 23)"
-    return dataset(
-        {
-            "critical": ("vertical", critical, "1", "Hhat at which the undeformed state is lost (the paper's border)"),
-            "fold": ("vertical", fold, "1", text),
-            "true": ("vertical", np.fmin(critical, fold), "1", "the lesser of both: the quasi-static border"),
-        },
-        {"vertical": ("vertical", vertical, "1", "V")},
-        what="quasi-static borders",
-        subcritical_below=start,
-    )
-
-
-def curves_of(panel: Any) -> list[Any]:
-    """The exact borders of a panel."""
-    borders = panel["borders"]
-    return [borders[name].to_dataset() for name in sorted(borders.children) if name.startswith("curve_")]
 
 
 @styled
@@ -102,9 +65,7 @@ def draw(data: Any, columns: int, height: float) -> Any:
     cells, fast = None, False
     for ax, (name, tree) in zip(axes, panels, strict=False):
         cells = draw_chart(ax, tree["chart"].to_dataset(), top) or cells
-        draw_borders(ax, curves_of(tree))
-        draw_ends(ax, tree["chart"].to_dataset(), tree["borders"]["ends"].to_dataset())
-        draw_static(ax, tree["static"])
+        draw_lines(ax, tree)
         fast |= _closed_form(ax, tree)
         panel_label(ax, name)
         attrs = tree.attrs

@@ -20,20 +20,43 @@ NAMES = {"LP": "fold", "PD": "period doubling", "BPC": "symmetry breaking", "GR"
 
 @styled
 def draw_stability_chart(data: Any) -> Any:
-    """One chart as it is stored, with its scale and what its marks mean; without borders."""
+    """A chart as it is stored, or a tree of one with its borders, with its scale and what its marks mean."""
+    chart = data["chart"].to_dataset() if data_is_tree(data) else data
     figure = new_figure(1.2 * SINGLE_COLUMN, 98.0)
     ax = figure.subplots()
-    cells = draw_chart(ax, data)
-    path = list(data.attrs.get("path", ("horizontal", "vertical")))
+    cells = draw_chart(ax, chart)
+    path = list(chart.attrs.get("path", ("horizontal", "vertical")))
     ax.set_xlabel(parameter_name(path[0]))
     ax.set_ylabel(parameter_name(path[1]))
     if cells is not None:
         ticks = cells.norm.boundaries[::2]
         figure.colorbar(cells, ax=ax, label=r"largest amplitude $\max_\tau|\theta|$ (rad)", ticks=ticks, format="%.2g")
-    handles = list(_marks(data))
+    handles = list(_marks(chart))
+    if chart is not data:
+        draw_lines(ax, data)
+        handles += _line_handles(curves_of(data), "static" in data.children)
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.4, handletextpad=0.6)
     return figure
+
+
+def data_is_tree(data: Any) -> bool:
+    """Whether a result is a tree of datasets."""
+    return bool(getattr(data, "children", None))
+
+
+def curves_of(tree: Any) -> list[Any]:
+    """The exact borders of a tree that holds a chart."""
+    borders = tree["borders"]
+    return [borders[name].to_dataset() for name in sorted(borders.children) if name.startswith("curve_")]
+
+
+def draw_lines(ax: Any, tree: Any) -> None:
+    """All borders of a tree that holds a chart."""
+    draw_borders(ax, curves_of(tree))
+    draw_ends(ax, tree["chart"].to_dataset(), tree["borders"]["ends"].to_dataset())
+    if "static" in tree.children:
+        draw_static(ax, tree["static"])
 
 
 def _marks(chart: Any) -> Iterator[Any]:
@@ -151,17 +174,25 @@ def draw_ends(ax: Any, chart: Any, ends: Any) -> None:
     )
 
 
+def _line_handles(curves: Sequence[Any], static: bool) -> list[Any]:
+    """What the lines of borders mean, those that are there."""
+    from matplotlib.lines import Line2D
+
+    kinds = {str(curve.attrs["kind"]) for curve in curves}
+    handles = [
+        Line2D([], [], color=UNSTABLE, lw=1.4, label="quasi-static border"),
+        Line2D([], [], color=UNSTABLE, lw=1.0, ls=(0, (1, 1.2)), label=r"$\widehat{\mathcal{H}}_{cr}^{QS}$ where it is not"),
+    ]
+    exact = [Line2D([], [], color=INK, lw=0.8, ls=BORDERS[kind], label=NAMES[kind]) for kind in BORDERS if kind in kinds]
+    return (handles if static else []) + exact
+
+
 def legend(figure: Any, curves: Sequence[Any], closed_form: bool = False) -> None:
     """What the lines and fillings mean, below all panels."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    kinds = {str(curve.attrs["kind"]) for curve in curves}
-    handles: list[Any] = [
-        Line2D([], [], color=UNSTABLE, lw=1.4, label="quasi-static border"),
-        Line2D([], [], color=UNSTABLE, lw=1.0, ls=(0, (1, 1.2)), label=r"$\widehat{\mathcal{H}}_{cr}^{QS}$ where it is not"),
-    ]
-    handles += [Line2D([], [], color=INK, lw=0.8, ls=BORDERS[kind], label=NAMES[kind]) for kind in BORDERS if kind in kinds]
+    handles = _line_handles(curves, static=True)
     handles.append(Line2D([], [], color=LIMIT, lw=0.9, label=r"max$|\theta|=\pi-\beta_0$"))
     with mpl.rc_context({"hatch.linewidth": 0.3}):
         handles.append(Patch(facecolor="#7fb8a8", edgecolor="white", hatch="......", label="several motions"))
