@@ -1,6 +1,7 @@
 """The exact borders of stability charts: curves of folds, doublings and symmetry breakings that chart and theory agree with."""
 
 import functools
+import importlib.util
 
 import numpy as np
 import pytest
@@ -8,12 +9,15 @@ import xarray as xr
 from study_cases import forced
 
 import saltus
+from saltus.errors import ParameterError
 from saltus.orbits import continue_orbit, continue_special, find_orbit
 from saltus.orbits.branch import follow_stable
+from saltus.studies.bordered import bordered_chart
 from saltus.studies.borders import HARMLESS, Borders, curve_dataset, disagreements, exact_borders, with_borders
 from saltus.studies.chart import stability_chart
 from saltus.studies.chart_ends import ends_of, explained, keys_of, read
 from saltus.studies.chart_follow import KINDS, MISSED, Follower, lost
+from saltus.systems import System, VelocityReduction
 from saltus.theory import high_frequency_onset, unloaded_fold
 
 H, V = "load.horizontal.amplitude", "load.vertical"
@@ -229,3 +233,51 @@ def test_a_curve_is_told_in_the_order_of_the_charts_axes():
     turned = curve_dataset(locus, [V, H])
     np.testing.assert_array_equal(told["vertical"], turned["horizontal"])
     assert told["vertical"].values.max() < 0 < told["horizontal"].values.min()
+
+
+def test_a_chart_is_read_in_any_order_of_its_dimensions():
+    turned = chart().transpose("motion", "horizontal", "vertical")
+    one, other = read(chart()), read(turned)
+    for name in ("cell", "period", "amplitude", "symmetric", "family", "empty"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    assert disagreements(turned, borders()).sizes["change"] == disagreements(chart(), borders()).sizes["change"]
+
+
+def test_a_chart_read_lazily_gets_its_motions_too():
+    bare = chart().chunk() if importlib.util.find_spec("dask") else chart()
+    whole, _ = with_borders(forced(), bare, most=0)
+    same, _ = with_borders(forced(), chart(), most=0)
+    assert whole.attrs["added_by_continuation"] > 0
+    np.testing.assert_array_equal(whole["count"].values, same["count"].values)
+
+
+@pytest.mark.parametrize("most", [-1, 2.5])
+def test_a_number_of_curves_without_meaning_is_refused(most):
+    with pytest.raises(ParameterError, match="most must"):
+        exact_borders(forced(), chart(), most=most)
+
+
+@pytest.mark.parametrize(
+    ("changes", "there"),
+    [
+        ({}, True),
+        ({"model.beta0": np.deg2rad(100)}, False),
+        ({"model.stiffness_ratio": 2.0}, False),
+        ({"load.horizontal.mean": 0.01}, False),
+    ],
+)
+def test_the_quasi_static_border_is_there_only_where_its_closed_form_holds(changes, there):
+    tree = bordered_chart(
+        forced().with_(changes), curves=0, horizontal=[0.001, 0.002], vertical=[-0.3, -0.2], starts=1, periods=3
+    )
+    assert ("static" in tree.children) is there
+    assert {"chart", "borders", "disagreements"} <= set(tree.children)
+
+
+def test_ends_of_orbits_that_rest_are_special_points_too():
+    """Impacts with loss: families end where a rest has no duration left (CH) or a release is only touched (RL)."""
+    system = System(model=forced().model, load=forced().load, impact=VelocityReduction(0.6))
+    here = stability_chart(system, horizontal=np.linspace(0.02, 0.5, 9), vertical=[-0.4, -0.2], starts=6)
+    _, found = with_borders(system, here, most=0)
+    assert {"CH", "RL"} & {ending.said for ending in found.ends.values()}
+    assert all(ending.said in KINDS for ending in found.ends.values() if np.isfinite(ending.horizontal))

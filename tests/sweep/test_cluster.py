@@ -54,7 +54,7 @@ def test_a_chunk_that_fails_on_a_cluster_is_tried_again_and_told(cluster, waves_
     assert status(tmp_path / "s").done == 6
 
 
-def test_an_interrupt_ends_a_run_on_a_cluster_at_once(cluster, script, tmp_path):
+def test_an_interrupt_ends_a_run_on_a_cluster_and_says_how_to_go_on(cluster, script, tmp_path):
     process = script("go_on", tmp_path / "store", cluster.scheduler_address, 0.3)
     while process.stdout.readline() not in ("1\n", ""):
         pass
@@ -87,7 +87,7 @@ def test_a_scheduler_that_goes_away_is_told(waves_plan, tmp_path, monkeypatch):
     assert status(tmp_path / "s").complete
 
 
-def test_an_address_without_a_scheduler_is_told_in_seconds(waves_plan, tmp_path, monkeypatch):
+def test_an_address_without_a_scheduler_is_told(waves_plan, tmp_path, monkeypatch):
     monkeypatch.setattr(cluster_module, "PATIENCE", 0.5)
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

@@ -108,7 +108,7 @@ def test_the_workers_of_a_killed_run_end_too(script, tmp_path):
 
 
 @pytest.mark.parametrize("workers", [0, 2])
-def test_an_interrupt_ends_a_run_at_once_and_says_how_to_go_on(script, tmp_path, workers):
+def test_an_interrupt_ends_a_run_and_says_how_to_go_on(script, tmp_path, workers):
     store = tmp_path / "store"
     process = script("go_on", store, workers, 60.0, -0.97)  # two chunks, and then a minute for each
     while process.stdout.readline() not in ("2\n", ""):

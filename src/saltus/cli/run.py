@@ -185,11 +185,12 @@ def _said_of_borders(tree: Any) -> Iterator[str]:
     left, kinds = tree["disagreements"].to_dataset(), [str(curve.attrs["kind"]) for curve in curves_of(tree)]
     curves = ", ".join(f"{kinds.count(kind)} {kind}" for kind in sorted(set(kinds))) or "none"
     total, looked = int(left.attrs["changes"]), int(left["looked_into"].sum())
+    on, harmless, unexplained = int(left.attrs["on_curves"]), int(left.attrs["harmless"]), left.sizes["change"]
     added = int(tree["chart"].attrs["added_by_continuation"])
     yield (
         f"Exact borders: {curves} as curves. Of {total} ends of motions between neighbouring cells "
-        f"{int(left.attrs['on_curves'])} lie on them, {total - int(left.attrs['on_curves']) - left.sizes['change']} at other "
-        f"special points, {looked} are not explained and {left.sizes['change'] - looked} were not looked into."
+        f"{on} lie on them, {total - on - harmless - unexplained} at other special points, {harmless} are none, as the same "
+        f"motion goes on, {looked} are not explained and {unexplained - looked} were not looked into."
     )
     if added:
         yield f"{added} motions of cells, to which no start leads, are known from their neighbours by continuation."

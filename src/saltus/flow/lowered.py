@@ -160,6 +160,7 @@ class _Writer:
         assert isinstance(node.iter, ast.Call)
         given = [self.value(argument) for argument in node.iter.args]
         start, stop = (ir.Constant(LONG, 0), given[0]) if len(given) == 1 else (given[0], given[1])
+        assert len(given) < 3 or ast.unparse(node.iter.args[2]) == "-1", "a generated range has no step but -1"
         step, sign = (given[2], ">") if len(given) == 3 else (ir.Constant(LONG, 1), "<")
         counter = cgutils.alloca_once(self.builder, LONG)
         self.builder.store(start, counter)

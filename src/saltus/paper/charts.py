@@ -49,8 +49,7 @@ def panel(
     here = system(beta0, damping, frequency)
     horizontal, vertical = np.linspace(0.0, widest, size), np.linspace(LOWEST, 0.0, size)
     tree = bordered_chart(here, curves=curves, horizontal=horizontal, vertical=vertical, **({"region": REGION} | options))
-    what = {"what": "quasi-static borders", "saltus_version": tree["chart"].attrs["saltus_version"]}
-    tree["static"].attrs |= what
+    tree["static"].attrs |= {"what": "quasi-static borders", "saltus_version": tree["chart"].attrs["saltus_version"]}
     tree.attrs = {"system": here.to_json(), "beta0_degrees": beta0, "damping": damping, "frequency": frequency}
     return tree
 

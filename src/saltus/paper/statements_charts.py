@@ -156,12 +156,14 @@ def agreement(name: str, data: Any) -> Claim:
             int(differ.attrs[key]) for key in ("changes", "changes_beside_rest", "on_curves", "chaos_beside_rest")
         )
         looked, beside = differ["looked_into"].values.astype(bool), differ["beside_rest"].values.astype(bool)
-        added = int(tree["chart"].attrs.get("added_by_continuation", 0))
-        judged += [looked.sum() <= FEW * (total - (~looked).sum()), (looked & beside).sum() <= FEW * border]
+        added, harmless = int(tree["chart"].attrs.get("added_by_continuation", 0)), int(differ.attrs["harmless"])
+        known, known_border = total - int((~looked).sum()), border - int((beside & ~looked).sum())
+        judged += [known > 0 and looked.sum() <= FEW * known]
+        judged += [known_border > 0 and (looked & beside).sum() <= FEW * known_border]
         parts.append(
-            f"Ω = {frequency:g}: {total - len(looked)} of {total - (~looked).sum()} ({curves} on curves; beside rest alone "
-            f"{border - beside.sum()} of {border - (beside & ~looked).sum()}, and {chaos} of chaos; {(~looked).sum()} not looked "
-            f"into; {added} motions of cells from continuation alone)"
+            f"Ω = {frequency:g}: {total - len(looked) - harmless} of {known - harmless} ({curves} on curves; beside rest alone "
+            f"{border - beside.sum()} of {known_border}, and {chaos} of chaos; {(~looked).sum()} not looked into; {harmless} are "
+            f"none, as the same motion goes on; {added} motions of cells from continuation alone)"
         )
     return check(
         f"{name}-agreement",

@@ -15,12 +15,15 @@ COLOURS = "viridis_r"  # large amplitudes dark, beside the white of rest small o
 LEVELS = 12
 CHAOS = "#c9c9c9"
 BORDERS: dict[str, Any] = {"LP": "-", "PD": (0, (5, 1.5)), "BPC": (0, (5, 1.2, 1, 1.2)), "GR": (0, (1, 1.1))}
+DOT: dict[str, Any] = {"linestyle": "none", "marker": ".", "color": INK, "markersize": 2.0, "markeredgewidth": 0.0}
 NAMES = {"LP": "fold", "PD": "period doubling", "BPC": "symmetry breaking", "GR": "grazing"}
 
 
 @styled
 def draw_stability_chart(data: Any) -> Any:
     """A chart as it is stored, or a tree of one with its borders, with its scale and what its marks mean."""
+    from matplotlib.lines import Line2D
+
     chart = data["chart"].to_dataset() if data_is_tree(data) else data
     figure = new_figure(1.2 * SINGLE_COLUMN, 98.0)
     ax = figure.subplots()
@@ -33,8 +36,9 @@ def draw_stability_chart(data: Any) -> Any:
         figure.colorbar(cells, ax=ax, label=r"largest amplitude $\max_\tau|\theta|$ (rad)", ticks=ticks, format="%.2g")
     handles = list(_marks(chart))
     if chart is not data:
-        draw_lines(ax, data)
+        dots = draw_lines(ax, data)
         handles += _line_handles(curves_of(data), "static" in data.children)
+        handles += [Line2D([], [], **DOT, label="end of motions")] if dots else []
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.4, handletextpad=0.6)
     return figure
@@ -51,12 +55,12 @@ def curves_of(tree: Any) -> list[Any]:
     return [borders[name].to_dataset() for name in sorted(borders.children) if name.startswith("curve_")]
 
 
-def draw_lines(ax: Any, tree: Any) -> None:
-    """All borders of a tree that holds a chart."""
+def draw_lines(ax: Any, tree: Any) -> int:
+    """All borders of a tree that holds a chart; returns how many dots there are."""
     draw_borders(ax, curves_of(tree))
-    draw_ends(ax, tree["chart"].to_dataset(), tree["borders"]["ends"].to_dataset())
     if "static" in tree.children:
         draw_static(ax, tree["static"])
+    return draw_ends(ax, tree["chart"].to_dataset(), tree["borders"]["ends"].to_dataset())
 
 
 def _marks(chart: Any) -> Iterator[Any]:
@@ -156,22 +160,14 @@ def draw_borders(ax: Any, curves: Sequence[Any]) -> None:
         )
 
 
-def draw_ends(ax: Any, chart: Any, ends: Any) -> None:
-    """The exact places at which a motion ends beside rest alone and no curve was followed, as dots."""
-    kinds = np.isin(ends["said"].values, list(BORDERS))
+def draw_ends(ax: Any, chart: Any, ends: Any) -> int:
+    """The exact places at which a motion ends beside rest alone and no curve was followed, as dots; returns how many."""
+    kinds = np.isfinite(ends["horizontal"].values)
     target = ends["key"].values[:, 3:]
     resting = ((chart["count"] == 0) & (chart["unsettled"] == 0)).transpose("vertical", "horizontal").values
     shown = kinds & resting[target[:, 0], target[:, 1]]
-    ax.plot(
-        ends["horizontal"].values[shown],
-        ends["vertical"].values[shown],
-        linestyle="none",
-        marker=".",
-        color=INK,
-        markersize=2.0,
-        markeredgewidth=0.0,
-        zorder=5,
-    )
+    ax.plot(ends["horizontal"].values[shown], ends["vertical"].values[shown], **DOT, zorder=5)
+    return int(shown.sum())
 
 
 def _line_handles(curves: Sequence[Any], static: bool) -> list[Any]:

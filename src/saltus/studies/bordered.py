@@ -10,7 +10,7 @@ import numpy as np
 from saltus.orbits.find import check_whole
 from saltus.studies.borders import disagreements, with_borders
 from saltus.studies.chart import stability_chart
-from saltus.systems import Metainterface, System
+from saltus.systems import Harmonic, Load, Metainterface, System
 
 if TYPE_CHECKING:
     import xarray
@@ -37,8 +37,8 @@ def bordered_chart(
         options: those of `stability_chart`.
 
     Returns:
-        A DataTree of the groups `chart`, `borders` (see `Borders.to_xarray`), `disagreements` and, for the metainterface in the
-        plane of its two loads, `static` (see `static_borders`).
+        A DataTree of the groups `chart`, `borders` (see `Borders.to_xarray`), `disagreements` and, for the metainterface with
+        k = 1 under load (i) in the plane of Hhat and V, `static` (see `static_borders`).
 
     Raises:
         ParameterError, SweepError: as `stability_chart`.
@@ -51,9 +51,23 @@ def bordered_chart(
     )
     chart.attrs = {name: value for name, value in chart.attrs.items() if name != "plan"}
     groups = {"chart": chart, "disagreements": disagreements(chart, borders)}
-    if isinstance(system.model, Metainterface) and tuple(chart.attrs["path"]) == LOADS:
+    if isinstance(system.model, Metainterface) and _has_static_border(system.model, system.load, chart):
         groups["static"] = static_borders(system.model.beta0, float(chart["vertical"].min()))
     return xr.DataTree.from_dict(groups).assign({"borders": borders.to_xarray()})
+
+
+def _has_static_border(model: Metainterface, load: Load, chart: xarray.Dataset) -> bool:
+    """Whether the closed forms of `static_borders` hold: k = 1, beta0 below 90 degrees, H = Hhat sin and constant V < 0 alone."""
+    horizontal = load.channels.get("horizontal")
+    return (
+        tuple(chart.attrs["path"]) == LOADS
+        and (model.stiffness_ratio, model.smoothing) == (1.0, None)
+        and model.beta0 < np.pi / 2
+        and set(load.channels) == {"horizontal", "vertical"}
+        and isinstance(horizontal, Harmonic)
+        and horizontal.mean == 0.0
+        and float(chart["vertical"].min()) < 0.0
+    )
 
 
 def static_borders(beta0: float, lowest: float) -> xarray.Dataset:

@@ -14,9 +14,10 @@ import numpy as np
 
 from saltus.errors import MotionError, ParameterError
 from saltus.orbits import PeriodicOrbit, SpecialPoint, continue_special
+from saltus.orbits.find import check_whole
 from saltus.studies.chart_complete import ADDED, with_motions
 from saltus.studies.chart_ends import Cells, Ends, ends_of, explained, keys_of, passes, read, unseen
-from saltus.studies.chart_follow import CONTINUED, KINDS, SHRINKS, Ending, Follower
+from saltus.studies.chart_follow import CONTINUED, KINDS, MISSED, SHRINKS, Ending, Follower
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -95,9 +96,11 @@ def with_borders(
             break
         cells, follower = read(chart), Follower(system, chart, read(chart))
         every = ends_of(cells)
-        borders.ends = {key: borders.ends[key] for key in keys_of(cells, every) if key in borders.ends}
-        fresh = np.array([key not in borders.ends for key in keys_of(cells, every)], dtype=bool)
-        _locate(follower, cells, every.only(fresh & ~explained(cells, every, borders.curves)), borders, None)
+        keys = keys_of(cells, every)
+        borders.ends = {key: borders.ends[key] for key in keys if key in borders.ends and borders.ends[key].said != MISSED}
+        fresh = np.array([key not in borders.ends for key in keys], dtype=bool)
+        fresh &= ~explained(cells, every, borders.curves)
+        _locate(follower, cells, every.only(fresh), borders, _told(progress, len(every)))
         missed = follower.missed
     return chart, borders
 
@@ -106,6 +109,7 @@ def _borders(
     system: System, chart: xarray.Dataset, most: int, progress: Callable[[float], object] | None
 ) -> tuple[Borders, list[tuple[int, int, PeriodicOrbit]]]:
     """The borders of a chart, and the orbits that it lacks: row, column, orbit."""
+    check_whole("most", most, 0)
     found, cells = Borders(), read(chart)
     waiting, follower = ends_of(cells), Follower(system, chart, cells)
     total, looks, easy = max(len(waiting), 1), LOOKS * most, EASY * most
@@ -122,8 +126,13 @@ def _borders(
         else:
             found.curves.append(curve)
         waiting = waiting.only(~first & ~explained(cells, waiting, found.curves[before:]))
-    _locate(follower, cells, waiting, found, None if progress is None else lambda left: progress(1 - left / total))
+    _locate(follower, cells, waiting, found, _told(progress, total))
     return found, follower.missed
+
+
+def _told(progress: Callable[[float], object] | None, total: int) -> Callable[[int], object] | None:
+    """Progress from how many changes are left of how many."""
+    return None if progress is None else lambda left: progress(1 - left / max(total, 1))
 
 
 def _locate(follower: Follower, cells: Cells, ends: Ends, found: Borders, left: Callable[[int], object] | None) -> None:
@@ -167,18 +176,18 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
         `horizontal` and `vertical` halfway between the cells, `amplitude` and `period` of the motion that ends, `cells` of its
         family, whether the neighbour has rest alone, `beside_rest`, and whether the change was `looked_into`; and along
         `unseen` the places on the curves of folds beside which no cell has the motions that end there. The attributes
-        `changes` and `changes_beside_rest` count all that there are, `on_curves` those that a curve explains;
-        `chaos_beside_rest` counts pairs of neighbouring cells, one with rest alone and one where no start settles, between which
-        no motion ends but chaos.
+        `changes` and `changes_beside_rest` count all that there are, `on_curves` those that a curve explains, `harmless` those
+        where the same motion goes on, with another amplitude than expected or too small to count; `chaos_beside_rest` counts
+        pairs of neighbouring cells, one with rest alone and one where no start settles, between which no motion ends but chaos.
     """
     import xarray as xr
 
     cells = read(chart)
     ends = ends_of(cells)
-    known = {key for key, ending in borders.ends.items() if ending.said in HARMLESS + KINDS}
-    located = np.array([key in known for key in keys_of(cells, ends)], dtype=bool)
     on_curves = explained(cells, ends, borders.curves)
-    left = ends.only(~on_curves & ~located)
+    said = np.array([borders.ends[key].said if key in borders.ends else "" for key in keys_of(cells, ends)], dtype=str)
+    harmless = np.isin(said, HARMLESS) & ~on_curves
+    left = ends.only(~on_curves & ~harmless & ~np.isin(said, KINDS))
     looked = np.array([key in borders.ends for key in keys_of(cells, left)], dtype=bool)
     middle, lonely = (left.source + left.target) / 2, unseen(cells, borders.curves)
     columns = {
@@ -198,6 +207,7 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
         "changes": len(ends),
         "changes_beside_rest": int(cells.empty[tuple(ends.target.T)].sum()),
         "on_curves": int(on_curves.sum()),
+        "harmless": int(harmless.sum()),
         "chaos_beside_rest": _neighbours(chaos, cells.empty),
     }
     return xr.Dataset(data, attrs=attrs)

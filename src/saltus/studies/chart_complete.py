@@ -23,7 +23,7 @@ ADDED = "added_by_continuation"  # an attribute of the chart: how many
 def with_motions(chart: xarray.Dataset, system: System, orbits: Sequence[tuple[int, int, PeriodicOrbit]]) -> xarray.Dataset:
     """The chart with stable orbits, given by row and column, as motions of their cells where these have them not yet."""
     order = ("vertical", "horizontal")
-    made = chart.transpose(*order, ...).copy(deep=True)
+    made = chart.transpose(*order, ...).copy(deep=True).load()  # its arrays are written to
     added = 0
     for row, column, orbit in orbits:
         added += _add(

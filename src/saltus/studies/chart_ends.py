@@ -92,7 +92,8 @@ def read(chart: xarray.Dataset) -> Cells:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    amplitude = chart["motion_amplitude"].transpose("vertical", "horizontal", "motion").values
+    chart = chart.transpose("vertical", "horizontal", ...)
+    amplitude = chart["motion_amplitude"].values
     place = np.argwhere(np.isfinite(amplitude))
     at = tuple(place.T)
     other, period = chart["motion_other"].values[at], chart["motion_period"].values[at]

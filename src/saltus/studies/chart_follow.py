@@ -17,8 +17,9 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-KINDS = ("LP", "PD", "BPC", "GR")
+KINDS = ("LP", "PD", "BPC", "GR", "RL", "CH")  # the last two for orbits that rest
 EQUAL = 1e-3  # of the amplitude, between the orbit followed to a neighbour and the motion that is there
+HERE = 1e-6  # of the way, between a special point and the end of a branch there
 CONTINUED, SHRINKS = "the motion goes on", "becomes too small to count"
 MISSED = "goes on, but no start of the neighbour has led to it"
 
@@ -64,6 +65,8 @@ class Follower:
             return Ending(special), None
         if reached.amplitude < cells.least:
             return Ending(SHRINKS), None
+        if not reached.stable:  # and the special point could not be located
+            return Ending(special), None
         there = cells.amplitude[(cells.cell == target).all(axis=1)]
         if np.abs(there - reached.amplitude).min(initial=np.inf) < EQUAL * reached.amplitude:
             return Ending(CONTINUED), None
@@ -94,15 +97,15 @@ class Follower:
 def lost(branch: Branch) -> SpecialPoint | str:
     """The special point at which the orbits of a branch lose their stability, seen from its first point, or why there is none.
 
-    That is also where a family ends at an orbit that is its own image, or at a grazing.
+    That is also where a family ends at an orbit that is its own image, at a grazing, or where it can rest no longer.
     """
     points = list(branch.points)
     bad = [i for i, point in enumerate(points) if not point.orbit.stable and not point.orbit.grazes]
     known = [special for special in branch.special if special.kind in KINDS]
     if not bad:
-        last = known[-1] if known else None
-        if last is not None and last.point is points[-1]:
-            return last
+        reach = HERE * (float(np.ptp(branch.parameters)) or 1.0)
+        if known and abs(known[-1].parameter - points[-1].parameter) <= reach:
+            return known[-1]
         return f"no loss of stability: {branch.ends[1]}"
     if bad[0] == 0:
         return "the orbit is not stable to its multipliers"

@@ -54,6 +54,7 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
                     raise OSError("the task was given up")
                 yield flying.pop(future.key), Raised(_said(result)) if future.status == "error" else result
                 del future, result  # so that the cluster forgets them
+            heed()
     except OSError as error:
         raise SweepError(
             f"the Dask scheduler at {address} has gone away ({_first_line(error)}); run the same again to go on"
