@@ -14,7 +14,7 @@ from saltus.cli.run import check
 from saltus.config import load_study
 from saltus.config.asks import ASKS, read_grid, read_pairs, read_values
 from saltus.errors import ParameterError
-from saltus.studies import basin_sweep, phase_portrait, stability_chart
+from saltus.studies import basin_sweep, bordered_chart, phase_portrait, stability_chart
 from saltus.studies.spectrum import diagram
 
 FUNCTIONS = {
@@ -28,6 +28,7 @@ FUNCTIONS = {
 NOT_IN_FILES = {
     "system",
     "progress",
+    "exploring",
     "store",
     "workers",
     "scheduler",
@@ -45,6 +46,8 @@ def test_the_keys_of_a_question_are_the_arguments_of_its_function(kind):
     arguments = set(inspect.signature(FUNCTIONS[kind]).parameters) - NOT_IN_FILES
     if kind == "basins":
         arguments |= set(inspect.signature(basin_sweep).parameters) - NOT_IN_FILES
+    if kind == "stability_chart":
+        arguments |= set(inspect.signature(bordered_chart).parameters) - NOT_IN_FILES
     assert set(ASKS[kind]) == arguments
 
 

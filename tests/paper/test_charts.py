@@ -11,7 +11,7 @@ from saltus.files import write_dataset
 from saltus.paper import FIGURES, Verdict, chart_measures, statements_charts
 from saltus.plots.chart import draw_stability_chart
 from saltus.studies.bordered import static_borders
-from saltus.theory import high_frequency_onset, is_monostable
+from saltus.theory import high_frequency_onset, is_monostable, unloaded_fold
 
 QUICK = {
     "d": {"beta0": 80.0, "damping": 0.1, "frequency": 1.0, "widest": 0.1},
@@ -58,6 +58,7 @@ def test_the_static_border_is_that_of_the_equilibria():
     for beta0 in (80.0, 60.0):
         border = static_borders(np.deg2rad(beta0), -2.0)
         vertical, true = border["vertical"].values, border["true"].values
+        assert (true[vertical <= unloaded_fold(np.deg2rad(beta0))[0]] == 0.0).all()
         inside = (true > 1e-3) & (vertical < 0)
         assert is_monostable(np.deg2rad(beta0), true[inside] * 0.999, vertical[inside]).all()
         assert not is_monostable(np.deg2rad(beta0), true[inside] * 1.001, vertical[inside]).any()

@@ -84,6 +84,7 @@ def static_borders(beta0: float, lowest: float) -> xarray.Dataset:
     vertical = vertical[vertical >= lowest]
     fold = np.full_like(vertical, np.nan)
     fold[vertical <= start] = fold_horizontal(beta0, vertical[vertical <= start])
+    fold[vertical <= end] = 0.0  # deformed equilibria are there without any horizontal load; not the rounding of 0
     critical = critical_horizontal(beta0, vertical)
     data = {
         "critical": (critical, "Hhat at which the undeformed state is lost (the paper's border)"),

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 MOST = 24  # curves
 LOOKS = 3  # times as many changes may be looked into in vain as curves are wanted
-MOST_LOOKS = 5000  # changes that are looked into one by one
+MOST_LOOKS = 2000  # changes that are looked into one by one
 EASY = 10  # times as many may turn out to be none: the same motion a little further
 BESIDE_REST = 10  # times as much as others do the changes matter where the neighbour has rest alone
 HARMLESS = (CONTINUED, SHRINKS)
@@ -70,7 +70,7 @@ def exact_borders(
 
     Where a cell has a motion and its neighbour none alike, the orbit is solved for and followed towards the neighbour to the
     special point at which it is lost. The points of the widest families, above all where rest alone is beside them, are followed
-    as curves through the plane of the chart; the changes that a curve explains are passed over, and at most 5000 are looked into.
+    as curves through the plane of the chart; the changes that a curve explains are passed over, and at most 2000 are looked into.
 
     Args:
         system: that of the chart.
