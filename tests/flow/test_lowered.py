@@ -147,3 +147,8 @@ def test_every_statement_does_what_python_does(compiled):
 def test_what_no_generated_text_has_is_refused(compiled):
     with pytest.raises(NotImplementedError, match="while"):
         compiled("@lowered_jit(CONSTANTS)\ndef f(p, c):\n    while p[0] > 1.0:\n        p[0] -= 1.0\n    return\n")
+
+
+def test_a_range_with_another_step_is_refused(compiled):
+    with pytest.raises(AssertionError, match="no step but -1"):
+        compiled("@lowered_jit(CONSTANTS)\ndef f(p, c):\n    for i in range(0, 4, 2):\n        c[i] = p[i]\n    return\n")

@@ -107,3 +107,17 @@ def test_a_chart_on_its_own_is_drawn_whole():
     assert clipped(draw_stability_chart(single)) == []
     empty = chart.where(chart["horizontal"] < -1).fillna(0).assign(amplitude=chart["amplitude"] * np.nan)
     assert clipped(draw_stability_chart(empty)) == []
+
+
+@pytest.mark.parametrize(("total", "looked", "agrees"), [(0, 0, False), (50, 0, False), (50, 50, False), (5000, 50, True)])
+def test_agreement_is_never_one_on_nothing(total, looked, agrees):
+    """No change at all, 50 that nobody has looked into, 50 of 50 without a special point; and 50 of 5000."""
+    left = min(total, 50)
+    differ = xr.Dataset(
+        {"looked_into": ("change", np.arange(left) < looked), "beside_rest": ("change", np.zeros(left, dtype=bool))},
+        attrs={"changes": total, "changes_beside_rest": min(total, 9), "on_curves": 0, "chaos_beside_rest": 0, "harmless": 0},
+    )
+    panel = xr.DataTree.from_dict({"chart": xr.Dataset(), "disagreements": differ})
+    panel.attrs["frequency"] = 1.0
+    claim = statements_charts.agreement("fig14", xr.DataTree(children={"a": panel}))
+    assert (claim.verdict is Verdict.AGREES) is agrees

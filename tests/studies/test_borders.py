@@ -2,6 +2,7 @@
 
 import functools
 import importlib.util
+import types
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import saltus
 from saltus.errors import ParameterError
 from saltus.orbits import continue_orbit, continue_special, find_orbit
 from saltus.orbits.branch import follow_stable
+from saltus.studies import chart_follow
 from saltus.studies.bordered import bordered_chart
 from saltus.studies.borders import HARMLESS, Borders, curve_dataset, disagreements, exact_borders, with_borders
 from saltus.studies.chart import stability_chart
@@ -281,3 +283,23 @@ def test_ends_of_orbits_that_rest_are_special_points_too():
     _, found = with_borders(system, here, most=0)
     assert {"CH", "RL"} & {ending.said for ending in found.ends.values()}
     assert all(ending.said in KINDS for ending in found.ends.values() if np.isfinite(ending.horizontal))
+
+
+def test_an_unstable_orbit_whose_special_point_was_not_located_is_no_motion(monkeypatch):
+    unstable = towards_the_onset().points[-1].orbit
+    cells = read(chart())
+    ends = ends_of(cells)
+    goal = float(
+        cells.horizontal[ends.target[0, 1]] if ends.source[0, 0] == ends.target[0, 0] else cells.vertical[ends.target[0, 0]]
+    )
+
+    class Lost:
+        points = (types.SimpleNamespace(orbit=unstable, parameter=goal),)
+        special, ends, missed = (), ("start", "is no longer stable"), ("LP between",)
+
+    monkeypatch.setattr(chart_follow, "follow_stable", lambda *_: Lost())
+    follower = Follower(forced(), chart(), cells)
+    ending, special = follower.follow(ends.only(np.arange(len(ends)) == 0))
+    assert special is None
+    assert ending.said == "the orbit is not stable to its multipliers"
+    assert follower.missed == []
