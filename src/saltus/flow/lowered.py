@@ -3,7 +3,8 @@
 Numbers are int64 or double, arrays are C-contiguous, indices are not negative, and every variable has one type: nothing has to be
 found out. numba, which needs seconds for a structure's recurrences, sees one call a function and keeps its cache. Known are
 assignments to names, elements and tuples of them, `+=` and the like, `if`, `for` over a range (step 1 or -1), `return`,
-arithmetic, comparisons, `and`, `x if c else y`, `min`, `max`, the functions of `math`, and calls of helpers written in the same way.
+arithmetic, comparisons, `and`, `x if c else y`, `min`, `max`, the functions of `math`, and calls of helpers written in the same
+way.
 """
 
 from __future__ import annotations
