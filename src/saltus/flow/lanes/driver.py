@@ -2,7 +2,7 @@
 
 The texts of `layout.py`, `steps.py`, `observe.py`, `legs.py` and this file are compiled as one, with two of `flow`,
 once for every model, for the width of this machine's registers. What a structure adds, `code`, comes through
-pointers: `lane_series`, `lane_impact`, `lane_field` (see `straight.py`), and the scalar `constants` and `geometry`.
+pointers: `lane_series`, `lane_impact`, `lane_field` (see `emit.py`), and the scalar `constants` and `geometry`.
 
 A step of all lanes: Taylor series; a step for each lane; a sweep of Horner's rule that gives the end of the step and bounds the
 gap; Newton's method in the lanes whose gap is concave and negative at the end; impacts. A lane whose step shows anything else
@@ -83,13 +83,13 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, poly, gap):
 def meet(sizes, at, m, flags, h, start, x, v, a, bend, alive, helpers, poly, gap):
     """Which of the lanes in `alive` meet the contact within the step, which are in doubt, and when."""
     order, skip = sizes[LANE_ORDER], flags[AT_CONTACT]
-    sign = select(mask(bits(load(m, SIDE_NOW) > 0.0)), load(m, RATE_UP), load(m, RATE_DOWN))
-    curve = bend * absolute(sign)
+    rate = select(mask(bits(load(m, SIDE_NOW) > 0.0)), load(m, RATE_UP), load(m, RATE_DOWN))
+    sign = select(mask(bits(rate > 0.0)), splat(1.0), splat(-1.0))  # all that a root depends on
     g0 = sign * start
     g1, g2 = sign * load(m, at[POSITIONS] + 1) * h, sign * load(m, at[POSITIONS] + 2) * (h * h)
     g3 = sign * load(m, at[POSITIONS] + 3) * (h * h * h)
     doubtful = ((bits(g0 <= 0.0) & ~skip) | (bits(g1 <= 0.0) & skip)) & alive
-    clear, falls, concave, convex = shape(g0, g1, g2, g3, curve, skip)
+    clear, falls, concave, convex = shape(g0, g1, g2, g3, bend, skip)
     over = bits(sign * x <= 0.0)
     single = concave | (falls & ~skip) | (convex & over)
     hit = alive & ~doubtful & ~clear & single & over

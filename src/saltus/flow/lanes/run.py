@@ -16,7 +16,7 @@ from saltus.flow import layout as k
 from saltus.flow.compile import Pointer
 from saltus.flow.lanes import layout as at
 from saltus.flow.lanes.compile import load_advance, load_driver, load_helpers
-from saltus.flow.lanes.straight import Slots
+from saltus.flow.lanes.emit import Slots
 from saltus.flow.lanes.vector import WIDTH
 from saltus.flow.simulation import Program, taylor_order
 
@@ -155,5 +155,5 @@ class Lanes:
 
 
 def lane_order(tol: float) -> int:
-    """The order that pays in lanes: 12 at 1e-6, 16 at 1e-10, 20 at 1e-14; their series cost little beside the rest of a step."""
-    return round(6 - math.log10(tol))
+    """The order that pays in lanes, an even one: 16 at 1e-6, 20 at 1e-10, 24 at 1e-14; series cost little beside the rest."""
+    return min(at.HIGHEST_ORDER, max(at.LOWEST_ORDER, 2 * round((10 - math.log10(tol)) / 2)))

@@ -19,7 +19,7 @@ from saltus.flow.layout import *
 ZERO_TERM = 1e-300
 LANE_SAFETY = SAFETY  # of a step: its error is then a tenth of tol
 LOG_GAP = GAP * math.log2(math.e)
-NEARLY = 1e-5  # of the time, and of the slope: a step of Halley's method below it leaves an error of its cube
+NEARLY = 1e-5  # of the time, and of the slope: a step of Chebyshev's method below it leaves an error of its cube
 
 
 @lean_jit
@@ -155,11 +155,12 @@ def first_guess(g0, g1, g2, f, slope, pull):
     a, b, c = g0 - f + slope - 0.5 * pull, slope - g1 - pull, 2.0 * g2 - pull
     c3, c4, c5 = 10.0 * a - 4.0 * b + 0.5 * c, 7.0 * b - 15.0 * a - c, 6.0 * a - 3.0 * b + 0.5 * c
     root = square_root(maximum(slope * slope - 2.0 * f * pull, splat(0.0)))
-    d = 2.0 * f / (slope - root)
-    for _ in range(2):
+    d, inverse = 2.0 * f / (slope - root), splat(0.0)
+    for again in range(2):
         value = fma(fma(fma(fma(fma(c5, d, c4), d, c3), d, 0.5 * pull), d, -slope), d, f)
         along = fma(fma(fma(fma(5.0 * c5, d, 4.0 * c4), d, 3.0 * c3), d, pull), d, -slope)
-        d = d - value / along
+        inverse = inverse * (2.0 - along * inverse) if again else 1.0 / along  # a division costs as much as ten products
+        d = d - value * inverse
     curve = fma(fma(fma(20.0 * c5, d, 12.0 * c4), d, 6.0 * c3), d, pull)
     return d, curve
 
@@ -168,33 +169,35 @@ def first_guess(g0, g1, g2, f, slope, pull):
 def only_root(m, at, order, h, start, sign, g0, g1, g2, x, v, a, chosen):
     """The root in (0, h] of gaps that have one there, not negative at 0 (if zero, then growing) and negative at h.
 
-    Halley's method from `first_guess`, with bisection where it leaves the bracket. A lane stays where it has converged, whatever
-    the others do. Returns the root and the velocity there.
+    Chebyshev's method from `first_guess`, with bisection where it leaves the bracket; `sign` is 1 or -1, and everything is scaled
+    to a step of 1. A lane stays where it has converged, whatever the others do. Returns the root and the velocity there.
     """
     positions, velocities = at[POSITIONS], at[VELOCITIES]
-    d, curve = first_guess(g0, g1, g2, sign * x, sign * v * h, sign * a * (h * h))
-    curve = curve / (h * h)
-    low, high, tau = splat(0.0), h, h - d * h
-    sane = mask(bits(tau > 0.0) & bits(tau <= h))  # the guess may have gone astray, and its curve with it
-    tau, curve = select(sane, tau, 0.5 * h), select(sane, curve, sign * a)
+    pull = sign * a * (h * h)
+    d, curve = first_guess(g0, g1, g2, sign * x, sign * v * h, pull)
+    low, high, u, inverse = splat(0.0), splat(1.0), 1.0 - d, splat(0.0)
+    sane = mask(bits(u > 0.0) & bits(u <= 1.0))  # the guess may have gone astray, and its curve with it
+    u, curve = select(sane, u, 0.5), select(sane, curve, pull)
     active = chosen
     for _ in range(60):
-        x, v = both_at(m, positions, velocities, order, start, tau)
-        f, slope = sign * x, sign * v
+        x, v = both_at(m, positions, velocities, order, start, u * h)
+        f, slope = sign * x, sign * v * h
         before = mask(bits(f > 0.0))
-        low, high = select(before, tau, low), select(before, high, tau)
-        newton = f / slope
-        following = tau - newton / (1.0 - 0.5 * newton * curve / slope)
+        low, high = select(before, u, low), select(before, high, u)
+        inverse = select(mask(active), 1.0 / slope, inverse)
+        newton = f * inverse
+        following = u - fma(0.5 * newton * curve * inverse, newton, newton)
         inside = mask(bits(following >= low) & bits(following <= high))
         following = select(inside, following, 0.5 * (low + high))
-        moved = absolute(following - tau)
-        tau = select(mask(active), following, tau)
-        active &= bits(moved > NEARLY * tau) | bits(moved * absolute(curve) > NEARLY * absolute(slope))
+        moved = absolute(following - u)
+        u = select(mask(active), following, u)
+        active &= bits(moved > NEARLY * u) | bits(moved * absolute(curve) > NEARLY * absolute(slope))
         if active == 0:
             break
+    tau = u * h
     x, v = both_at(m, positions, velocities, order, start, tau)
-    rest = x / v
-    return tau - rest, v - curve * rest / sign
+    rest = sign * x * inverse
+    return fma(-rest, h, tau), v - v * (curve * rest * inverse)
 
 
 @lean_jit

@@ -2,7 +2,7 @@
 
 Within compiled code `+ - * / < <= > >=` work on vectors, mixed with numbers. A comparison gives a mask; `bits` turns a mask into
 an integer with one bit for each lane, on which `& | ~` work, and `mask` turns it back. Memory is counted in slots of one
-vector. `Vec` is the same vector where LLVM's code is written directly (see `straight.py`).
+vector. `Vec` is the same vector where LLVM's code is written directly (see `emit.py`).
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ WIDTH = host_width()
 ALL = (1 << WIDTH) - 1  # every lane, as bits
 VECTOR, MASK = ir.VectorType(DOUBLE, WIDTH), ir.VectorType(BIT, WIDTH)
 LONGS = ir.VectorType(LONG, WIDTH)
+ALIGNED = min(64, 8 * WIDTH)  # bytes: a vector, or a line of the cache
 FUSED = ("contract", "nsz")  # what arithmetic may do besides IEEE: fused multiply-adds
 
 
@@ -184,6 +185,14 @@ class Vec:
         return self.builder.icmp_unsigned("!=", self.builder.and_(numbers, one), ir.Constant(LONGS, [0] * WIDTH))
 
 
+def everywhere(builder: Any, number: Any) -> Vec:
+    """LLVM's number in all lanes."""
+    undefined = ir.Constant(VECTOR, ir.Undefined)
+    first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
+    zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+    return Vec(builder, builder.shuffle_vector(first, undefined, zeros))
+
+
 SINE = (
     -1.66666666666666324348e-01,
     8.33333333332248946124e-03,
@@ -252,10 +261,7 @@ def _lift(builder: Any, kind: Any, value: Any) -> Vec:
         return Vec(builder, value)
     if isinstance(kind, types.Integer):
         value = builder.sitofp(value, DOUBLE)
-    undefined = ir.Constant(VECTOR, ir.Undefined)
-    first = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
-    zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-    return Vec(builder, builder.shuffle_vector(first, undefined, zeros))
+    return everywhere(builder, value)
 
 
 def _function(result: Any, write: Callable[..., Any], count: int) -> Any:

@@ -1,4 +1,4 @@
-"""LLVM's code for tapes at one instant: every node of a trace a vector register (see `straight.py`)."""
+"""LLVM's code for tapes at one instant: every node of a trace a vector register (see `emit.py`)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from saltus.flow.lanes.vector import LONG, VECTOR, WIDTH, Vec, slot_pointer
 from saltus.flow.trace import RECORD_WIDTH
 
 if TYPE_CHECKING:
-    from saltus.flow.lanes.straight import Slots
+    from saltus.flow.lanes.emit import Slots
 
 Tape = list[tuple[Any, ...]]
 
@@ -24,16 +24,20 @@ class Writer:
         self.at, self.builder, self.fused = slots.places, builder, fused
         self._base = slot_pointer(context, builder, array_type, array, ir.Constant(LONG, 0))
 
+    def pointer(self, slot: int) -> Any:
+        """LLVM's pointer to a slot."""
+        return self.builder.gep(self._base, [ir.Constant(LONG, slot)])
+
     def load(self, slot: int) -> Vec:
         """The vector in a slot."""
-        loaded = self.builder.load(self.builder.gep(self._base, [ir.Constant(LONG, slot)]))
+        loaded = self.builder.load(self.pointer(slot))
         loaded.align = 8
         return Vec(self.builder, loaded, self.fused)
 
     def store(self, slot: int, vector: Vec | float) -> None:
         """Put a vector, or one number, into a slot."""
         value = vector.value if isinstance(vector, Vec) else ir.Constant(VECTOR, [vector] * VECTOR.count)
-        self.builder.store(value, self.builder.gep(self._base, [ir.Constant(LONG, slot)])).align = 8
+        self.builder.store(value, self.pointer(slot)).align = 8
 
     def known(self, node: tuple[Any, ...]) -> Vec | float | None:
         """A leaf that does not change along a step: a number, a parameter, a constant, the side, the time's origin."""
@@ -102,7 +106,12 @@ def add(a: Any, b: Any) -> Any:
 
 def subtract(a: Any, b: Any) -> Any:
     """a - b, where None is zero."""
-    return a if b is None else -b if a is None else a - b
+    return a if b is None else negative(b) if a is None else a - b
+
+
+def negative(a: Any) -> Any:
+    """-a, where None is zero."""
+    return None if a is None else -a
 
 
 def multiply(a: Any, b: Any) -> Any:

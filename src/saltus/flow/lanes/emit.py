@@ -1,8 +1,7 @@
-"""From a trace to straight-line code for lanes: the Taylor recurrences of `emit.py`, every coefficient a vector register.
+"""From a trace to a structure's three functions for lanes, LLVM's instructions for all lanes at once (compare `flow/emit.py`).
 
-Loops over coefficients are unrolled while LLVM's instructions are written, one operation for all lanes at once; that makes
-the series some twice as fast as loops, and it compiles in a second because numba sees three calls only. A trace reaches
-the generated file as tapes: lists of nodes, operands before what uses them, each (operation, operands or value).
+They are written directly: it takes a second, as numba sees three calls only. A trace reaches the generated file as tapes: lists
+of nodes, operands before what uses them, each (operation, operands or value). The Taylor series are in `series.py`.
 """
 
 from __future__ import annotations
@@ -11,20 +10,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
 from saltus.flow.emit import Emitter
 from saltus.flow.graph import Expr, substitute
-from saltus.flow.lanes.layout import FIRST_PLACE, HIGHEST_ORDER, NEW_SIDE, STRIDE
-from saltus.flow.lanes.recurrences import Series
-from saltus.flow.lanes.vector import LONG
-from saltus.flow.lanes.writer import Tape, Writer, multiply
+from saltus.flow.lanes.layout import FIRST_PLACE, NEW_SIDE, STRIDE
+from saltus.flow.lanes.recurrences import RULES
+from saltus.flow.lanes.series import Series
+from saltus.flow.lanes.writer import Tape, Writer
 from saltus.flow.tangent import saltation
 from saltus.flow.trace import RECORD_WIDTH, Trace
 
-LOWEST_ORDER = 8  # at which `lane_series` may end
 CACHE_LINE = 64  # bytes
 
 
@@ -138,18 +135,14 @@ def _listing(nodes: Tape, roots: list[int]) -> str:
 def write_series(slots: Slots, nodes: Tape, roots: list[int]) -> Any:
     """Compiled code for `lane_series(m, order)`: the series of positions and velocities from the state, and of the margins.
 
-    Coefficients 0..order of positions and velocities, 0..order - 1 of the margins; order from LOWEST_ORDER to HIGHEST_ORDER.
+    Coefficients 0..order of positions and velocities, 0..order - 1 of the accelerations and margins.
     """
 
     @intrinsic
     def series(typing: Any, m: Any, order: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             _align_stack(builder.function)
-            w = Series(slots, context, builder, signature.args[0], args[0])
-            end = builder.append_basic_block("end")
-            _write_orders(w, slots, nodes, roots, args[1], end)
-            builder.branch(end)
-            builder.position_at_end(end)
+            _write_orders(Series(slots, context, builder, signature.args[0], args[0]), slots, nodes, roots, args[1])
             return context.get_dummy_value()
 
         return types.void(m, types.int64), code
@@ -167,32 +160,23 @@ def _align_stack(function: Any) -> None:
     function.attributes.add("noinline")
 
 
-def _write_orders(w: Series, slots: Slots, nodes: Tape, roots: list[int], order: Any, end: Any) -> None:
-    w.expand(nodes)
-    for row in range(slots.rows):
-        w.positions[row] = [w.load(w.at["position"] + row)]
-        w.velocities[row] = [w.load(w.at["velocity"] + row)]
-        w.store(w.at["position_series"] + row * STRIDE, w.positions[row][0])
-        w.store(w.at["velocity_series"] + row * STRIDE, w.velocities[row][0])
-    for k in range(HIGHEST_ORDER):
-        w.advance(k)
+def _write_orders(w: Series, slots: Slots, nodes: Tape, roots: list[int], order: Any) -> None:
+    w.read(nodes, RULES)
+    for name in ("position", "velocity"):
         for row in range(slots.rows):
-            q, v = w.positions[row], w.velocities[row]
-            q.append(multiply(1.0 / (k + 1), v[k]))
-            v.append(multiply(1.0 / (k + 1), w.series[roots[row]][k]))
-            for name, value in (("position_series", q[k + 1]), ("velocity_series", v[k + 1])):
-                w.store(w.at[name] + row * STRIDE + k + 1, 0.0 if value is None else value)
-            if row < slots.own:
-                pull = w.series[roots[row]][k]
-                w.store(w.at["acceleration_series"] + row * STRIDE + k, 0.0 if pull is None else pull)
-        for stop, root in enumerate(roots[slots.rows :]):
-            value = w.series[root][k]
-            w.store(w.at["margin_series"] + stop * STRIDE + k, 0.0 if value is None else value)
-        if LOWEST_ORDER <= k + 1 < HIGHEST_ORDER:
-            following = w.builder.append_basic_block(f"order{k + 2}")
-            reached = w.builder.icmp_signed("==", order, ir.Constant(LONG, k + 1))
-            w.builder.cbranch(reached, end, following)
-            w.builder.position_at_end(following)
+            w.store(w.at[f"{name}_series"] + row * STRIDE, w.load(w.at[name] + row))
+    pulls = [w.rows[root] for root in roots[: slots.rows]]
+    accelerations = [w.pointer(w.at["acceleration_series"] + row * STRIDE) for row in range(slots.own)]
+    margins = [w.pointer(w.at["margin_series"] + row * STRIDE) for row in range(slots.stops)]
+    for _ in w.each_order(order):
+        w.advance()
+        for position, velocity, pull in zip(w.positions, w.velocities, pulls, strict=True):
+            w.integrate(position, w.now(velocity))
+            w.integrate(velocity, w.now(pull))
+        for place, pull in zip(accelerations, pulls, strict=False):
+            w.write(place, w.now(pull))
+        for place, root in zip(margins, roots[slots.rows :], strict=True):
+            w.write(place, w.now(w.rows[root]))
 
 
 def write_impact(slots: Slots, nodes: Tape, roots: list[int]) -> Any:
