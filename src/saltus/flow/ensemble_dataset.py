@@ -126,8 +126,12 @@ class _Writer:
 
     def add(self, name: str, values: np.ndarray, unit: str, text: str, *extra: str, **more: Any) -> None:
         """Add a variable that has a row for each trajectory, over further dimensions `extra`."""
+        import xarray
+
         reshaped = values.reshape((*self.shape, *values.shape[1:]))
-        self.variables[name] = ((*self.dims, *extra), reshaped, {"units": unit, "long_name": text} | more)
+        attributes = {"units": unit, "long_name": text} | more
+        # `fastpath`, as xarray would import Dask, where there is one, to see that a numpy array is none of Dask's
+        self.variables[name] = xarray.Variable((*self.dims, *extra), reshaped, attributes, fastpath=True)
 
 
 def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends) -> None:

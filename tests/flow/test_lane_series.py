@@ -1,0 +1,133 @@
+"""The series of the lanes: every allowed operation, in all lanes at once, against power series composed in 40 digits."""
+
+import itertools
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numba import njit, types
+from power_series import solution
+from test_emit import OPERATIONS, agrees, force
+
+from saltus.flow import jit
+from saltus.flow.emit import Emitter
+from saltus.flow.lanes.compile import load_lane_functions
+from saltus.flow.lanes.layout import HIGHEST_ORDER, LOWEST_ORDER, NOW, STRIDE
+from saltus.flow.lanes.run import lane_order
+from saltus.flow.lanes.signatures import LANE_SERIES
+from saltus.flow.lanes.vector import WIDTH
+from saltus.flow.simulation import program
+from saltus.flow.trace import RECORD_WIDTH
+from saltus.systems import Harmonic, Load, Model, Record, System, WallOscillator
+
+# Operations on a record, whose series ends: what they make ends soon, or late, or never
+OF_RECORD = {
+    "record": lambda r, q, v: r + 2 * r * q - (1 - r) * v + r / 3 - q / (2 + r),
+    "square of a record": lambda r, q, v: r * r * np.sin(q) + r * r * r - (r * r + r) * v + np.square(r * r),
+    "functions of a record": lambda r, q, v: np.cos(r * r) - np.sqrt(3 + r) * np.exp(-r) + np.log(2 + r) * np.tanh(r) * q,
+    "powers of a record": lambda r, q, v: (2 + r) ** 1.5 + np.sinh(0.3 * r) * q / np.cosh(r * v) + 1 / (2 + r) + (q + 2) ** r,
+}
+PIECE = (0.3, -0.2, 0.15, 0.4, -0.1)  # of the record, from the time of the step
+NAMES = [name for name in OPERATIONS if name != "abs"]  # a side has the first coordinate only
+STATES = [(0.35, 0.55, 0.0), (-0.45, -0.3, 2.1)]
+ORDER = 12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Many(Model):
+    """x_i'' = operation i of x_i, x_i' and the load, or of a record."""
+
+    a: float = 1.3
+    b: float = 0.6
+
+    coordinates: ClassVar[tuple[str, ...]] = tuple(f"x{i}" for i in range(len(NAMES) + len(OF_RECORD)))
+    channels: ClassVar[tuple[str, ...]] = ("force", "pulse")
+    sides: ClassVar[tuple[int, ...]] = ()
+
+    def acceleration(self, t, position, velocity, side, load):
+        states = list(zip(position, velocity, strict=True))
+        f, r = load.force(t), load.pulse(t)
+        first = [OPERATIONS[name](*state, f, self.a, self.b) for name, state in zip(NAMES, states, strict=False)]
+        return (*first, *(rule(r, *state) for rule, state in zip(OF_RECORD.values(), states[len(NAMES) :], strict=True)))
+
+
+class LaneSeries:
+    """The compiled series of a system, for states in all lanes at once."""
+
+    def __init__(self, system):
+        self.run = program(system)
+        emitter = Emitter(self.run.trace)
+        emitter.source()
+        self.slots, (self.function, *_) = load_lane_functions(self.run.trace, emitter)
+        with jit.pointers():
+            kind = types.FunctionType(LANE_SERIES)
+            self.call = njit(types.void(kind, types.float64[::1], types.int64))(_call)
+
+    def coefficients(self, states, order):
+        """Of positions, velocities, accelerations, shape (lanes, coordinates, STRIDE); `states` = (t, positions, velocities)."""
+        places, rows = self.slots.places, self.slots.rows
+        m = np.full(places["end"] * WIDTH, np.nan)
+        memory = m.reshape(-1, WIDTH)
+        for lane in range(WIDTH):
+            memory[NOW, lane], q, v = states[lane % len(states)]
+            memory[NOW + 1, lane], memory[NOW + 2, lane] = 0.0, 1.0
+            memory[places["position"] : places["position"] + rows, lane] = q
+            memory[places["velocity"] : places["velocity"] + rows, lane] = v
+        for name, values in (("parameters", self.run.env[0]), ("constants", self.run.env[1])):
+            memory[places[name] : places[name] + len(values)] = values[:, None]
+        for k in range(self.slots.records * RECORD_WIDTH):
+            memory[places["records"] + k] = PIECE[k]
+        self.call(self.function, m, order)
+        series = [
+            memory[places[f"{name}_series"] : places[f"{name}_series"] + rows * STRIDE].reshape(rows, STRIDE, WIDTH)
+            for name in ("position", "velocity", "acceleration")
+        ]
+        return [part.transpose(2, 0, 1) for part in series]
+
+
+def _call(function, m, order):
+    function(m, order)
+
+
+def test_series_of_each_operation_and_of_every_order_in_lanes():
+    """One structure for all of them, as compiling it is what takes time."""
+    pulse = Record([0.0, 1.0, 2.0], [0.1, 0.4, 0.3])
+    load = Load(frequency=1.3, force=Harmonic(0.4, phase=0.7) + Harmonic(0.2, mean=0.1, order=3), pulse=pulse)  # see `force`
+    series, rows = LaneSeries(System(model=Many(), load=load)), len(Many.coordinates)
+    states = [(t, [x] * rows, [v] * rows) for x, v, t in STATES]
+    computed = series.coefficients(states, ORDER)
+    wrong = []
+    for row, name in enumerate([*NAMES, *OF_RECORD]):
+        for i, (x, v, t) in enumerate(STATES):
+            expected = _expected(name, x, v, t)
+            wrong += [(name, lane) for lane in range(i, WIDTH, 2) if not agrees(computed[0][lane, row, : ORDER + 1], expected)]
+    assert not wrong
+    orders = np.arange(1, ORDER + 1)
+    for part, slope in itertools.pairwise(computed):
+        assert np.allclose(slope[:, :, :ORDER], part[:, :, 1 : ORDER + 1] * orders, rtol=1e-15, atol=0.0)
+    whole = series.coefficients(states, HIGHEST_ORDER)
+    for order in range(LOWEST_ORDER, HIGHEST_ORDER, 2):  # made in pairs: none lacks its last coefficient or changes one before
+        for part, last, complete in zip(series.coefficients(states, order), (order, order, order - 1), whole, strict=True):
+            assert np.array_equal(part[:, :, : last + 1], complete[:, :, : last + 1])
+
+
+def _expected(name, x, v, t):
+    """The coefficients of x about t, in 40 digits."""
+    if name in OF_RECORD:
+        return solution(lambda s, q, w: OF_RECORD[name](sum(c * s**k for k, c in enumerate(PIECE)), q, w), x, v, 0.0, ORDER)
+    return solution(lambda s, q, w: OPERATIONS[name](q, w, force(s), 1.3, 0.6), x, v, t, ORDER)
+
+
+def test_a_linear_system_needs_no_sums():
+    """x'' = -x - 0.2 x' + 0.3 sin 2t, whose coefficients follow from each other."""
+    lanes = LaneSeries(System(model=WallOscillator(damping=0.2), load=Load(frequency=2.0, force=Harmonic(0.3))))
+    expected = solution(lambda t, q, v: -q - 0.2 * v + 0.3 * np.sin(2.0 * t), 0.4, -1.1, 0.7, 16)
+    for position in lanes.coefficients([(0.7, [0.4], [-1.1])], 16)[0]:
+        assert agrees(position[0, :17], expected)
+
+
+def test_orders_are_even_and_within_their_bounds():
+    for tol in np.geomspace(1e-15, 1e-6, 37):
+        order = lane_order(tol)
+        assert order % 2 == 0
+        assert LOWEST_ORDER <= order <= HIGHEST_ORDER
