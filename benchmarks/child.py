@@ -26,9 +26,11 @@ def first(module: str, name: str, variant: str = "") -> dict[str, Any]:
     """Seconds for the first motion at 1e-10, after the imports; a variant of the system is for saltus only."""
     home = importlib.import_module(f"peers.{module}")
     if module.startswith("saltus"):  # what its first use imports
-        import numba  # noqa: F401
+        import saltus
 
-        import saltus.flow  # noqa: F401
+        if module == "saltus_lanes":
+            import xarray  # noqa: F401
+        getattr(saltus, "simulate_many" if module == "saltus_lanes" else "simulate")
     start = time.perf_counter()
     flow = home.flow_of(variant, 1e-10) if variant else find(module, name).setup(1e-10)
     theta, _ = flow(np.array([0.3]), np.array([0.0]))

@@ -11,6 +11,7 @@ from tasks.startup import CACHED, OTHER_NUMBERS, OTHER_STRUCTURE
 TARGETS = (1e-6, 1e-8, 1e-10, 1e-12, 1e-13, 1e-14)
 OURS = "saltus lanes"
 LOST = 1e-2  # an error above this is a motion lost, not a motion followed coarsely
+START = 0.5  # seconds
 AT_LEAST = {
     "heyoka.py batch": 5.0,
     "SciPy DOP853": 1000.0,
@@ -50,15 +51,18 @@ def asked(results: dict[str, Any]) -> list[tuple[str, str, str]]:
 def _asked_of_a_start(row: dict[str, Any]) -> list[tuple[str, str, str]]:
     if "fails" in row:
         return []
-    peer, seconds, after, most = row["peer"], row["median"], row["after_imports"], 0.5
+    peer, seconds, after = row["peer"], row["median"], row["after_imports"]
     if row["start"] == OTHER_STRUCTURE:
         return [(f"{peer}: a structure compiled under 10 s", f"{after:.1f} s after the imports", _verdict(after < 10))]
     if row["start"] == OTHER_NUMBERS:
         files = row["new_files"]
         return [(f"{peer}: nothing compiled for other numbers", f"{files} files added", _verdict(not files))]
     if row["start"] == CACHED:
-        found = f"{seconds:.2f} s, of which {after:.2f} after the imports"
-        return [(f"{peer}: a cached start under {most:g} s", found, _verdict(seconds < most))]
+        wanted = f"{peer}: a cached start under {START:g} s"
+        return [
+            (f"{wanted}, its packages imported", f"{after:.2f} s", _verdict(after < START)),
+            (f"{wanted}, Python and all imports included", f"{seconds:.2f} s", _verdict(seconds < START)),
+        ]
     return []
 
 

@@ -459,13 +459,14 @@ def nudged(cases, rng):
 def amplification(cases, ensemble, tol, rng):
     """By how much each motion magnifies an error of its numbers, at least 1; inf where an impact appears or vanishes.
 
-    A slow impact magnifies by its speed's inverse. That shows unless all numbers conspire, as where a motion from the contact
-    comes back to it with the speed that it had: so it is looked at in itself, where it is one of few.
+    A slow impact magnifies by its speed's inverse. That shows unless all numbers conspire, as where a motion without loss comes
+    back to the contact with the speed that it had: so slow impacts are looked at in themselves, where there are few.
     """
     other, state = nudged(cases, rng).in_lanes(tol=tol, sample=("speed",), last="all"), end_state(ensemble, cases.system)
     moved = np.abs(end_state(other, cases.system) - state).max(axis=1) / np.maximum(1.0, np.abs(state).max(axis=1))
     same = (other.stop.values == ensemble.stop.values) & (other.crossings.values == ensemble.crossings.values)
     calm = same & (ensemble.grazings.values == 0) & (other.grazings.values == 0)
     slowest = other.least_speed.min("period").fillna(np.inf).values  # a period that a limit ends is not kept
-    slow = np.where(other.crossings.values <= 5, 1e-1 / np.maximum(slowest, 1e-300), 1.0)
+    crossings = other.crossings.values
+    slow = np.where(crossings <= 10, crossings * 1e-1 / np.maximum(slowest, 1e-300), 1.0)
     return np.where(calm, np.maximum(np.maximum(moved / NUDGE, slow), 1.0), math.inf)

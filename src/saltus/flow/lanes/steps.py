@@ -20,6 +20,7 @@ ZERO_TERM = 1e-300
 LANE_SAFETY = SAFETY  # of a step: its error is then a tenth of tol
 LOG_GAP = GAP * math.log2(math.e)
 NEARLY = 1e-5  # of the time, and of the slope: a step of Chebyshev's method below it leaves an error of its cube
+NOTHING = 1e-12  # of the time: what is left after a shorter move is rounding
 
 
 @lean_jit
@@ -175,7 +176,8 @@ def only_root(m, at, order, h, start, sign, g0, g1, g2, x, v, a, chosen):
     positions, velocities = at[POSITIONS], at[VELOCITIES]
     pull = sign * a * (h * h)
     d, curve = first_guess(g0, g1, g2, sign * x, sign * v * h, pull)
-    low, high, u, inverse = splat(0.0), splat(1.0), 1.0 - d, splat(0.0)
+    low, high, u = splat(0.0), splat(1.0), 1.0 - d
+    inverse, last, moved = splat(0.0), splat(0.0), splat(0.0)
     sane = mask(bits(u > 0.0) & bits(u <= 1.0))  # the guess may have gone astray, and its curve with it
     u, curve = select(sane, u, 0.5), select(sane, curve, pull)
     active = chosen
@@ -184,20 +186,22 @@ def only_root(m, at, order, h, start, sign, g0, g1, g2, x, v, a, chosen):
         f, slope = sign * x, sign * v * h
         before = mask(bits(f > 0.0))
         low, high = select(before, u, low), select(before, high, u)
-        inverse = select(mask(active), 1.0 / slope, inverse)
+        going = mask(active)
+        inverse, last = select(going, 1.0 / slope, inverse), select(going, v, last)
         newton = f * inverse
         following = u - fma(0.5 * newton * curve * inverse, newton, newton)
         inside = mask(bits(following >= low) & bits(following <= high))
         following = select(inside, following, 0.5 * (low + high))
-        moved = absolute(following - u)
-        u = select(mask(active), following, u)
-        active &= bits(moved > NEARLY * u) | bits(moved * absolute(curve) > NEARLY * absolute(slope))
+        moved = select(going, following - u, moved)
+        u = select(going, following, u)
+        active &= bits(absolute(moved) > NEARLY * u) | bits(absolute(moved * curve) > NEARLY * absolute(slope))
         if active == 0:
             break
     tau = u * h
     x, v = both_at(m, positions, velocities, order, start, tau)
     rest = sign * x * inverse
-    return fma(-rest, h, tau), v - v * (curve * rest * inverse)
+    share = select(mask(bits(absolute(moved) > NOTHING * u)), rest / moved, 0.0)  # of how the last move changed the velocity
+    return fma(-rest, h, tau), v - (v - last) * share
 
 
 @lean_jit
