@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import saltus
+from saltus import flow
 
 SOURCE = Path(saltus.__file__).parent
 
@@ -55,7 +56,23 @@ def test_every_public_name_is_there(name: str) -> None:
     assert getattr(saltus, name) is not None
 
 
+@pytest.mark.parametrize("name", flow.__all__)
+def test_every_name_of_the_flow_is_there(name: str) -> None:
+    assert getattr(flow, name) is not None
+
+
+def test_one_motion_needs_no_lanes_and_an_ensemble_no_dask() -> None:
+    start = "import sys, saltus; s = saltus.System(model=saltus.WallOscillator(damping=0.1), load=saltus.Load(force=0.3))"
+    ask = "print([m for m in ('saltus.flow.lanes', 'xarray', 'dask') if m in sys.modules])"
+    motion, ensemble = "saltus.simulate(s, x=0.5, duration=1.0)", "saltus.simulate_many(s, x=[0.5, 0.4], duration=1.0)"
+    command = [sys.executable, "-c", "; ".join([start, motion, ask, ensemble, ask])]
+    result = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert result.stdout.split("\n")[:2] == ["[]", "['saltus.flow.lanes', 'xarray']"]
+
+
 def test_a_wrong_public_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no 'Motoin'"):
+        _ = flow.Motoin
     with pytest.raises(AttributeError, match="no 'simulat'"):
         _ = saltus.simulat
 

@@ -460,13 +460,15 @@ def amplification(cases, ensemble, tol, rng):
     """By how much each motion magnifies an error of its numbers, at least 1; inf where an impact appears or vanishes.
 
     A slow impact magnifies by its speed's inverse. That shows unless all numbers conspire, as where a motion without loss comes
-    back to the contact with the speed that it had: so slow impacts are looked at in themselves, where there are few.
+    back to the contact with the speed that it had (among 10^5 cases: six impacts at 0.00165 by `energy_restitution`, batch 16,
+    row 128). So where impacts are few the inverse speeds are added up, an impact's being at most that of its period's slowest.
     """
-    other, state = nudged(cases, rng).in_lanes(tol=tol, sample=("speed",), last="all"), end_state(ensemble, cases.system)
+    other = nudged(cases, rng).in_lanes(tol=tol, sample=("speed", "crossings"), last="all")
+    state = end_state(ensemble, cases.system)
     moved = np.abs(end_state(other, cases.system) - state).max(axis=1) / np.maximum(1.0, np.abs(state).max(axis=1))
     same = (other.stop.values == ensemble.stop.values) & (other.crossings.values == ensemble.crossings.values)
     calm = same & (ensemble.grazings.values == 0) & (other.grazings.values == 0)
-    slowest = other.least_speed.min("period").fillna(np.inf).values  # a period that a limit ends is not kept
-    crossings = other.crossings.values
-    slow = np.where(crossings <= 10, crossings * 1e-1 / np.maximum(slowest, 1e-300), 1.0)
+    slowest = np.maximum(other.least_speed.fillna(np.inf), 1e-300)  # a period that a limit ends is not kept
+    added = (other.period_crossings.fillna(0.0) / slowest).sum("period").values
+    slow = np.where(other.crossings.values <= 10, 1e-1 * added, 1.0)
     return np.where(calm, np.maximum(np.maximum(moved / NUDGE, slow), 1.0), math.inf)

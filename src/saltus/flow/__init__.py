@@ -42,7 +42,13 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name in _HOME_OF:
-        return getattr(import_module(_HOME_OF[name]), name)
-    raise AttributeError(f"saltus.flow has no {name!r}; see dir(saltus.flow)")
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        if name in _HOME_OF:
+            return getattr(import_module(_HOME_OF[name]), name)
+        raise AttributeError(f"saltus.flow has no {name!r}; see dir(saltus.flow)")
+
+
+def __dir__() -> list[str]:
+    return __all__

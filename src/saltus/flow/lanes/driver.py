@@ -5,7 +5,7 @@ once for every model, for the width of this machine's registers. What a structur
 pointers: `lane_series`, `lane_impact`, `lane_field` (see `emit.py`), and the scalar `constants` and `geometry`.
 
 A step of all lanes: Taylor series; a step for each lane; a sweep of Horner's rule that gives the end of the step and bounds the
-gap; Newton's method in the lanes whose gap is concave and negative at the end; impacts. A lane whose step shows anything else
+gap; Chebyshev's method in the lanes whose gap has one root for certain; impacts. A lane whose step shows anything else
 -- rest, slow impacts, a gap that cannot be decided, a limit, a number out of range -- visits the scalar kernel (`visits.py`)
 from the start of that step. No lane sees another one, so results depend neither on the width nor on the order.
 

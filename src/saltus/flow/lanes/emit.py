@@ -18,11 +18,10 @@ from saltus.flow.graph import Expr, substitute
 from saltus.flow.lanes.layout import FIRST_PLACE, NEW_SIDE, STRIDE
 from saltus.flow.lanes.recurrences import RULES
 from saltus.flow.lanes.series import Series
+from saltus.flow.lanes.vector import CACHE_LINE
 from saltus.flow.lanes.writer import Tape, Writer
 from saltus.flow.tangent import saltation
 from saltus.flow.trace import RECORD_WIDTH, Trace
-
-CACHE_LINE = 64  # bytes
 
 
 @dataclass(frozen=True)
@@ -135,7 +134,8 @@ def _listing(nodes: Tape, roots: list[int]) -> str:
 def write_series(slots: Slots, nodes: Tape, roots: list[int]) -> Any:
     """Compiled code for `lane_series(m, order)`: the series of positions and velocities from the state, and of the margins.
 
-    Coefficients 0..order of positions and velocities, 0..order - 1 of the accelerations and margins.
+    Coefficients 0..order of positions and velocities, 0..order - 1 of the accelerations and margins; an even order from
+    LOWEST_ORDER to HIGHEST_ORDER.
     """
 
     @intrinsic

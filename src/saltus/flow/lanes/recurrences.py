@@ -27,7 +27,7 @@ def _derivative(w: Series, u: Row, other: Row) -> Coefficient:
 
 
 def _sine(w: Series, own: Row, u: Row) -> None:
-    s, c = w.beside(u, "sin"), w.beside(u, "cos")
+    s, c = (w.beside(u, name, own.degree, own.early) for name in ("sin", "cos"))
     sine, cosine = w.start(u).sin_cos() if w.starts else (_derivative(w, u, c), negative(_derivative(w, u, s)))
     w.push(s, sine)
     w.push(c, cosine)
@@ -35,7 +35,7 @@ def _sine(w: Series, own: Row, u: Row) -> None:
 
 def _hyperbolic(name: str, other: str) -> Callable[..., None]:
     def rule(w: Series, own: Row, u: Row) -> None:
-        twin = w.beside(own, other)
+        twin = w.beside(own, other, own.degree, own.early)
         values = [w.start(u).lane_by_lane(f) if w.starts else _derivative(w, u, g) for f, g in ((name, twin), (other, own))]
         w.push(own, values[0])
         w.push(twin, values[1])
@@ -44,7 +44,7 @@ def _hyperbolic(name: str, other: str) -> Callable[..., None]:
 
 
 def _hyperbolic_tangent(w: Series, own: Row, u: Row) -> None:
-    square = w.beside(own, "1 - tanh^2")
+    square = w.beside(own, "1 - tanh^2", own.degree, own.early)
     w.push(own, w.start(u).lane_by_lane("tanh") if w.starts else _derivative(w, u, square))
     below = negative(w.product(own, own))
     w.push(square, add(1.0, below) if w.starts else below)
@@ -58,7 +58,7 @@ def _logarithm(w: Series, own: Row, u: Row) -> None:
     if w.starts:
         w.push(own, w.start(u).lane_by_lane("log"))
     else:
-        below = w.per_order(w.product(w.beside(own, "scaled"), u, first=False, last=False))
+        below = w.per_order(w.product(w.scaled(own, newest=False), u, first=False, last=False))
         w.push(own, multiply(subtract(w.now(u), below), w.inverse(u)))
     w.scaled(own)
 
@@ -78,7 +78,7 @@ def _power(w: Series, own: Row, u: Row, exponent: Row) -> None:
         w.push(own, w.start(u).lane_by_lane("pow", p))
     else:
         above = multiply(p, w.product(w.scaled(u), own, first=False))
-        below = w.product(u, w.beside(own, "scaled"), first=False, last=False)
+        below = w.product(u, w.scaled(own, newest=False), first=False, last=False)
         w.push(own, multiply(w.inverse(u), w.per_order(subtract(above, below))))
     w.scaled(own)
 

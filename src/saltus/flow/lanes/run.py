@@ -17,7 +17,7 @@ from saltus.flow.compile import Pointer
 from saltus.flow.lanes import layout as at
 from saltus.flow.lanes.compile import load_advance, load_driver, load_helpers
 from saltus.flow.lanes.emit import Slots
-from saltus.flow.lanes.vector import WIDTH
+from saltus.flow.lanes.vector import CACHE_LINE, WIDTH
 from saltus.flow.simulation import Program, taylor_order
 
 CHUNK = 1024  # trajectories that one call of the driver runs: some milliseconds a forcing period
@@ -148,12 +148,12 @@ class Lanes:
 
     def _memory(self) -> np.ndarray:
         """The lanes' memory; vectors lie within one line of the cache each, or every load would touch two."""
-        size, line = self.slots.places["end"] * WIDTH, 8
+        size, line = self.slots.places["end"] * WIDTH, CACHE_LINE // 8
         buffer = np.zeros(size + line)
         start = -(buffer.ctypes.data // 8) % line
         return buffer[start : start + size]
 
 
 def lane_order(tol: float) -> int:
-    """The order that pays in lanes, an even one: 16 at 1e-6, 20 at 1e-10, 24 at 1e-14; series cost little beside the rest."""
-    return min(at.HIGHEST_ORDER, max(at.LOWEST_ORDER, 2 * round((10 - math.log10(tol)) / 2)))
+    """The order that pays in lanes: 16 at 1e-6, 20 at 1e-10, 24 at 1e-14; always even (see `layout.py`)."""
+    return 2 * math.ceil((9 - math.log10(tol)) / 2 - 1e-9)

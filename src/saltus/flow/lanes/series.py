@@ -21,7 +21,7 @@ from llvmlite import ir
 from numba.core import cgutils
 
 from saltus.flow.lanes.layout import NOW, STRIDE
-from saltus.flow.lanes.vector import ALIGNED, DOUBLE, LONG, VECTOR, Vec, everywhere
+from saltus.flow.lanes.vector import CACHE_LINE, DOUBLE, LONG, VECTOR, WIDTH, Vec, everywhere
 from saltus.flow.lanes.writer import Tape, Writer, dot, multiply
 from saltus.flow.trace import RECORD_WIDTH
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from saltus.flow.lanes.emit import Slots
 
 MOST_SUMS = 3  # products of an inner loop: their sums and what they load fit into the registers of AVX-512 and of AVX2
-MOST_ENDING = 7  # the highest degree of a series whose end is made use of
+MOST_ENDING = 7  # the highest degree of a series whose end is made use of: all orders to it are written out, of LOWEST_ORDER
 LEAVES = {"number": 0, "parameter": 0, "constant": 0, "side": 0, "origin": 0, "time": 1, "record": RECORD_WIDTH - 1}  # degrees
 
 Coefficient = Vec | float | None  # None: zero
@@ -130,12 +130,16 @@ class Series(Writer):
     def advance(self) -> None:
         """Append the coefficient of this order to every node's series."""
         for row, node in zip(self.rows, self.nodes, strict=True):
-            if node[0] in ("coordinate", "velocity") or (self.ahead is not None and row.degree is not None) or self._has(row):
+            if (
+                node[0] in ("coordinate", "velocity")
+                or (self.ahead is not None and row.degree is not None)
+                or self._is_known(row)
+            ):
                 continue
             if node[0] in LEAVES:
                 self.push(row, self._leaf(node))
             else:
-                with self._where(row):
+                with self._before_sums(row):
                     self.rules[node[0]](self, row, *(self.rows[i] for i in node[1:]))
 
     def _leaf(self, node: tuple[Any, ...]) -> Coefficient:
@@ -148,7 +152,7 @@ class Series(Writer):
 
     def integrate(self, row: Row, slope: Coefficient) -> None:
         """Append to a position or velocity the coefficient of the next order, from that of its derivative at this one."""
-        value = multiply(self._per(1), slope)
+        value = multiply(self._reciprocal(1), slope)
         if self.ahead != 1:
             self.push(row, value)
         self.write(row.place, value, 1)
@@ -180,24 +184,26 @@ class Series(Writer):
             return row.first[self.order]
         return row.pair[self.ahead] if row.degree is None else None
 
-    def beside(self, row: Row, name: str, degree: int | None = None, early: bool = False) -> Row:
+    def beside(self, row: Row, name: str, degree: int | None, early: bool) -> Row:
         """A series that is needed besides one that has a node; empty at first."""
         return self._beside.setdefault((id(row), name), Row(degree, early))
 
-    def scaled(self, u: Row) -> Row:
-        """j u_j, up to this order."""
+    def scaled(self, u: Row, newest: bool = True) -> Row:
+        """j u_j, up to this order, or up to the one before where u has no more."""
         row = self.beside(u, "scaled", u.degree, u.early)
+        if not newest:
+            return row
         if self.ahead is None:
             for j in range(len(row.first), self.order + 1):
                 row.first.append(multiply(float(j), u.first[j]) if j else None)
-        elif row.degree is None and not self._has(row):
-            with self._where(row):
+        elif row.degree is None and not self._is_known(row):
+            with self._before_sums(row):
                 self.push(row, multiply(self._number + float(self.ahead), self.now(u)))
         return row
 
     def per_order(self, value: Coefficient) -> Coefficient:
         """A coefficient divided by this order."""
-        return multiply(self._per(0), value)
+        return multiply(self._reciprocal(0), value)
 
     def inverse(self, row: Row) -> Any:
         """One over coefficient 0."""
@@ -213,28 +219,28 @@ class Series(Writer):
         for one, other, whole in ((a, b, first), (b, a, last)):
             if one.degree is not None:
                 return dot([(one.first[j], self._back(other, j)) for j in range(one.degree, -1 if whole else 0, -1)])
-        slow, carried = (a, b) if b.early or not a.early else (b, a)
+        forward, backward = (a, b) if b.early or not a.early else (b, a)
         newest = []
         if self.ahead == 1:
-            newest = [(slow.pair[0], carried.first[1])]
-            newest += [] if carried.early else [(slow.first[1], carried.pair[0])]
+            newest = [(forward.pair[0], backward.first[1])]
+            newest += [] if backward.early else [(forward.first[1], backward.pair[0])]
         newest += [(a.first[0], self.now(b))] if first else []
         newest += [(self.now(a), b.first[0])] if last else []
-        return dot(newest, self._earlier(slow, carried)[self.ahead])
+        return dot(newest, self._earlier(forward, backward)[self.ahead])
 
     # --- memory ----------------------------------------------------------------------------------------------------------------
 
-    def _has(self, row: Row) -> bool:
+    def _is_known(self, row: Row) -> bool:
         return len(row.first) > self.order if self.ahead is None else len(row.pair) > self.ahead
 
-    def _per(self, more: int) -> Any:
+    def _reciprocal(self, more: int) -> Any:
         """One over this order, or over a following one."""
         if self.ahead is None:
             return 1.0 / (self.order + more)
         index = self.builder.add(self.order, LONG(self.ahead + more))
         return everywhere(self.builder, self.builder.load(self.builder.gep(self._reciprocals, [LONG(0), index])))
 
-    def _where(self, row: Row) -> AbstractContextManager[Any]:
+    def _before_sums(self, row: Row) -> AbstractContextManager[Any]:
         """Where the code for a series' coefficient goes: before the sums if it can."""
         return self.builder.goto_block(self._head) if self.ahead == 0 and row.early else nullcontext()
 
@@ -257,20 +263,21 @@ class Series(Writer):
                 self._lasts[id(row)] = row, self.builder.phi(VECTOR)
         return Vec(self.builder, self._lasts[id(row)][1])
 
-    def _earlier(self, slow: Row, carried: Row) -> tuple[Vec, Vec]:
+    def _earlier(self, forward: Row, backward: Row) -> tuple[Vec, Vec]:
         """The sums of a product for both orders of a pair, made in an inner loop."""
-        key = (id(slow), id(carried))
+        key = (id(forward), id(backward))
         if key not in self._sums:
             if not self._loops or self._loops[-1].full:
                 self._loops.append(_InnerLoop(self))
-            self._sums[key] = self._loops[-1].sums(slow, carried)
+            self._sums[key] = self._loops[-1].sums(forward, backward)
         return self._sums[key]
 
     def _at(self, row: Row, index: Any) -> Vec:
         """A coefficient from memory, where the series is from now on."""
         if row.place is None:
-            row.place = cgutils.alloca_once(self.builder, VECTOR, STRIDE)
-            row.place.align = ALIGNED
+            with self.builder.goto_entry_block():
+                row.place = self.builder.alloca(VECTOR, STRIDE)
+            row.place.align = min(CACHE_LINE, 8 * WIDTH)
             self._kept.append(row)
         loaded = self.builder.load(self.builder.gep(row.place, [index]))
         loaded.align = 8
@@ -310,12 +317,12 @@ class _InnerLoop:
         """Whether it should make no further sums."""
         return self._made == MOST_SUMS
 
-    def sums(self, slow: Row, carried: Row) -> tuple[Vec, Vec]:
-        """sum a_j b_{k-j} and sum a_j b_{k+1-j}; the second has a_1 b_k only if b_k is known before the loop."""
+    def sums(self, forward: Row, backward: Row) -> tuple[Vec, Vec]:
+        """sum a_j b_{k-j} and sum a_j b_{k+1-j} of a `forward`, b `backward`; a_1 b_k only if b_k is known before the loop."""
         self._made += 1
         with self.builder.goto_block(self.block):
-            a, b = self._load(slow, False), self._load(carried, True)
-            return self._sum(a, b), self._sum(a, self._before(carried, b))
+            a, b = self._load(forward, False), self._load(backward, True)
+            return self._sum(a, b), self._sum(a, self._before(backward, b))
 
     def _variable(self, kind: Any) -> Any:
         with self.builder.goto_block(self.block):

@@ -19,7 +19,7 @@ from saltus.flow.layout import *
 ZERO_TERM = 1e-300
 LANE_SAFETY = SAFETY  # of a step: its error is then a tenth of tol
 LOG_GAP = GAP * math.log2(math.e)
-NEARLY = 1e-5  # of the time, and of the slope: a step of Chebyshev's method below it leaves an error of its cube
+NEARLY = 1e-5  # of the time, and of the slope: after a shorter move one correction with the same slope is exact to rounding
 NOTHING = 1e-12  # of the time: what is left after a shorter move is rounding
 
 
@@ -170,8 +170,8 @@ def first_guess(g0, g1, g2, f, slope, pull):
 def only_root(m, at, order, h, start, sign, g0, g1, g2, x, v, a, chosen):
     """The root in (0, h] of gaps that have one there, not negative at 0 (if zero, then growing) and negative at h.
 
-    Chebyshev's method from `first_guess`, with bisection where it leaves the bracket; `sign` is 1 or -1, and everything is scaled
-    to a step of 1. A lane stays where it has converged, whatever the others do. Returns the root and the velocity there.
+    Chebyshev's method from `first_guess`, with bisection where it leaves the bracket; `sign` is 1 or -1. Inside, the
+    step is 1. A lane stays where it has converged, whatever the others do. Returns the root and the velocity there.
     """
     positions, velocities = at[POSITIONS], at[VELOCITIES]
     pull = sign * a * (h * h)

@@ -44,7 +44,7 @@ WIDTH = host_width()
 ALL = (1 << WIDTH) - 1  # every lane, as bits
 VECTOR, MASK = ir.VectorType(DOUBLE, WIDTH), ir.VectorType(BIT, WIDTH)
 LONGS = ir.VectorType(LONG, WIDTH)
-ALIGNED = min(64, 8 * WIDTH)  # bytes: a vector, or a line of the cache
+CACHE_LINE = 64  # bytes
 FUSED = ("contract", "nsz")  # what arithmetic may do besides IEEE: fused multiply-adds
 
 
