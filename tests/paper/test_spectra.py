@@ -17,8 +17,16 @@ QUICK = {
     "fig12": {"values": [0.3, 2.0], "starts": 16, "max_period": 1, "repelling": 0, "switch": False},
     "fig13": {"values": [0.3, 1.2], "starts": 16, "max_period": 1, "repelling": 0, "switch": False},
 }
-ERRATA = {"fig11": {24, 30}}
-NEED_A_WHOLE_SEARCH = {"fig11-coexistence", "fig12-coexistence"}  # how many motions there are: not from a quick one
+ERRATA = {"fig09": {22}, "fig10": {22}, "fig11": {24, 30, 32}}
+# How many motions there are, and where chaos begins and ends: not from a quick search at two or three values
+NEED_A_WHOLE_SEARCH = {
+    "fig09-chaos",
+    "fig09-chaos-range",
+    "fig09-pierced",
+    "fig11-coexistence",
+    "fig11-route",
+    "fig12-coexistence",
+}
 
 
 @pytest.mark.parametrize("name", QUICK)

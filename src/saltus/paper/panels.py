@@ -12,7 +12,7 @@ from typing import Any
 from saltus.flow.lanes.run import available_cores
 
 
-def each(make: Callable[..., Any], values: Mapping[str, Any], longest: str = "last", **options: Any) -> dict[str, Any]:
+def each(make: Callable[..., Any], values: Mapping[str, Any], /, longest: str = "last", **options: Any) -> dict[str, Any]:
     """`make(value, **options)` for every value, by the value's name.
 
     Those that take `longest` are begun first: the "first" or the "last" of the figure. Branches are followed by one core, so

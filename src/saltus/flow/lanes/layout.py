@@ -17,7 +17,7 @@ FIRST_PLACE = 15
 POSITION, VELOCITY, NEW_POSITION, NEW_VELOCITY, AFTER_POSITION, AFTER_VELOCITY = 0, 1, 2, 3, 4, 5
 PARAMETERS, CONSTANTS_AT, RECORDS, POSITIONS, VELOCITIES, ACCELERATIONS, MARGINS, END_OF_MEMORY = 6, 7, 8, 9, 10, 11, 12, 13
 
-LOWEST_ORDER, HIGHEST_ORDER = 16, 24  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
+LOWEST_ORDER, HIGHEST_ORDER = 12, 20  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
 STRIDE = HIGHEST_ORDER + 1  # slots of one series
 
 # Numbers of a structure and of a call, in `sizes`.

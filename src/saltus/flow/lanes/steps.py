@@ -18,7 +18,7 @@ from saltus.flow.layout import *
 
 ZERO_TERM = 1e-300
 LANE_SAFETY = SAFETY  # of a step: its error is then a tenth of tol
-LOG_GAP = GAP * math.log2(math.e)
+LOG_GAP = 0.5 * math.log2(math.e)  # for GAP: the shorter series of the lanes are looked at a little sooner
 NEARLY = 1e-5  # of the time, and of the slope: after a shorter move one correction with the same slope is exact to rounding
 NOTHING = 1e-12  # of the time: what is left after a shorter move is rounding
 
