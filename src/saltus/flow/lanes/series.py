@@ -6,8 +6,8 @@ which a product of two series takes for both orders a sum over coefficients that
     sum_{j=1}^{k-1} a_j b_{k-j}    and    sum_{j=1}^{k-1} a_j b_{k+1-j}.
 
 An inner loop makes both for up to MOST_SUMS products: what it loads serves both orders, and its code is so short that the
-processor keeps it decoded; written out order by order it takes half as long again. What the newest coefficients add comes after
-that loop. A series that ends, as the time's does, needs no loop: its few terms are written out.
+processor keeps it decoded; written out order by order a call takes 5 to 30 % longer at orders 12 to 20. What the newest
+coefficients add comes after that loop. A series that ends, as the time's does, needs no loop: its few terms are written out.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from saltus.flow.lanes.emit import Slots
 
 MOST_SUMS = 3  # products of an inner loop: their sums and what they load fit into the registers of AVX-512 and of AVX2
-MOST_ENDING = 7  # the highest degree of a series whose end is made use of: all orders to it are written out, of LOWEST_ORDER
+MOST_ENDING = 7  # the highest degree of a series whose end is made use of; the orders written out for it must be < LOWEST_ORDER
 LEAVES = {"number": 0, "parameter": 0, "constant": 0, "side": 0, "origin": 0, "time": 1, "record": RECORD_WIDTH - 1}  # degrees
 
 Coefficient = Vec | float | None  # None: zero
@@ -130,11 +130,8 @@ class Series(Writer):
     def advance(self) -> None:
         """Append the coefficient of this order to every node's series."""
         for row, node in zip(self.rows, self.nodes, strict=True):
-            if (
-                node[0] in ("coordinate", "velocity")
-                or (self.ahead is not None and row.degree is not None)
-                or self._is_known(row)
-            ):
+            ended = self.ahead is not None and row.degree is not None
+            if ended or node[0] in ("coordinate", "velocity") or self._is_known(row):
                 continue
             if node[0] in LEAVES:
                 self.push(row, self._leaf(node))
