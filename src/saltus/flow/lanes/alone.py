@@ -44,14 +44,16 @@ def move(p, n, u):
 
 
 @cached_jit(TURNING_RANGE)
-def turning_range(q, order, h, p):
-    """The largest and the smallest value of a series on (0, h]: at its end, or where its derivative vanishes between."""
+def turning_range(q, order, begin, h, p):
+    """The largest and the smallest value of a series on (begin, h]: at its end, or where its derivative vanishes between."""
     high = low = horner(q, order, h)
     n, power = order - 1, 1.0
     for k in range(order):
         p[k] = (k + 1) * q[k + 1] * power
         power *= h
-    start, left = 0.0, 1.0
+    start, left = begin / h, 1.0 - begin / h
+    if begin > 0.0:
+        move(p, n, start)
     for _ in range(MOST_TURNS):
         while n > 0 and p[0] == 0.0:
             for k in range(n):

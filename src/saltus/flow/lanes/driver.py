@@ -21,7 +21,7 @@ from saltus.flow.jit import inline_jit, lean_jit
 from saltus.flow.jit import not_here as cached_jit
 from saltus.flow.lanes.layout import *
 from saltus.flow.lanes.legs import arrive, begin_records, fill, finish, sizes_rows, unresolved
-from saltus.flow.lanes.observe import LONGEST_CYCLE, watch_range
+from saltus.flow.lanes.observe import LONGEST_CYCLE, pass_ends, watch_range
 from saltus.flow.lanes.signatures import RUN_LANES
 from saltus.flow.lanes.steps import *
 from saltus.flow.lanes.vector import *
@@ -52,8 +52,8 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, poly, gap):
     order, tol = sizes[LANE_ORDER], settings[TOLERANCE]
     code[SERIES_CODE](m, order)
     natural, size = natural_step(m, at, sizes, limits)
-    now, target = load(m, NOW), load(m, TARGET)
-    h = minimum(natural, target - now)
+    now, wall = load(m, NOW), load(m, WALL)
+    h = minimum(natural, wall - now)
     alive = flags[AWAKE] & ~flags[PARKED]
     sound = bits(natural > settings[SHORTEST_STEP]) & bits(size < FAST)
     point = load(m, POINT)
@@ -66,7 +66,7 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, poly, gap):
         hit, doubtful, tau, at_root = meet(sizes, at, m, flags, h, start, x, v, a, bend, alive & sound, helpers, poly, gap)
         sound &= ~doubtful
     struck = mask(hit)
-    store(m, NEW_TIME, select(mask(bits(natural >= target - now) & ~hit), target, now + tau))
+    store(m, NEW_TIME, select(mask(bits(natural >= wall - now) & ~hit), wall, now + tau))
     store(m, at[NEW_POSITION], select(struck, point, x + point))
     store(m, at[NEW_VELOCITY], select(struck, at_root, v))
     for row in range(1, sizes_rows(at)):
@@ -95,7 +95,7 @@ def meet(sizes, at, m, flags, h, start, x, v, a, bend, alive, helpers, poly, gap
     hit = alive & ~doubtful & ~clear & single & over
     tau, at_root = h, v
     if hit:
-        root, speed = only_root(m, at, order, h, start, sign, g0, g1, g2, x, v, a, hit)
+        root, speed = only_root(m, at, order, h, start, sign, g0, g1, g2, g3, x, v, a, hit)
         tau, at_root = select(mask(hit), root, h), select(mask(hit), speed, v)
     unclear = alive & ~doubtful & ~clear & ~single
     if unclear:
@@ -134,10 +134,6 @@ def strike(code, sizes, at, m, settings, hit):
     speed = new * after
     good = bits(old * before < 0.0) & bits(speed > settings[SLOWEST_IMPACT]) & hit
     captured = bits(speed < load(m, CAPTURE)) & good
-    chosen = mask(good)
-    least, count = load(m, LEAST), load(m, CROSSINGS)
-    store(m, LEAST, select(chosen, minimum(least, absolute(before)), least))
-    store(m, CROSSINGS, select(chosen, count + 1.0, count))
     return good, hit & ~good, captured
 
 
@@ -147,6 +143,9 @@ def commit(at, m, moved, hit):
     going, struck = mask(moved), mask(hit)
     store(m, NOW, select(going, load(m, NEW_TIME), load(m, NOW)))
     store(m, SIDE_NOW, select(struck, load(m, NEW_SIDE), load(m, SIDE_NOW)))
+    least, impacts = load(m, LEAST), load(m, CROSSINGS)
+    store(m, LEAST, select(struck, minimum(least, absolute(load(m, at[NEW_VELOCITY]))), least))
+    store(m, CROSSINGS, select(struck, impacts + 1.0, impacts))
     count = sizes_rows(at)
     for row in range(2 * count):  # positions, then velocities, lie one behind the other
         new = select(struck, load(m, at[AFTER_POSITION] + row), load(m, at[NEW_POSITION] + row))
@@ -154,8 +153,21 @@ def commit(at, m, moved, hit):
 
 
 @inline_jit
+def pass_on(m, free):
+    """Begin the next leg in lanes that are past the end of one, where it is as long (compare `legs.arrive`)."""
+    going = mask(free)
+    now, look, begin, end = load(m, NOW), load(m, LAST_LOOK), load(m, LEG_START), load(m, TARGET)
+    leg = load(m, LEG) + 1.0
+    store(m, NOW, select(going, begin + (now - end), now))
+    store(m, LAST_LOOK, select(going, look + (begin - end), look))
+    store(m, LEGS_DONE, select(going, load(m, LEGS_DONE) + 1.0, load(m, LEGS_DONE)))
+    store(m, ORIGIN, select(going, leg * load(m, LEG_LENGTH), load(m, ORIGIN)))
+    store(m, LEG, select(going, leg, load(m, LEG)))
+
+
+@inline_jit
 def fly(code, sizes, at, m, flags, settings, limits, helpers, poly, gap):
-    """One step of all lanes. Returns (bits to visit, bits captured)."""
+    """One step of all lanes. Returns (bits to visit, bits captured, bits that went past the end of their leg)."""
     hit, away, h, tau, bend = propose(code, sizes, at, m, flags, settings, limits, helpers, poly, gap)
     captured = 0
     new_hit = hit
@@ -163,11 +175,18 @@ def fly(code, sizes, at, m, flags, settings, limits, helpers, poly, gap):
         new_hit, doubtful, captured = strike(code, sizes, at, m, settings, hit)
         away |= doubtful
     moved = flags[AWAKE] & ~flags[PARKED] & ~away
+    begin, v_begin = splat(0.0), load(m, at[VELOCITY])
+    past = moved & bits(load(m, NEW_TIME) > load(m, TARGET))
+    if past and sizes[ENDS_ASKED] > 0:
+        pass_ends(m, at, sizes, h, bend, past, helpers, poly, gap)
+        begin = select(mask(past), load(m, TARGET) - load(m, NOW), begin)
+        v_begin = select(mask(past), load(m, at[ENDED_VELOCITY]), v_begin)
     if sizes[WATCH] > 0:
-        watch_range(m, at, sizes, h, tau, bend, moved, helpers, poly, gap)
+        x, v = load(m, at[NEW_POSITION]), load(m, at[NEW_VELOCITY])
+        watch_range(m, at, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, poly, gap)
     commit(at, m, moved, new_hit)
     flags[AT_CONTACT] = (flags[AT_CONTACT] & ~moved) | new_hit
-    return away, captured
+    return away, captured, past
 
 
 @cached_jit(RUN_LANES, nogil=True)
@@ -185,44 +204,50 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
         np.zeros((WIDTH, LONGEST_CYCLE + 1), dtype=np.int64),
     )
     flags, poly, gap = np.zeros(3, dtype=np.int64), np.zeros(STRIDE + 2), np.zeros(STRIDE + 2)
-    count, following, arrived = jobs[0].shape[0], 0, 0
+    count, following = jobs[0].shape[0], 0
     while True:
         while flags[AWAKE] != ALL and following < count:
             lane = 0
             while (flags[AWAKE] >> lane) & 1:
                 lane += 1
             fill(lane, following, code, sizes, at, m, flags, lanes, jobs, tables)
-            begin_records(lane, at, m)
             following += 1
             if lanes[0][lane, MODE_NOW] == BEYOND:
                 finish(lane, OUTSIDE, 0, code, sizes, at, m, flags, lanes, results)
         if flags[AWAKE] == 0 or control[0] != 0:
             return
+        away, captured, looking, past = 0, 0, 0, 0
         arrived = bits(load(m, NOW) >= load(m, TARGET)) & flags[AWAKE]
         if arrived == 0:
             if sizes[RECORD_ROWS] > 0:
                 expand_records(sizes, at, m, flags, lanes, tables, poly)
-            away, captured, looking = flags[PARKED], 0, 0
+            away = flags[PARKED]
             if flags[AWAKE] != flags[PARKED]:
-                doubtful, captured = fly(code, sizes, at, m, flags, settings, limits, helpers, poly, gap)
+                doubtful, captured, past = fly(code, sizes, at, m, flags, settings, limits, helpers, poly, gap)
                 away |= doubtful
+                free = past & bits(load(m, LEG) < load(m, FREE_LEGS))
+                if free:
+                    pass_on(m, free)
+                    control[1] += lane_count(free)
+                    past &= ~free
                 looking = bits(load(m, CROSSINGS) > load(m, NEXT_LOOK)) & flags[AWAKE]
-            for lane in range(WIDTH if away | captured | looking else 0):
-                if (looking >> lane) & 1 and unresolved(lane, m, lanes[1]):
-                    finish(lane, UNRESOLVED, 0, code, sizes, at, m, flags, lanes, results)
-                elif (captured >> lane) & 1:
-                    finish(lane, CAPTURED, 0, code, sizes, at, m, flags, lanes, results)
-                elif (away >> lane) & 1:
-                    reason, detail = helpers[VISIT_ALONE](
-                        lane, scalar, sizes, at, m, flags, settings, lanes, jobs[3], tables, poly, control
-                    )
-                    if reason != PAUSED:
-                        finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results)
             arrived = bits(load(m, NOW) >= load(m, TARGET)) & flags[AWAKE]
-        for lane in range(WIDTH if arrived else 0):
-            if (arrived >> lane) & 1:
-                before = lanes[0][lane, LEGS_DONE]
-                reason, detail = arrive(lane, sizes, at, m, lanes, tables, results)
-                control[1] += lanes[0][lane, LEGS_DONE] - before
-                if reason != PAUSED:
-                    finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results)
+        concerned = away | captured | looking | arrived
+        while concerned:
+            lane = first_lane(concerned)
+            concerned &= concerned - 1
+            reason, detail = PAUSED, 0
+            if (away >> lane) & 1:
+                reason, detail = helpers[VISIT_ALONE](
+                    lane, scalar, sizes, at, m, flags, settings, lanes, jobs[3], tables, poly, control
+                )
+            elif (looking >> lane) & 1 and unresolved(lane, m):
+                reason = UNRESOLVED
+            if reason == PAUSED and m[NOW * WIDTH + lane] >= m[TARGET * WIDTH + lane]:
+                before = m[LEGS_DONE * WIDTH + lane]
+                reason, detail = arrive(lane, (past >> lane) & 1, sizes, at, m, lanes, tables, results)
+                control[1] += int(m[LEGS_DONE * WIDTH + lane] - before)
+            if reason == PAUSED and (captured >> lane) & 1:
+                reason = CAPTURED
+            if reason != PAUSED:
+                finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results)

@@ -45,6 +45,8 @@ class Slots:
             "new_velocity": self.rows,
             "after_position": self.rows,
             "after_velocity": self.rows,
+            "ended_position": self.rows,
+            "ended_velocity": self.rows,
             "parameters": self.parameters,
             "constants": self.constants,
             "records": self.records * RECORD_WIDTH,

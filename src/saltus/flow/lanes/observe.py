@@ -5,9 +5,11 @@ This text is compiled together with the lanes (see `driver.py`).
 
 from __future__ import annotations
 
+import numpy as np
+
 from saltus.flow.jit import lean_jit
 from saltus.flow.lanes.layout import *
-from saltus.flow.lanes.steps import both_at
+from saltus.flow.lanes.steps import both_at, motion_at
 from saltus.flow.lanes.vector import *
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -18,18 +20,15 @@ DOUBTFUL = 1e4  # times CLOSE: not so far apart that they are surely two
 
 
 @lean_jit
-def turning_value(m, at, order, h, v0, chosen):
-    """The position where the velocity, monotonic and of two signs at the ends of the step, vanishes."""
-    low, high, tau = splat(0.0), h, 0.5 * h
-    active, x = chosen, splat(0.0)
+def turning_value(m, at, order, low, high, v0, chosen):
+    """The position where the velocity, monotonic and of two signs at the ends, the first that of `v0`, vanishes."""
+    h, tau = high - low, 0.5 * (low + high)
+    active, start = chosen, load(m, at[POSITION])
     for _ in range(60):
-        x, v = both_at(m, at[POSITIONS], at[VELOCITIES], order, load(m, at[POSITION]), tau)
+        _, v, a, _ = motion_at(m, at, order, start, tau)
         before = mask(bits(v * v0 > 0.0))
         low, high = select(before, tau, low), select(before, high, tau)
-        slope = splat(0.0)
-        for k in range(order - 1, -1, -1):
-            slope = fma(slope, tau, load(m, at[ACCELERATIONS] + k))
-        following = tau - v / slope
+        following = tau - v / a
         inside = mask(bits(following >= low) & bits(following <= high))
         following = select(inside, following, 0.5 * (low + high))
         moved = absolute(following - tau)
@@ -37,23 +36,21 @@ def turning_value(m, at, order, h, v0, chosen):
         active &= bits(moved > 1e-9 * h)
         if active == 0:
             break
-    x, v = both_at(m, at[POSITIONS], at[VELOCITIES], order, load(m, at[POSITION]), tau)
-    return x
+    return both_at(m, at[POSITIONS], at[VELOCITIES], order, start, tau)[0]
 
 
 @lean_jit
-def watch_range(m, at, sizes, h, tau, bend, chosen, helpers, poly, gap):
-    """Take the extrema of the first coordinate within this step into HIGHEST and LOWEST, for the chosen lanes."""
+def watch_range(m, at, sizes, h, bend, begin, v_begin, end, x, v, chosen, helpers, poly, gap):
+    """Take the extrema of the first coordinate from `begin` to `end` of this step into HIGHEST and LOWEST, for the chosen lanes."""
     order = sizes[LANE_ORDER]
-    x, v = load(m, at[NEW_POSITION]), load(m, at[NEW_VELOCITY])
     high, low = load(m, HIGHEST), load(m, LOWEST)
     v0, first = load(m, at[VELOCITY]), 2.0 * load(m, at[POSITIONS] + 2) * h * h
     last = first + 6.0 * load(m, at[POSITIONS] + 3) * (h * h * h)
     monotonic = bits(minimum(first, last) > bend) | bits(maximum(first, last) < -bend)
-    turns = bits(v0 * v < 0.0) & monotonic & chosen
+    turns = bits(v_begin * v < 0.0) & monotonic & chosen
     top, bottom = maximum(high, x), minimum(low, x)
     if turns:
-        turning = turning_value(m, at, order, tau, v0, turns)
+        turning = turning_value(m, at, order, begin, end, v_begin, turns)
         top, bottom = select(mask(turns), maximum(top, turning), top), select(mask(turns), minimum(bottom, turning), bottom)
     store(m, HIGHEST, select(mask(chosen), top, high))
     store(m, LOWEST, select(mask(chosen), bottom, low))
@@ -64,9 +61,41 @@ def watch_range(m, at, sizes, h, tau, bend, chosen, helpers, poly, gap):
             if (unclear >> lane) & 1:
                 for k in range(order + 1):
                     gap[k] = m[(at[POSITIONS] + k) * WIDTH + lane]
-                above, below = helpers[TURNS_ALONE](gap, order, vector_lane(tau, lane), poly)
+                above, below = helpers[TURNS_ALONE](gap, order, vector_lane(begin, lane), vector_lane(end, lane), poly)
                 m[HIGHEST * WIDTH + lane] = max(m[HIGHEST * WIDTH + lane], above)
                 m[LOWEST * WIDTH + lane] = min(m[LOWEST * WIDTH + lane], below)
+
+
+@lean_jit
+def pass_ends(m, at, sizes, h, bend, past, helpers, poly, gap):
+    """In lanes whose step goes past the end of their leg, take what they were then for its end, and record anew.
+
+    The state there is what the step's series say. Compare `legs.end_here`.
+    """
+    order, since, anew = sizes[LANE_ORDER], load(m, TARGET) - load(m, NOW), mask(past)
+    for row in range(at[VELOCITY] - at[POSITION]):
+        series = at[POSITIONS] + row * STRIDE
+        x, v = both_at(m, series, at[VELOCITIES] + row * STRIDE, order, load(m, series), since)
+        store(m, at[ENDED_POSITION] + row, select(anew, x, load(m, at[ENDED_POSITION] + row)))
+        store(m, at[ENDED_VELOCITY] + row, select(anew, v, load(m, at[ENDED_VELOCITY] + row)))
+    x, v = load(m, at[ENDED_POSITION]), load(m, at[ENDED_VELOCITY])
+    if sizes[WATCH] > 0:
+        watch_range(m, at, sizes, h, bend, splat(0.0), load(m, at[VELOCITY]), since, x, v, past, helpers, poly, gap)
+    high, low, least, impacts = load(m, HIGHEST), load(m, LOWEST), load(m, LEAST), load(m, CROSSINGS)
+    store(m, ENDED_SIDE, select(anew, load(m, SIDE_NOW), load(m, ENDED_SIDE)))
+    store(m, ENDED_HIGHEST, select(anew, high, load(m, ENDED_HIGHEST)))
+    store(m, ENDED_LOWEST, select(anew, low, load(m, ENDED_LOWEST)))
+    store(m, ENDED_LEAST, select(anew, least, load(m, ENDED_LEAST)))
+    store(m, ENDED_CROSSINGS, select(anew, impacts, load(m, ENDED_CROSSINGS)))
+    store(m, TOP, select(anew, maximum(load(m, TOP), high), load(m, TOP)))
+    store(m, BOTTOM, select(anew, minimum(load(m, BOTTOM), low), load(m, BOTTOM)))
+    store(m, SLOWEST, select(anew, minimum(load(m, SLOWEST), least), load(m, SLOWEST)))
+    store(m, COUNT, select(anew, load(m, COUNT) + impacts, load(m, COUNT)))
+    store(m, HIGHEST, select(anew, x, high))
+    store(m, LOWEST, select(anew, x, low))
+    store(m, LEAST, select(anew, splat(np.inf), least))
+    store(m, CROSSINGS, select(anew, splat(0.0), impacts))
+    store(m, NEXT_LOOK, select(anew, load(m, NEXT_LOOK) - impacts, load(m, NEXT_LOOK)))
 
 
 @lean_jit

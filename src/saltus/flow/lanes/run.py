@@ -140,6 +140,8 @@ class Lanes:
         sizes[[at.SIDED, at.BENDS, at.RECORD_ROWS]] = module.SIDES, module.STEEP, self.slots.records
         sizes[[at.LANE_ORDER, at.SCALAR_ORDER, at.WORKSPACE]] = order, taylor_order(self.tol), module.ROWS
         sizes[[at.LAST_KEPT, at.WATCH, at.SETTLE]] = self.kept, self.watch, self.settle
+        sizes[at.ENDS_ASKED] = self.settle or bool(self.sampled)
+        sizes[at.EVERY_END] = self.settle or self.kept > 1
         settings = np.zeros(at.SETTINGS)
         settings[k.TOLERANCE], settings[at.SHORTEST_STEP] = self.tol, k.SHORTEST
         settings[at.SLOWEST_IMPACT] = max(k.SLOW * math.sqrt(self.tol), k.CHATTER_SPEED)

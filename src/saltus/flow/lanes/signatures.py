@@ -13,7 +13,7 @@ _i1, _i2 = (types.Array(_i, n, "C") for n in (1, 2))
 LANE_SERIES = types.void(_f1, _i)  # memory of the lanes, order
 LANE_IMPACT = LANE_FIELD = types.void(_f1)
 LANE_ROOT = _f(_f1, _i, _i, _i, _f, _f, _f, _i, _f1, _f1)
-TURNING_RANGE = types.UniTuple(_f, 2)(_f1, _i, _f, _f1)
+TURNING_RANGE = types.UniTuple(_f, 2)(_f1, _i, _f, _f, _f1)
 JOBS = types.Tuple((_f2, _f2, _i2, _f2))  # states; numbers; labels; parameters
 TABLES = types.Tuple((_f1, _f3))  # record breakpoints, record table
 LANES = types.Tuple((_i2, _f2, _f2, _f2, _f3, _i2))  # what goes with each lane besides the memory: see `driver.py`

@@ -19,8 +19,7 @@ from saltus.flow.layout import *
 ZERO_TERM = 1e-300
 LANE_SAFETY = SAFETY  # of a step: its error is then a tenth of tol
 LOG_GAP = 0.5 * math.log2(math.e)  # for GAP: the shorter series of the lanes are looked at a little sooner
-NEARLY = 1e-5  # of the time, and of the slope: after a shorter move one correction with the same slope is exact to rounding
-NOTHING = 1e-12  # of the time: what is left after a shorter move is rounding
+NEARLY = 1e-5  # of the time, and of the slope: a shorter move leads to the root to rounding, and its cube is rounding
 
 
 @lean_jit
@@ -113,6 +112,18 @@ def sweep(m, at, order, start, h):
 
 
 @inline_jit
+def motion_at(m, at, order, start, h):
+    """Position from `start` on, velocity, acceleration, and half its rate of change, at h."""
+    positions, velocities = at[POSITIONS], at[VELOCITIES]
+    x, v, a, jerk = load(m, positions + order), load(m, velocities + order), splat(0.0), splat(0.0)
+    for k in range(order - 1, 0, -1):
+        jerk, a = fma(jerk, h, a), fma(a, h, v)
+        v, x = fma(v, h, load(m, velocities + k)), fma(x, h, load(m, positions + k))
+    jerk, a = fma(jerk, h, a), fma(a, h, v)
+    return fma(x, h, start), fma(v, h, load(m, velocities)), a, jerk
+
+
+@inline_jit
 def both_at(m, positions, velocities, order, start, h):
     """Position from `start` on and velocity at h, even and odd powers apart so that the processor works on four sums at once."""
     square = h * h
@@ -147,61 +158,58 @@ def shape(g0, g1, g2, g3, bend, skip):
 
 
 @inline_jit
-def first_guess(g0, g1, g2, f, slope, pull):
-    """The root d in [0, 1], counted back from the end, of the quintic with these values and derivatives at both ends.
-
-    Scaled to a step of 1: g0 + g1 u + g2 u^2 + ... at the start, and f, its slope and twice its next coefficient at the end. Two
-    of Newton's steps from the parabola at the end. Returns also the second derivative at the root.
-    """
-    a, b, c = g0 - f + slope - 0.5 * pull, slope - g1 - pull, 2.0 * g2 - pull
-    c3, c4, c5 = 10.0 * a - 4.0 * b + 0.5 * c, 7.0 * b - 15.0 * a - c, 6.0 * a - 3.0 * b + 0.5 * c
-    root = square_root(maximum(slope * slope - 2.0 * f * pull, splat(0.0)))
-    d, inverse = 2.0 * f / (slope - root), splat(0.0)
-    for again in range(2):
-        value = fma(fma(fma(fma(fma(c5, d, c4), d, c3), d, 0.5 * pull), d, -slope), d, f)
-        along = fma(fma(fma(fma(5.0 * c5, d, 4.0 * c4), d, 3.0 * c3), d, pull), d, -slope)
-        inverse = inverse * (2.0 - along * inverse) if again else 1.0 / along  # a division costs as much as ten products
-        d = d - value * inverse
-    curve = fma(fma(fma(20.0 * c5, d, 12.0 * c4), d, 6.0 * c3), d, pull)
-    return d, curve
+def root_move(value, inverse, second, third):
+    """By how much a root lies beyond an argument, from Taylor's coefficients there and the inverse of the slope: to O(move^4)."""
+    n, a, b = value * inverse, second * inverse, third * inverse
+    return -n * fma(n, fma(n, fma(2.0 * a, a, -b), a), splat(1.0))
 
 
 @inline_jit
-def only_root(m, at, order, h, start, sign, g0, g1, g2, x, v, a, chosen):
+def first_guess(g0, g1, g2, g3, f, slope, pull):
+    """The root d in [0, 1], counted back from the end, of the sextic with these values and derivatives at both ends.
+
+    Scaled to a step of 1: g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start, and f, its slope and its next coefficient at the end. One
+    move from the root of the parabola at the end.
+    """
+    r0, r1, r2 = g0 - f + slope - pull, g1 - slope + 2.0 * pull, g2 - pull
+    c3, c4 = 20.0 * r0 + 10.0 * r1 + 4.0 * r2 + g3, -45.0 * r0 - 25.0 * r1 - 11.0 * r2 - 3.0 * g3
+    c5, c6 = 36.0 * r0 + 21.0 * r1 + 10.0 * r2 + 3.0 * g3, -10.0 * r0 - 6.0 * r1 - 3.0 * r2 - g3
+    square = maximum(fma(slope, slope, -4.0 * f * pull), splat(0.0))
+    d = minimum(2.0 * f * rough_inverse(slope - rough_root(square)), splat(1.0))
+    third = fma(fma(fma(20.0 * c6, d, 10.0 * c5), d, 4.0 * c4), d, c3)
+    second = fma(fma(fma(fma(15.0 * c6, d, 10.0 * c5), d, 6.0 * c4), d, 3.0 * c3), d, pull)
+    first = fma(fma(fma(fma(fma(6.0 * c6, d, 5.0 * c5), d, 4.0 * c4), d, 3.0 * c3), d, 2.0 * pull), d, -slope)
+    value = fma(fma(fma(fma(fma(fma(c6, d, c5), d, c4), d, c3), d, pull), d, -slope), d, f)
+    return d + root_move(value, rough_inverse(first), second, third)
+
+
+@inline_jit
+def only_root(m, at, order, h, start, sign, g0, g1, g2, g3, x, v, a, chosen):
     """The root in (0, h] of gaps that have one there, not negative at 0 (if zero, then growing) and negative at h.
 
-    Chebyshev's method from `first_guess`, with bisection where it leaves the bracket; `sign` is 1 or -1. Inside, the
-    step is 1. A lane stays where it has converged, whatever the others do. Returns the root and the velocity there.
+    Moves as in `root_move` from `first_guess`, with bisection where one leaves the bracket; `sign` is 1 or -1. A lane stays where
+    it has converged, whatever the others do. Returns the root and the velocity there.
     """
-    positions, velocities = at[POSITIONS], at[VELOCITIES]
-    pull = sign * a * (h * h)
-    d, curve = first_guess(g0, g1, g2, sign * x, sign * v * h, pull)
-    low, high, u = splat(0.0), splat(1.0), 1.0 - d
-    inverse, last, moved = splat(0.0), splat(0.0), splat(0.0)
-    sane = mask(bits(u > 0.0) & bits(u <= 1.0))  # the guess may have gone astray, and its curve with it
-    u, curve = select(sane, u, 0.5), select(sane, curve, pull)
-    active = chosen
+    d = first_guess(g0, g1, g2, g3, sign * x, sign * v * h, 0.5 * sign * a * (h * h))
+    low, high, tau = splat(0.0), h, h - d * h
+    tau = select(mask(bits(tau > 0.0) & bits(tau <= h)), tau, 0.5 * h)  # the guess may have gone astray
+    speed, active = v, chosen
     for _ in range(60):
-        x, v = both_at(m, positions, velocities, order, start, u * h)
-        f, slope = sign * x, sign * v * h
-        before = mask(bits(f > 0.0))
-        low, high = select(before, u, low), select(before, high, u)
-        going = mask(active)
-        inverse, last = select(going, 1.0 / slope, inverse), select(going, v, last)
-        newton = f * inverse
-        following = u - fma(0.5 * newton * curve * inverse, newton, newton)
+        x, v, a, jerk = motion_at(m, at, order, start, tau)
+        inverse = rough_inverse(v)
+        inverse = inverse * (2.0 - v * inverse)
+        before = mask(bits(sign * x > 0.0))
+        low, high = select(before, tau, low), select(before, high, tau)
+        following = tau + root_move(x, inverse, 0.5 * a, (1.0 / 3.0) * jerk)
         inside = mask(bits(following >= low) & bits(following <= high))
         following = select(inside, following, 0.5 * (low + high))
-        moved = select(going, following - u, moved)
-        u = select(going, following, u)
-        active &= bits(absolute(moved) > NEARLY * u) | bits(absolute(moved * curve) > NEARLY * absolute(slope))
+        move, going = following - tau, mask(active)
+        speed = select(going, fma(move, fma(move, jerk, a), v), speed)
+        tau = select(going, following, tau)
+        active &= bits(absolute(move) > NEARLY * tau) | bits(absolute(move * a) > NEARLY * absolute(v))
         if active == 0:
             break
-    tau = u * h
-    x, v = both_at(m, positions, velocities, order, start, tau)
-    rest = sign * x * inverse
-    share = select(mask(bits(absolute(moved) > NOTHING * u)), rest / moved, 0.0)  # of how the last move changed the velocity
-    return fma(-rest, h, tau), v - (v - last) * share
+    return tau, speed
 
 
 @lean_jit

@@ -343,6 +343,26 @@ def _exp2(a: Vec) -> Vec:
     return power * (1.0 + rest * (0.6565 + 0.3435 * rest))
 
 
+def _inverse(a: Vec) -> Vec:
+    """1/a to 1e-5: a line in every octave, and two of Newton's steps."""
+    b, bits = a.builder, a.builder.bitcast(a.value, LONGS)
+    y = Vec(b, b.bitcast(b.sub(ir.Constant(LONGS, [0x7FDE24FD40000000] * WIDTH), bits), VECTOR))
+    for _ in range(2):
+        y = y * (2.0 - a * y)
+    return y
+
+
+def _root(a: Vec) -> Vec:
+    """The square root to 0.2 %, for a >= 0, by that of 1/a: a line in every second octave, and one of Newton's steps."""
+    b, bits = a.builder, a.builder.bitcast(a.value, LONGS)
+    halved = b.lshr(bits, ir.Constant(LONGS, [1] * WIDTH))
+    y = Vec(b, b.bitcast(b.sub(ir.Constant(LONGS, [0x5FE6EB50C7B537A9] * WIDTH), halved), VECTOR))
+    z = a * y
+    return z * (1.5 - (0.5 * y) * z)
+
+
+rough_inverse = _function(vector_type, _inverse, 1)
+rough_root = _function(vector_type, _root, 1)
 rough_log2 = _function(vector_type, _log2, 1)
 rough_exp2 = _function(vector_type, _exp2, 1)
 
@@ -377,6 +397,26 @@ def mask(typing: Any, integer: Any) -> Any:
         return builder.bitcast(builder.trunc(args[0], ir.IntType(WIDTH)), MASK)
 
     return mask_type(types.int64), code
+
+
+@intrinsic
+def first_lane(typing: Any, integer: Any) -> Any:
+    """The lowest lane whose bit is set, of an integer that is not zero."""
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.cttz(args[0], ir.Constant(BIT, 1))
+
+    return types.int64(types.int64), code
+
+
+@intrinsic
+def lane_count(typing: Any, integer: Any) -> Any:
+    """How many lanes have their bit set."""
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.ctpop(args[0])
+
+    return types.int64(types.int64), code
 
 
 @intrinsic

@@ -26,7 +26,8 @@ def depart(lane, sizes, at, m, flags, settings, lanes):
     own, gauge = lanes[0][lane], lanes[1][lane]
     rows = at[VELOCITY] - at[POSITION]
     where, state, limits = np.zeros(WHERE, dtype=np.int64), np.zeros(2 + 2 * rows + sizes[COLUMN_COUNT]), np.zeros(4)
-    where[PERIOD], where[LAST], where[MODE], where[HELD] = own[LEG], own[LEG], own[MODE_NOW], own[HELD_NOW]
+    leg, length = int(m[LEG * WIDTH + lane]), m[LEG_LENGTH * WIDTH + lane]
+    where[PERIOD], where[LAST], where[MODE], where[HELD] = leg, leg, own[MODE_NOW], own[HELD_NOW]
     where[SIDE], where[PIECE], where[FORCED] = int(m[SIDE_NOW * WIDTH + lane]), own[PIECE_NOW], own[FORCED_SIDE]
     where[SKIP] = (flags[AT_CONTACT] >> lane) & 1 if own[MODE_NOW] == ARC else own[SKIP_NOW]
     where[ORDER], where[DENSE], where[VISIT] = sizes[SCALAR_ORDER], sizes[WATCH], 1
@@ -37,9 +38,9 @@ def depart(lane, sizes, at, m, flags, settings, lanes):
     for row in range(rows):
         state[STATE + row] = m[(at[POSITION] + row) * WIDTH + lane]
         state[STATE + rows + row] = m[(at[VELOCITY] + row) * WIDTH + lane]
-    limits[LENGTH], limits[TOLERANCE] = gauge[PERIOD_LENGTH], settings[TOLERANCE]
-    limits[END] = gauge[END_TIME] if own[LEG] == own[LAST_LEG] else gauge[LEG_START] + gauge[PERIOD_LENGTH]
-    limits[HORIZON] = (own[LAST_LEG] - own[LEG]) * gauge[PERIOD_LENGTH] + gauge[END_TIME]
+    limits[LENGTH], limits[TOLERANCE] = length, settings[TOLERANCE]
+    limits[END] = gauge[END_TIME] if leg == own[LAST_LEG] else m[LEG_START * WIDTH + lane] + length
+    limits[HORIZON] = (own[LAST_LEG] - leg) * length + gauge[END_TIME]
     return where, state, limits
 
 
@@ -55,7 +56,7 @@ def note(lane, where, m, lanes, steps, events, sizes, poly):
         elif kind == GRAZING:
             lanes[0][lane, TOUCHES] += 1
     for i in range(where[STEPS]):
-        above, below = turning_range(steps[2][i, 0], where[ORDER], steps[1][i, 1], poly)
+        above, below = turning_range(steps[2][i, 0], where[ORDER], 0.0, steps[1][i, 1], poly)
         m[HIGHEST * WIDTH + lane] = max(m[HIGHEST * WIDTH + lane], above)
         m[LOWEST * WIDTH + lane] = min(m[LOWEST * WIDTH + lane], below)
     where[STEPS] = where[EVENTS] = 0
