@@ -125,6 +125,6 @@ def test_the_series_of_a_linear_system():
 
 
 def test_orders_are_even_and_within_their_bounds():
-    assert [lane_order(10.0**-n) for n in range(6, 16)] == [12, 12, 14, 14, 16, 16, 18, 18, 20, 20]
+    assert [lane_order(10.0**-n) for n in range(6, 16)] == [14, 14, 16, 16, 18, 18, 20, 20, 22, 22]
     orders = {lane_order(tol) for tol in np.geomspace(1e-15, 1e-6, 1001)}
     assert orders == set(range(LOWEST_ORDER, HIGHEST_ORDER + 1, 2))

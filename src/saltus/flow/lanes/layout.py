@@ -23,7 +23,7 @@ POSITION, VELOCITY, NEW_POSITION, NEW_VELOCITY, AFTER_POSITION, AFTER_VELOCITY =
 ENDED_POSITION, ENDED_VELOCITY = 6, 7
 PARAMETERS, CONSTANTS_AT, RECORDS, POSITIONS, VELOCITIES, ACCELERATIONS, MARGINS, END_OF_MEMORY = 8, 9, 10, 11, 12, 13, 14, 15
 
-LOWEST_ORDER, HIGHEST_ORDER = 12, 20  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
+LOWEST_ORDER, HIGHEST_ORDER = 14, 22  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
 STRIDE = HIGHEST_ORDER + 1  # slots of one series
 
 # Numbers of a structure and of a call, in `sizes`.

@@ -157,9 +157,9 @@ class Lanes:
 
 
 def lane_order(tol: float) -> int:
-    """The order that pays in lanes: 12 at 1e-6, 16 at 1e-10, 20 at 1e-14; always even (see `layout.py`).
+    """The order that pays in lanes: 14 at 1e-6, 18 at 1e-10, 22 at 1e-14; always even (see `layout.py`).
 
-    Four more would take 5 % less time, but where the last coefficients nearly vanish the step is too long by a factor, and the
+    Two more take up to 5 % less time, but where the last coefficients nearly vanish the step is too long by a factor, and the
     error by that factor to the power of the order.
     """
-    return 2 * math.ceil((5 - math.log10(tol)) / 2 - 1e-9)
+    return 2 * math.ceil((7 - math.log10(tol)) / 2 - 1e-9)

@@ -17,8 +17,8 @@ from saltus.flow.layout import *
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 ZERO_TERM = 1e-300
-LANE_SAFETY = SAFETY  # of a step: its error is then a tenth of tol
-LOG_GAP = 0.5 * math.log2(math.e)  # for GAP: the shorter series of the lanes are looked at a little sooner
+LAST_TERMS = 4  # of a series, the largest of which limits the step: two may nearly vanish together
+LOG_GAP = 0.35 * math.log2(math.e)  # for GAP: where four terms vanish, so do others
 NEARLY = 1e-5  # of the time, and of the slope: a shorter move leads to the root to rounding, and its cube is rounding
 
 
@@ -47,7 +47,7 @@ def natural_step(m, at, sizes, limits):
         step = minimum(step, row_step(m, at[VELOCITIES] + row * STRIDE, sizes[LANE_ORDER], size, limits[0]))
     for first in range(rows, rows * (1 + sizes[COLUMN_COUNT]), rows):
         step = minimum(step, column_step(m, at, sizes, first, limits[1]))
-    return LANE_SAFETY * step, size
+    return step, size
 
 
 @lean_jit
@@ -64,16 +64,20 @@ def column_step(m, at, sizes, first, limits):
 
 @inline_jit
 def row_step(m, series, order, size, limits):
-    """The step of `steps.step_size` for one series: from its last two terms, and from its upper half where they vanish."""
+    """The step at which the largest of a series' last terms is tol, relative to `size`.
+
+    Where they vanish its upper half says how fast it grows, as in `steps.step_size`.
+    """
     log_tol, rarely, factor = limits
     wanted = log_tol + rough_log2(size)
-    last = rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + order))))
-    before = rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + order - 1))))
-    step = minimum((wanted - last) * (1.0 / order), (wanted - before) * (1.0 / (order - 1)))
-    step = maximum(minimum(step, splat(500.0)), splat(-500.0))
+    step = splat(500.0)
+    for k in range(order - LAST_TERMS + 1, order + 1):
+        term = rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + k))))
+        step = minimum(step, (wanted - term) * (1.0 / k))
+    step = maximum(step, splat(-500.0))
     natural, half = rough_exp2(step), order // 2
-    reach, upper = natural * factor, absolute(load(m, series + order - 2))
-    for k in range(order - 3, half - 1, -1):
+    reach, upper = natural * factor, absolute(load(m, series + order - LAST_TERMS))
+    for k in range(order - LAST_TERMS - 1, half - 1, -1):
         upper = fma(upper, reach, absolute(load(m, series + k)))
     vanishing = bits(rough_log2(upper) + half * (step + rarely) > wanted - log_tol + 1.0)
     if vanishing:
@@ -84,9 +88,9 @@ def row_step(m, series, order, size, limits):
 
 @lean_jit
 def upper_half(m, series, order, log_size, log_tol):
-    """log2 of the step that the upper half of a series allows, its last two terms left out."""
+    """log2 of the step that the upper half of a series allows, its last terms left out."""
     step = splat(500.0)
-    for k in range(order // 2, order - 1):
+    for k in range(order // 2, order - LAST_TERMS + 1):
         growth = (rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + k)))) - log_size) * (1.0 / k)
         step = minimum(step, log_tol / order - growth)
     return step
