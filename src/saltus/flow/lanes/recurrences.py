@@ -21,14 +21,14 @@ def _quotient(w: Series, own: Row, a: Row, b: Row) -> None:
     w.push(own, multiply(above, w.inverse(b)))
 
 
-def _derivative(w: Series, u: Row, other: Row) -> Coefficient:
-    """(1/k) sum_{j=1}^{k} j u_j other_{k-j}: of a series whose derivative is u' times another one."""
-    return w.per_order(w.product(w.scaled(u), other, first=False))
+def _derivative(w: Series, u: Row, other: Row, sign: float = 1.0) -> Coefficient:
+    """(1/k) sum_{j=1}^{k} j u_j other_{k-j}: of a series whose derivative is u' times another one, or minus that."""
+    return w.per_order(w.product(w.scaled(u), other, first=False), sign)
 
 
 def _sine(w: Series, own: Row, u: Row) -> None:
     s, c = (w.beside(u, name, own.degree, own.early) for name in ("sin", "cos"))
-    sine, cosine = w.start(u).sin_cos() if w.starts else (_derivative(w, u, c), negative(_derivative(w, u, s)))
+    sine, cosine = w.start(u).sin_cos() if w.starts else (_derivative(w, u, c), _derivative(w, u, s, -1.0))
     w.push(s, sine)
     w.push(c, cosine)
 

@@ -22,7 +22,7 @@ from numba.core import cgutils
 
 from saltus.flow.lanes.layout import NOW, STRIDE
 from saltus.flow.lanes.vector import CACHE_LINE, DOUBLE, LONG, VECTOR, WIDTH, Vec, everywhere
-from saltus.flow.lanes.writer import Tape, Writer, dot, multiply
+from saltus.flow.lanes.writer import Tape, Writer, add, dot, multiply, subtract
 from saltus.flow.trace import RECORD_WIDTH
 
 if TYPE_CHECKING:
@@ -64,6 +64,7 @@ class Series(Writer):
         self.nodes, self.rules, self.rows = nodes, rules, list[Row]()
         self.order: Any = 0  # a number among the first orders, then LLVM's number k of a pair
         self.ahead: int | None = None  # of a pair: 0 at order k, 1 at order k + 1; None among the first
+        self._nodes: dict[int, tuple[Any, ...]] = {}  # that the rows are for
         self._beside: dict[tuple[int, str], Row] = {}
         self._inverses: dict[int, Any] = {}
         self._sums: dict[tuple[int, int], tuple[Vec, Vec]] = {}
@@ -74,11 +75,18 @@ class Series(Writer):
             self.rows.append(self._row(node))
         highest = max((row.degree for row in self.rows if row.degree is not None), default=0)
         self.written_out = 2 * (highest // 2 + 1)  # how many orders are
-        table = [1.0 / max(k, 1) for k in range(STRIDE + 2)]
-        constant = ir.Constant(ir.ArrayType(DOUBLE, len(table)), table)
-        self._reciprocals = cgutils.global_constant(self.builder, "reciprocals", constant)
+        self._tables = {sign: self._table([sign / max(k, 1) for k in range(STRIDE + 2)]) for sign in (1.0, -1.0)}
+
+    def _table(self, numbers: list[float]) -> Any:
+        constant = ir.Constant(ir.ArrayType(DOUBLE, len(numbers)), numbers)
+        return cgutils.global_constant(self.builder, "reciprocals", constant)
 
     def _row(self, node: tuple[Any, ...]) -> Row:
+        row = self._new_row(node)
+        self._nodes.setdefault(id(row), node)
+        return row
+
+    def _new_row(self, node: tuple[Any, ...]) -> Row:
         op = node[0]
         if op in ("coordinate", "velocity"):
             return (self.positions if op == "coordinate" else self.velocities)[node[1]]
@@ -195,12 +203,27 @@ class Series(Writer):
                 row.first.append(multiply(float(j), u.first[j]) if j else None)
         elif row.degree is None and not self._is_known(row):
             with self._before_sums(row):
-                self.push(row, multiply(self._number + float(self.ahead), self.now(u)))
+                self.push(row, self._scaled_now(u))
         return row
 
-    def per_order(self, value: Coefficient) -> Coefficient:
-        """A coefficient divided by this order."""
-        return multiply(self._reciprocal(0), value)
+    def _scaled_now(self, u: Row) -> Coefficient:
+        """j u_j at this order of a pair, from velocities if u is made of positions and what does not change: known sooner so."""
+        op, *places = self._nodes.get(id(u), ("",))
+        if op == "coordinate":
+            return self._back(self.velocities[places[0]], 1)
+        if op in ("add", "sub", "mul"):
+            a, b = (self.rows[i] for i in places)
+            if op == "mul" and 0 in (a.degree, b.degree):
+                constant, other = (a, b) if a.degree == 0 else (b, a)
+                return multiply(constant.first[0], self._scaled_now(other))
+            if op != "mul":
+                one, other = (None if row.degree == 0 else self._scaled_now(row) for row in (a, b))
+                return add(one, other) if op == "add" else subtract(one, other)
+        return multiply(self._number + float(self.ahead or 0), self.now(u))
+
+    def per_order(self, value: Coefficient, sign: float = 1.0) -> Coefficient:
+        """A coefficient, or with the other sign, divided by this order."""
+        return multiply(self._reciprocal(0, sign), value)
 
     def inverse(self, row: Row) -> Any:
         """One over coefficient 0."""
@@ -217,25 +240,25 @@ class Series(Writer):
             if one.degree is not None:
                 return dot([(one.first[j], self._back(other, j)) for j in range(one.degree, -1 if whole else 0, -1)])
         forward, backward = (a, b) if b.early or not a.early else (b, a)
-        newest = []
+        newest = [(b.early, a.first[0], self.now(b))] if first else []
+        newest += [(a.early, self.now(a), b.first[0])] if last else []
         if self.ahead == 1:
-            newest = [(forward.pair[0], backward.first[1])]
-            newest += [] if backward.early else [(forward.first[1], backward.pair[0])]
-        newest += [(a.first[0], self.now(b))] if first else []
-        newest += [(self.now(a), b.first[0])] if last else []
-        return dot(newest, self._earlier(forward, backward)[self.ahead])
+            newest += [(False, forward.pair[0], backward.first[1])]
+            newest += [] if backward.early else [(False, forward.first[1], backward.pair[0])]
+        newest.sort(key=lambda term: not term[0])  # what is known last is added last
+        return dot([pair for _, *pair in newest], self._earlier(forward, backward)[self.ahead])
 
     # --- memory ----------------------------------------------------------------------------------------------------------------
 
     def _is_known(self, row: Row) -> bool:
         return len(row.first) > self.order if self.ahead is None else len(row.pair) > self.ahead
 
-    def _reciprocal(self, more: int) -> Any:
-        """One over this order, or over a following one."""
+    def _reciprocal(self, more: int, sign: float = 1.0) -> Any:
+        """One, or minus one, over this order, or over a following one."""
         if self.ahead is None:
-            return 1.0 / (self.order + more)
+            return sign / (self.order + more)
         index = self.builder.add(self.order, LONG(self.ahead + more))
-        return everywhere(self.builder, self.builder.load(self.builder.gep(self._reciprocals, [LONG(0), index])))
+        return everywhere(self.builder, self.builder.load(self.builder.gep(self._tables[sign], [LONG(0), index])))
 
     def _before_sums(self, row: Row) -> AbstractContextManager[Any]:
         """Where the code for a series' coefficient goes: before the sums if it can."""
