@@ -20,7 +20,7 @@ import numpy as np
 from saltus.flow.jit import inline_jit, lean_jit
 from saltus.flow.jit import not_here as cached_jit
 from saltus.flow.lanes.layout import *
-from saltus.flow.lanes.legs import arrive, begin_records, fill, finish, sizes_rows, unresolved
+from saltus.flow.lanes.legs import arrive, fill, finish, sizes_rows, unresolved
 from saltus.flow.lanes.observe import LONGEST_CYCLE, pass_ends, watch_range
 from saltus.flow.lanes.signatures import RUN_LANES
 from saltus.flow.lanes.steps import *

@@ -109,9 +109,9 @@ def leg_end(lane, m, lanes):
 
 @inline_jit
 def begin_leg(lane, sizes, m, lanes, tables):
-    """Set where a lane's leg ends, and where a step must: not at the end of a forcing period, unless its motion ends there or soon.
+    """Set where a lane's leg ends and where a step must: there, only if the motion ends in this leg or the next one.
 
-    The records' breakpoints end both.
+    The records' breakpoints end both. A step may go one leg further, not two.
     """
     where, breaks = lanes[0], tables[0]
     leg, last, length = int(m[LEG * WIDTH + lane]), where[lane, LAST_LEG], m[LEG_LENGTH * WIDTH + lane]
@@ -202,8 +202,11 @@ def total_up(lane, m):
 
 @inline_jit
 def arrive(lane, past, sizes, at, m, lanes, tables, results):
-    """At the end of a leg, or `past` it, or at a breakpoint: go on. Returns DONE, SETTLED, or PAUSED, and the length of the cycle."""
-    where, gauge = lanes[0], lanes[1]
+    """At the end of a leg, or `past` it, or at a breakpoint: go on.
+
+    Returns DONE, SETTLED, or PAUSED, and the length of the cycle.
+    """
+    where = lanes[0]
     leg, now, start = int(m[LEG * WIDTH + lane]), m[NOW * WIDTH + lane], m[LEG_START * WIDTH + lane]
     last, t_end = leg == where[lane, LAST_LEG], leg_end(lane, m, lanes)
     if now >= t_end:

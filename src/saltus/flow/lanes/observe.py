@@ -41,7 +41,7 @@ def turning_value(m, at, order, low, high, v0, chosen):
 
 @lean_jit
 def watch_range(m, at, sizes, h, bend, begin, v_begin, end, x, v, chosen, helpers, poly, gap):
-    """Take the extrema of the first coordinate from `begin` to `end` of this step into HIGHEST and LOWEST, for the chosen lanes."""
+    """Take the extrema of the first coordinate from `begin` to `end` of this step into HIGHEST and LOWEST, for chosen lanes."""
     order = sizes[LANE_ORDER]
     high, low = load(m, HIGHEST), load(m, LOWEST)
     v0, first = load(m, at[VELOCITY]), 2.0 * load(m, at[POSITIONS] + 2) * h * h

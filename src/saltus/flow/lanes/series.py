@@ -246,7 +246,7 @@ class Series(Writer):
             newest += [(False, forward.pair[0], backward.first[1])]
             newest += [] if backward.early else [(False, forward.first[1], backward.pair[0])]
         newest.sort(key=lambda term: not term[0])  # what is known last is added last
-        return dot([pair for _, *pair in newest], self._earlier(forward, backward)[self.ahead])
+        return dot([(one, other) for _, one, other in newest], self._earlier(forward, backward)[self.ahead])
 
     # --- memory ----------------------------------------------------------------------------------------------------------------
 

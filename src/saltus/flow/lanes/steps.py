@@ -26,11 +26,12 @@ NEARLY = 1e-5  # of the time, and of the slope: a shorter move leads to the root
 def step_limits(order, tol):
     """log2 of tol, log2 of how much longer than the step its upper half would allow where it vanishes, and that factor.
 
-    Taken once for a run: a call of the C library in every step would put all registers into memory.
+    And one over the orders of the last terms. Taken once for a run: a call of the C library in every step would put all
+    registers into memory.
     """
     log_tol = math.log2(tol)
     rarely = -log_tol / order - LOG_GAP
-    return log_tol, rarely, math.exp2(rarely)
+    return log_tol, rarely, math.exp2(rarely), (1.0 / (order - 3), 1.0 / (order - 2), 1.0 / (order - 1), 1.0 / order)
 
 
 @inline_jit
@@ -68,12 +69,12 @@ def row_step(m, series, order, size, limits):
 
     Where they vanish its upper half says how fast it grows, as in `steps.step_size`.
     """
-    log_tol, rarely, factor = limits
+    log_tol, rarely, factor, inverses = limits
     wanted = log_tol + rough_log2(size)
     step = splat(500.0)
-    for k in range(order - LAST_TERMS + 1, order + 1):
-        term = rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + k))))
-        step = minimum(step, (wanted - term) * (1.0 / k))
+    for j in range(LAST_TERMS):
+        term = absolute(load(m, series + order - LAST_TERMS + 1 + j))
+        step = minimum(step, (wanted - rough_log2(maximum(splat(ZERO_TERM), term))) * inverses[j])
     step = maximum(step, splat(-500.0))
     natural, half = rough_exp2(step), order // 2
     reach, upper = natural * factor, absolute(load(m, series + order - LAST_TERMS))
@@ -172,19 +173,28 @@ def root_move(value, inverse, second, third):
 def first_guess(g0, g1, g2, g3, f, slope, pull):
     """The root d in [0, 1], counted back from the end, of the sextic with these values and derivatives at both ends.
 
-    Scaled to a step of 1: g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start, and f, its slope and its next coefficient at the end. One
-    move from the root of the parabola at the end.
+    Scaled to a step of 1: g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start; f, its slope, and its next coefficient `pull` at the end.
+    One move from the root of the parabola at the end.
     """
     r0, r1, r2 = g0 - f + slope - pull, g1 - slope + 2.0 * pull, g2 - pull
     c3, c4 = 20.0 * r0 + 10.0 * r1 + 4.0 * r2 + g3, -45.0 * r0 - 25.0 * r1 - 11.0 * r2 - 3.0 * g3
     c5, c6 = 36.0 * r0 + 21.0 * r1 + 10.0 * r2 + 3.0 * g3, -10.0 * r0 - 6.0 * r1 - 3.0 * r2 - g3
     square = maximum(fma(slope, slope, -4.0 * f * pull), splat(0.0))
     d = minimum(2.0 * f * rough_inverse(slope - rough_root(square)), splat(1.0))
-    third = fma(fma(fma(20.0 * c6, d, 10.0 * c5), d, 4.0 * c4), d, c3)
-    second = fma(fma(fma(fma(15.0 * c6, d, 10.0 * c5), d, 6.0 * c4), d, 3.0 * c3), d, pull)
-    first = fma(fma(fma(fma(fma(6.0 * c6, d, 5.0 * c5), d, 4.0 * c4), d, 3.0 * c3), d, 2.0 * pull), d, -slope)
-    value = fma(fma(fma(fma(fma(fma(c6, d, c5), d, c4), d, c3), d, pull), d, -slope), d, f)
-    return d + root_move(value, rough_inverse(first), second, third)
+    p1 = fma(c6, d, c5)  # Horner's rule, and again on what it leaves behind
+    p2 = fma(p1, d, c4)
+    p3 = fma(p2, d, c3)
+    p4 = fma(p3, d, pull)
+    p5 = fma(p4, d, -slope)
+    q1 = fma(c6, d, p1)
+    q2 = fma(q1, d, p2)
+    q3 = fma(q2, d, p3)
+    q4 = fma(q3, d, p4)
+    r1 = fma(c6, d, q1)
+    r2 = fma(r1, d, q2)
+    r3 = fma(r2, d, q3)
+    third = fma(fma(fma(c6, d, r1), d, r2), d, r3)
+    return d + root_move(fma(p5, d, f), rough_inverse(fma(q4, d, p5)), fma(r3, d, q4), third)
 
 
 @inline_jit
