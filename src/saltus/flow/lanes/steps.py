@@ -173,7 +173,7 @@ def root_move(value, inverse, second, third):
 def first_guess(g0, g1, g2, g3, f, slope, pull):
     """The root d in [0, 1], counted back from the end, of the sextic with these values and derivatives at both ends.
 
-    Scaled to a step of 1: g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start; f, its slope, and its next coefficient `pull` at the end.
+    Scaled to a step of 1: g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start; f, its slope, and half its curvature `pull` at the end.
     One move from the root of the parabola at the end.
     """
     r0, r1, r2 = g0 - f + slope - pull, g1 - slope + 2.0 * pull, g2 - pull

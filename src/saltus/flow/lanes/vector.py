@@ -340,7 +340,7 @@ def _exp2(a: Vec) -> Vec:
 def _inverse(a: Vec) -> Vec:
     """1/a to 1e-5: a line in every octave, and two of Newton's steps."""
     b, bits = a.builder, a.builder.bitcast(a.value, LONGS)
-    y = Vec(b, b.bitcast(b.sub(ir.Constant(LONGS, [0x7FDE24FD40000000] * WIDTH), bits), VECTOR))
+    y = Vec(b, b.bitcast(b.sub(ir.Constant(LONGS, [0x7FDE623822FC16E6] * WIDTH), bits), VECTOR))
     for _ in range(2):
         y = y * (2.0 - a * y)
     return y

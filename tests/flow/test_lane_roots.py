@@ -1,0 +1,112 @@
+"""The roots of the lanes: exact to rounding from any first guess, with the velocity there; and the rough functions they use."""
+
+import numpy as np
+import pytest
+from numba import njit, types
+
+from saltus.flow.jit import OPTIONS
+from saltus.flow.lanes.layout import HIGHEST_ORDER, LOWEST_ORDER, POSITIONS, STRIDE, VELOCITIES
+from saltus.flow.lanes.steps import motion_at, only_root
+from saltus.flow.lanes.vector import (
+    ALL,
+    WIDTH,
+    load,
+    rough_exp2,
+    rough_inverse,
+    rough_log2,
+    rough_root,
+    store,
+)
+
+EPS = 2.0**-52
+H = 0.7  # the step
+PLACES = np.zeros(16, dtype=np.int64)  # of a memory with the two series of one coordinate, and slots for what goes in and out
+PLACES[POSITIONS], PLACES[VELOCITIES] = 0, STRIDE
+STEP, SIGN, TIME, SPEED, SIZE = 2 * STRIDE, 2 * STRIDE + 1, 2 * STRIDE + 2, 2 * STRIDE + 3, 2 * STRIDE + 4
+
+
+@njit(types.void(types.float64[::1], types.int64[::1], types.int64), **OPTIONS)
+def find(m, at, order):
+    h, sign, start = load(m, STEP), load(m, SIGN), load(m, at[POSITIONS])
+    x, v, a, _ = motion_at(m, at, order, start, h)
+    g1, g2 = sign * load(m, at[POSITIONS] + 1) * h, sign * load(m, at[POSITIONS] + 2) * (h * h)
+    g3 = sign * load(m, at[POSITIONS] + 3) * (h * h * h)
+    time, speed = only_root(m, at, order, h, start, sign, sign * start, g1, g2, g3, x, v, a, ALL)
+    store(m, TIME, time)
+    store(m, SPEED, speed)
+
+
+@njit(types.void(types.float64[::1]), **OPTIONS)
+def rough(m):
+    store(m, 1, rough_log2(load(m, 0)))
+    store(m, 2, rough_exp2(rough_log2(load(m, 0))))
+    store(m, 3, rough_inverse(load(m, 0)))
+    store(m, 4, rough_root(load(m, 0)))
+
+
+def positions_of(kind, order, rng):
+    """Coefficients of gaps that have one root in (0, H], as steps are chosen: terms that fall to 1e-7 or less at the end."""
+    k = np.arange(order + 1)
+    c = rng.normal(size=(WIDTH, order + 1)) * (10.0 ** (-8.0 / order) / H) ** k
+    if kind == "falling":
+        c[:, 0], c[:, 1] = rng.uniform(1e-3, 0.9, WIDTH), -3.0 / H
+        c[:, 2:] *= 0.1
+    else:  # concave: it comes from its summit, which is just above zero in some lanes
+        summit, height = rng.uniform(0.0, 0.5, WIDTH) * H, 10.0 ** rng.uniform(-8, -1, WIDTH)
+        c[:, 3:] *= 0.01
+        c[:, 2] = -3.0 / H**2
+        c[:, 1], c[:, 0] = -2.0 * c[:, 2] * summit, height + c[:, 2] * summit**2
+        c[:, 0] = np.maximum(c[:, 0], 1e-9)
+    return c
+
+
+def root_of(c):
+    """The root in (0, H], and the derivative there, in long doubles: bisection, then Newton's method."""
+    p = np.polynomial.Polynomial(c.astype(np.longdouble))
+    slope, low, high = p.deriv(), np.longdouble(0), np.longdouble(H)
+    for _ in range(40):
+        middle = (low + high) / 2
+        low, high = (middle, high) if p(middle) > 0 else (low, middle)
+    u = (low + high) / 2
+    for _ in range(4):
+        u = u - p(u) / slope(u)
+    return u, slope(u)
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="no long doubles on this machine")
+@pytest.mark.parametrize("kind", ["falling", "concave"])
+@pytest.mark.parametrize("order", [LOWEST_ORDER, HIGHEST_ORDER])
+def test_roots_and_velocities_are_exact_to_rounding(kind, order):
+    rng, errors = np.random.default_rng(order), []
+    for _ in range(-(-400 // WIDTH)):
+        c, memory = positions_of(kind, order, rng), np.zeros((SIZE, WIDTH))
+        sign = rng.choice([-1.0, 1.0], WIDTH)
+        memory[: order + 1], memory[STEP], memory[SIGN] = (sign[:, None] * c).T, H, sign
+        memory[STRIDE : STRIDE + order] = (sign[:, None] * c[:, 1:] * np.arange(1, order + 1)).T
+        find(memory.reshape(-1), PLACES, order)
+        for lane in range(WIDTH):
+            root, slope = root_of(c[lane])
+            size, bend = np.abs(c[lane] * H ** np.arange(order + 1)).sum(), 6.0 / H**2
+            late = 8 * EPS * max(size, 1.0) / abs(float(slope))  # what rounding of the gap does to its root
+            errors.append(abs(float(memory[TIME, lane] - root)) / (late + EPS * H))
+            errors.append(abs(float(sign[lane] * memory[SPEED, lane] - slope)) / (bend * late + 16 * EPS * size / H))
+    assert max(errors) <= 1.0
+
+
+def test_rough_functions_are_as_good_as_they_say():
+    rng = np.random.default_rng(0)
+    for exponent in (-290, -20, -1, 0, 1, 20, 290):
+        memory = np.zeros((5, WIDTH))
+        memory[0] = rng.uniform(1.0, 10.0, WIDTH) * 10.0**exponent
+        rough(memory.reshape(-1))
+        a, log, power, inverse, root = memory
+        assert np.abs(log - np.log2(a)).max() < 0.05
+        assert np.abs(power / 2.0**log - 1.0).max() < 0.004
+        assert np.abs(inverse * a - 1.0).max() < 1e-5
+        assert np.abs(root / np.sqrt(a) - 1.0).max() < 0.002
+    memory[0] = np.linspace(-2.0, -1.0, WIDTH)
+    rough(memory.reshape(-1))
+    assert np.abs(memory[3] * memory[0] - 1.0).max() < 1e-5
+    memory[0] = 0.0
+    rough(memory.reshape(-1))
+    assert (memory[4] == 0.0).all()
