@@ -45,18 +45,18 @@ def rough(m):
 
 
 def positions_of(kind, order, rng):
-    """Coefficients of gaps that have one root in (0, H], as steps are chosen: terms that fall to 1e-7 or less at the end."""
-    k = np.arange(order + 1)
-    c = rng.normal(size=(WIDTH, order + 1)) * (10.0 ** (-8.0 / order) / H) ** k
+    """Coefficients of gaps that have one root in (0, H], their last terms from 1e-2, for guesses that are bad, to 1e-15."""
+    k, digits = np.arange(order + 1), rng.choice([2, 6, 15], (WIDTH, 1))
+    c = rng.normal(size=(WIDTH, order + 1)) * (10.0 ** (-digits / order) / H) ** k
     if kind == "falling":
         c[:, 0], c[:, 1] = rng.uniform(1e-3, 0.9, WIDTH), -3.0 / H
         c[:, 2:] *= 0.1
     else:  # concave: it comes from its summit, which is just above zero in some lanes
-        summit, height = rng.uniform(0.0, 0.5, WIDTH) * H, 10.0 ** rng.uniform(-8, -1, WIDTH)
+        summit, height = rng.uniform(0.0, 0.4, WIDTH) * H, 10.0 ** rng.uniform(-8, -1, WIDTH)
         c[:, 3:] *= 0.01
         c[:, 2] = -3.0 / H**2
         c[:, 1], c[:, 0] = -2.0 * c[:, 2] * summit, height + c[:, 2] * summit**2
-        c[:, 0] = np.maximum(c[:, 0], 1e-9)
+        c[:, 0] = np.maximum(c[:, 0], 1e-9)  # with a summit so far away it leaves the contact
     return c
 
 
