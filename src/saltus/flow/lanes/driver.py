@@ -5,9 +5,12 @@ once for every model, for the width of this machine's registers. What a structur
 pointers: `lane_series`, `lane_impact`, `lane_field` (see `emit.py`), and the scalar `constants` and `geometry`.
 
 A step of all lanes: Taylor series; a step for each lane; a sweep of Horner's rule that gives the end of the step and bounds the
-gap; Chebyshev's method in the lanes whose gap has one root for certain; impacts. A lane whose step shows anything else
--- rest, slow impacts, a gap that cannot be decided, a limit, a number out of range -- visits the scalar kernel (`visits.py`)
+gap; the root in the lanes whose gap has one for certain; impacts. A lane whose step shows anything else -- rest, slow impacts,
+a gap that cannot be decided, a limit, a number out of range -- visits the scalar kernel (`visits.py`)
 from the start of that step. No lane sees another one, so results depend neither on the width nor on the order.
+
+A step may go past the end of a forcing period: the state there is then read off its series (`observe.pass_ends`), and the next
+period begins, for all lanes at once (`pass_on`) or for those that are waited for (`legs.arrive`).
 
 `m` is the lanes' memory, in slots of one vector (`layout.py`). `jobs` and `results` are arrays with a row for each
 trajectory. `flags` holds bits of lanes: see `layout.py`.
@@ -20,7 +23,7 @@ import numpy as np
 from saltus.flow.jit import inline_jit, lean_jit
 from saltus.flow.jit import not_here as cached_jit
 from saltus.flow.lanes.layout import *
-from saltus.flow.lanes.legs import arrive, fill, finish, sizes_rows, unresolved
+from saltus.flow.lanes.legs import arrive, fill, finish, unresolved
 from saltus.flow.lanes.observe import LONGEST_CYCLE, pass_ends, watch_range
 from saltus.flow.lanes.signatures import RUN_LANES
 from saltus.flow.lanes.steps import *
@@ -230,19 +233,19 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
                     pass_on(m, free)
                     control[1] += lane_count(free)
                     past &= ~free
-                looking = bits(load(m, CROSSINGS) > load(m, NEXT_LOOK)) & flags[AWAKE]
+                looking = bits(load(m, CROSSINGS) > load(m, NEXT_LOOK)) & flags[AWAKE] & ~past
             arrived = bits(load(m, NOW) >= load(m, TARGET)) & flags[AWAKE]
         concerned = away | captured | looking | arrived
         while concerned:
             lane = first_lane(concerned)
             concerned &= concerned - 1
             reason, detail = PAUSED, 0
-            if (away >> lane) & 1:
+            if (looking >> lane) & 1 and unresolved(lane, m):  # first, as slow impacts visit in every step
+                reason = UNRESOLVED
+            elif (away >> lane) & 1:
                 reason, detail = helpers[VISIT_ALONE](
                     lane, scalar, sizes, at, m, flags, settings, lanes, jobs[3], tables, poly, control
                 )
-            elif (looking >> lane) & 1 and unresolved(lane, m):
-                reason = UNRESOLVED
             if reason == PAUSED and m[NOW * WIDTH + lane] >= m[TARGET * WIDTH + lane]:
                 before = m[LEGS_DONE * WIDTH + lane]
                 reason, detail = arrive(lane, (past >> lane) & 1, sizes, at, m, lanes, tables, results)

@@ -26,7 +26,7 @@ from saltus.flow.trace import RECORD_WIDTH, Trace
 
 @dataclass(frozen=True)
 class Slots:
-    """Where everything lies in the memory of a group of lanes, in slots of one vector (see `driver.py`)."""
+    """Where everything lies in the memory of a group of lanes, in slots of one vector (see `layout.py`)."""
 
     rows: int  # coordinates, those of the sensitivities included
     own: int  # the model's

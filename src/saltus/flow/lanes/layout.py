@@ -15,13 +15,13 @@ ENDED_HIGHEST, ENDED_LOWEST, ENDED_LEAST, ENDED_CROSSINGS, ENDED_SIDE = 14, 15, 
 TOP, BOTTOM, SLOWEST, COUNT = 19, 20, 21, 22  # from the start to the end of the last leg
 WALL = 23  # the time that no step goes beyond; it may go beyond the end of a leg, TARGET
 LEG, LEG_START, LEG_LENGTH, LEGS_DONE = 24, 25, 26, 27  # which forcing period, from what local time on, how long; how many ended
-FREE_LEGS = 28  # of a leg below this one the end is like that of the one before, and nobody waits for it
+FREE_LEGS = 28  # legs below this one are ended for all lanes at once
 NEXT_LOOK, LAST_LOOK = 29, 30  # at this many impacts of a leg the clock is looked at, as it was at that time
 FIRST_PLACE = 31
 # Then, from the slots that `at` lists, as many as the structure needs.
 POSITION, VELOCITY, NEW_POSITION, NEW_VELOCITY, AFTER_POSITION, AFTER_VELOCITY = 0, 1, 2, 3, 4, 5
 ENDED_POSITION, ENDED_VELOCITY = 6, 7
-PARAMETERS, CONSTANTS_AT, RECORDS, POSITIONS, VELOCITIES, ACCELERATIONS, MARGINS, END_OF_MEMORY = 8, 9, 10, 11, 12, 13, 14, 15
+PARAMETERS, CONSTANTS_AT, RECORDS, POSITIONS, VELOCITIES, ACCELERATIONS, MARGINS = 8, 9, 10, 11, 12, 13, 14
 
 LOWEST_ORDER, HIGHEST_ORDER = 14, 22  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
 STRIDE = HIGHEST_ORDER + 1  # slots of one series

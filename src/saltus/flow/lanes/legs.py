@@ -12,16 +12,11 @@ import numpy as np
 from saltus.flow.jit import inline_jit, lean_jit
 from saltus.flow.lanes.layout import *
 from saltus.flow.lanes.observe import LONGEST_CYCLE, cycle_length
+from saltus.flow.lanes.steps import sizes_rows
 from saltus.flow.lanes.vector import *
 from saltus.flow.layout import *
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
-
-
-@lean_jit
-def sizes_rows(at):
-    """How many coordinates there are, those of the sensitivities included."""
-    return at[VELOCITY] - at[POSITION]
 
 
 @lean_jit

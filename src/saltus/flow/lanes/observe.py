@@ -1,4 +1,4 @@
-"""What is recorded of a trajectory while it runs: extrema of its first coordinate, and whether it has settled on a cycle.
+"""What is recorded of a trajectory: extrema of its first coordinate, the ends of its legs, whether it has settled on a cycle.
 
 This text is compiled together with the lanes (see `driver.py`).
 """
@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.flow.jit import lean_jit
 from saltus.flow.lanes.layout import *
-from saltus.flow.lanes.steps import both_at, motion_at
+from saltus.flow.lanes.steps import both_at, motion_at, sizes_rows
 from saltus.flow.lanes.vector import *
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -73,7 +73,7 @@ def pass_ends(m, at, sizes, h, bend, past, helpers, poly, gap):
     The state there is what the step's series say. Compare `legs.end_here`.
     """
     order, since, anew = sizes[LANE_ORDER], load(m, TARGET) - load(m, NOW), mask(past)
-    for row in range(at[VELOCITY] - at[POSITION]):
+    for row in range(sizes_rows(at)):
         series = at[POSITIONS] + row * STRIDE
         x, v = both_at(m, series, at[VELOCITIES] + row * STRIDE, order, load(m, series), since)
         store(m, at[ENDED_POSITION] + row, select(anew, x, load(m, at[ENDED_POSITION] + row)))

@@ -26,7 +26,7 @@ PATIENCE = 0.1  # seconds between looks at Ctrl-C and at the progress
 
 @dataclass(frozen=True)
 class Jobs:
-    """Trajectories to run, an array with a row for each; see `fill` of `driver.py` for the columns."""
+    """Trajectories to run, an array with a row for each; see `fill` of `legs.py` for the columns."""
 
     states: np.ndarray  # (n, 2 coordinates): coordinates, then velocities
     numbers: (
@@ -41,7 +41,7 @@ class Jobs:
 
 @dataclass(frozen=True)
 class Ends:
-    """How the trajectories ended; see `finish` and `end_leg` of `driver.py` for the columns."""
+    """How the trajectories ended; see `finish` and `keep_sample` of `legs.py` for the columns."""
 
     states: np.ndarray  # (n, 2 coordinates)
     numbers: np.ndarray  # (n, 5 + own coordinates + columns of the tangent)

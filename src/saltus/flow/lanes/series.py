@@ -6,7 +6,7 @@ which a product of two series takes for both orders a sum over coefficients that
     sum_{j=1}^{k-1} a_j b_{k-j}    and    sum_{j=1}^{k-1} a_j b_{k+1-j}.
 
 An inner loop makes both for up to MOST_SUMS products: what it loads serves both orders, and its code is so short that the
-processor keeps it decoded; written out order by order a call takes 5 to 30 % longer at orders 12 to 20. What the newest
+processor keeps it decoded; written out order by order a call took 5 to 30 % longer at orders 12 to 20. What the newest
 coefficients add comes after that loop. A series that ends, as the time's does, needs no loop: its few terms are written out.
 """
 
@@ -213,12 +213,12 @@ class Series(Writer):
             return self._back(self.velocities[places[0]], 1)
         if op in ("add", "sub", "mul"):
             a, b = (self.rows[i] for i in places)
-            if op == "mul" and 0 in (a.degree, b.degree):
-                constant, other = (a, b) if a.degree == 0 else (b, a)
-                return multiply(constant.first[0], self._scaled_now(other))
             if op != "mul":
-                one, other = (None if row.degree == 0 else self._scaled_now(row) for row in (a, b))
+                one, other = (self.now(self.scaled(row)) for row in (a, b))
                 return add(one, other) if op == "add" else subtract(one, other)
+            if 0 in (a.degree, b.degree):
+                constant, changing = (a, b) if a.degree == 0 else (b, a)
+                return multiply(constant.first[0], self.now(self.scaled(changing)))
         return multiply(self._number + float(self.ahead or 0), self.now(u))
 
     def per_order(self, value: Coefficient, sign: float = 1.0) -> Coefficient:

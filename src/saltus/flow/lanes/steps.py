@@ -23,11 +23,17 @@ NEARLY = 1e-5  # of the time, and of the slope: a shorter move leads to the root
 
 
 @lean_jit
-def step_limits(order, tol):
-    """log2 of tol, log2 of how much longer than the step its upper half would allow where it vanishes, and that factor.
+def sizes_rows(at):
+    """How many coordinates there are, those of the sensitivities included."""
+    return at[VELOCITY] - at[POSITION]
 
-    And one over the orders of the last terms. Taken once for a run: a call of the C library in every step would put all
-    registers into memory.
+
+@lean_jit
+def step_limits(order, tol):
+    """log2 of tol; log2 of how much longer than the step its upper half would allow where it vanishes, and that factor; one over
+    the orders of the last terms.
+
+    Taken once for a run: a call of the C library in every step would put all registers into memory.
     """
     log_tol = math.log2(tol)
     rarely = -log_tol / order - LOG_GAP
@@ -176,9 +182,9 @@ def first_guess(g0, g1, g2, g3, f, slope, pull):
     Scaled to a step of 1: g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start; f, its slope, and half its curvature `pull` at the end.
     One move from the root of the parabola at the end.
     """
-    r0, r1, r2 = g0 - f + slope - pull, g1 - slope + 2.0 * pull, g2 - pull
-    c3, c4 = 20.0 * r0 + 10.0 * r1 + 4.0 * r2 + g3, -45.0 * r0 - 25.0 * r1 - 11.0 * r2 - 3.0 * g3
-    c5, c6 = 36.0 * r0 + 21.0 * r1 + 10.0 * r2 + 3.0 * g3, -10.0 * r0 - 6.0 * r1 - 3.0 * r2 - g3
+    a, b, c = g0 - f + slope - pull, g1 - slope + 2.0 * pull, g2 - pull  # what the parabola lacks at the start
+    c3, c4 = 20.0 * a + 10.0 * b + 4.0 * c + g3, -45.0 * a - 25.0 * b - 11.0 * c - 3.0 * g3
+    c5, c6 = 36.0 * a + 21.0 * b + 10.0 * c + 3.0 * g3, -10.0 * a - 6.0 * b - 3.0 * c - g3
     square = maximum(fma(slope, slope, -4.0 * f * pull), splat(0.0))
     d = minimum(2.0 * f * rough_inverse(slope - rough_root(square)), splat(1.0))
     p1 = fma(c6, d, c5)  # Horner's rule, and again on what it leaves behind

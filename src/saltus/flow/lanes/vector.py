@@ -318,7 +318,6 @@ absolute = _function(vector_type, lambda a: a._call("llvm.fabs", a.value), 1)
 minimum = _function(vector_type, lambda a, b: a.select(a.compare("<", b), b), 2)
 maximum = _function(vector_type, lambda a, b: a.select(a.compare(">", b), b), 2)
 fma = _function(vector_type, lambda a, b, c: a.fma(b, c), 3)
-square_root = _function(vector_type, lambda a: a.sqrt(), 1)
 splat = _function(vector_type, lambda a: a, 1)
 
 
