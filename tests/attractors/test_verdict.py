@@ -80,7 +80,7 @@ def test_chaos_is_seen_with_its_exponent(frequency, amplitude, known, periods):
     assert saltus.System.from_json(data.attrs["system"]) == system
 
 
-MORE = [pytest.param(amplitude, marks=pytest.mark.thorough) for amplitude in (7.3, 7.4, 7.5, 7.6)]
+MORE = [pytest.param(amplitude, marks=pytest.mark.thorough) for amplitude in (7.4, 7.5, 7.6)]
 
 
 def settled_late(system, count, periods):
@@ -90,7 +90,7 @@ def settled_late(system, count, periods):
     return starts, np.where(ends.cycle > 0, ends.periods, np.nan), ends.cycle
 
 
-@pytest.mark.parametrize("amplitude", [7.2, 7.7, *MORE])
+@pytest.mark.parametrize("amplitude", [7.2, 7.3, *MORE])
 def test_long_chaotic_transients_are_not_called_chaos(amplitude):
     """At Omega = 4 motions wander for thousands of periods, and many settle in the end; the first thousand show nothing of it."""
     system = under_force(4.0, amplitude)

@@ -17,6 +17,7 @@ from saltus.systems import System
 
 RESIDUAL = 1e-9  # of the orbit's equations
 DEFECT = 1e-6  # of its repetition in direct simulation, and of the motion's states from its own
+NEUTRAL = 1e-9  # a multiplier this near to 1 does not show that an orbit attracts
 SLOW = 1e-3  # a motion that approaches slowly may still be as far away
 
 
@@ -38,7 +39,7 @@ class Certificate:
             return f"no admissible orbit solves the equations there (residual {orbit.residual:.1g})"
         if orbit.grazes:
             return "the orbit there touches the contact without speed, and has no multipliers"
-        if not orbit.stable:
+        if not orbit.stable or abs(orbit.multipliers[0]) > 1.0 - NEUTRAL:
             return f"the orbit there does not attract: its largest multiplier is {abs(orbit.multipliers[0]):.9g}"
         if not orbit.defect < DEFECT:
             return f"in direct simulation the orbit there misses itself by {orbit.defect:.1g}"
