@@ -328,7 +328,7 @@ def _log2(a: Vec) -> Vec:
 
 
 def _exp2(a: Vec) -> Vec:
-    """2**a to 0.3 %, for -1000 < a < 1000: the exponent, and a parabola for the rest."""
+    """2**a to 0.4 %, for -1000 < a < 1000: the exponent, and a parabola for the rest."""
     b, whole = a.builder, a._call("llvm.floor", a.value)
     rest = a - whole
     exponent = b.add(b.fptosi(whole.value, LONGS), ir.Constant(LONGS, [1023] * WIDTH))
