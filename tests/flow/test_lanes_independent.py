@@ -1,4 +1,4 @@
-"""Results do not depend on threads, order, neighbours or chunks, to the last bit; on the width of a register only by rounding."""
+"""Results do not depend on threads, order, neighbours, chunks or the width of a register, to the last bit."""
 
 import os
 import subprocess
