@@ -3,17 +3,17 @@
 import numpy as np
 
 import saltus
-from saltus.attractors import attractors, basin_entropy, basins, stable_manifold, uncertainty_exponent
+from saltus.attractors import basin_entropy, basins_of_attraction, find_attractors, stable_manifold, uncertainty_exponent
 
 system = saltus.System(
     model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
     load=saltus.Load(frequency=2.4, horizontal=saltus.Harmonic(amplitude=1.0), vertical=-0.5),
 )
-found = attractors(system, region=(2.0, 2.0))
+found = find_attractors(system, region=(2.0, 2.0))
 print(found)
 
 grid = np.linspace(-2.0, 2.0, 101)
-picture = basins(system, theta=grid, velocity=grid, found=found)
+picture = basins_of_attraction(system, theta=grid, velocity=grid, found=found)
 for label, share in zip(picture.attractor.values, picture.cells.values, strict=True):
     slowest = float(picture.time.where(picture.label == label).max())
     print(f"attractor {label}: {100 * share:.1f} % of the grid, reached within {slowest:.0f} forcing periods")

@@ -2,8 +2,8 @@
 
 from concurrent.futures import ProcessPoolExecutor
 
-from saltus.flow.compile import load_kernel, load_segments
-from saltus.flow.lanes.compile import load_driver, load_helpers
+from saltus.flow.compiled import load_kernel, load_segments
+from saltus.flow.ensemble.compiled_lanes import load_driver, load_helpers
 
 
 def compile_part(name: str) -> None:

@@ -63,11 +63,11 @@ def test_every_name_of_the_flow_is_there(name: str) -> None:
 
 def test_one_motion_needs_no_lanes_and_an_ensemble_no_dask() -> None:
     start = "import sys, saltus; s = saltus.System(model=saltus.WallOscillator(damping=0.1), load=saltus.Load(force=0.3))"
-    ask = "print([m for m in ('saltus.flow.lanes', 'xarray', 'dask') if m in sys.modules])"
+    ask = "print([m for m in ('saltus.flow.ensemble', 'xarray', 'dask') if m in sys.modules])"
     motion, ensemble = "saltus.simulate(s, x=0.5, duration=1.0)", "saltus.simulate_many(s, x=[0.5, 0.4], duration=1.0)"
     command = [sys.executable, "-c", "; ".join([start, motion, ask, ensemble, ask])]
     result = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert result.stdout.split("\n")[:2] == ["[]", "['saltus.flow.lanes', 'xarray']"]
+    assert result.stdout.split("\n")[:2] == ["[]", "['saltus.flow.ensemble', 'xarray']"]
 
 
 def test_a_wrong_public_name_is_an_attribute_error() -> None:

@@ -12,7 +12,7 @@ from reference import PERIODS
 import saltus
 from peers.peer import AbsentError, DerivativeFlow, Flow, Peer
 from peers.saltus_scalar import AMPLITUDE_PATH, TOLERANCES, system
-from saltus.flow.lanes.vector import WIDTH
+from saltus.taylor.vectors import WIDTH
 
 if not hasattr(saltus, "simulate_many"):
     raise AbsentError("this saltus has no simulate_many")

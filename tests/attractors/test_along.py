@@ -5,7 +5,7 @@ import pytest
 from attractor_cases import FOLDS, HELD, ONSET, loaded, walled
 
 import saltus
-from saltus.attractors.along import attractors_along, set_distance
+from saltus.attractors.along_parameter import attractors_along, set_distance
 from saltus.attractors.attractor import Target
 from saltus.errors import ParameterError
 from saltus.theory import wall_orbits

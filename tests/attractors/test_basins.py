@@ -9,8 +9,8 @@ import pytest
 import xarray
 from attractor_cases import loaded, steady, strobes, walled
 
-from saltus.attractors.basins import basins, cell_arguments, cells
-from saltus.attractors.found import Attractors, attractors
+from saltus.attractors.basins.grid import basins_of_attraction, cell_arguments, cells
+from saltus.attractors.find import Attractors, find_attractors
 from saltus.errors import ParameterError
 from saltus.plots.basins import draw_basins
 
@@ -20,12 +20,12 @@ THETA, VELOCITY = np.linspace(-2.4, 2.4, 13), np.linspace(-2.1, 2.1, 11)
 
 @pytest.fixture(scope="module")
 def found() -> Attractors:
-    return attractors(SYSTEM, starts=64)
+    return find_attractors(SYSTEM, starts=64)
 
 
 @pytest.fixture(scope="module")
 def picture(found: Attractors) -> xarray.Dataset:
-    return basins(SYSTEM, theta=THETA, velocity=VELOCITY, found=found)
+    return basins_of_attraction(SYSTEM, theta=THETA, velocity=VELOCITY, found=found)
 
 
 def test_labels_and_times_are_those_of_single_simulations(found: Attractors, picture: xarray.Dataset) -> None:
@@ -45,15 +45,15 @@ def test_the_shares_are_those_of_the_cells(picture: xarray.Dataset) -> None:
 
 
 def test_sampled_fractions_agree_with_the_area() -> None:
-    sampled = attractors(SYSTEM, starts=256, region=(2.0, 2.0)).of(1)
+    sampled = find_attractors(SYSTEM, starts=256, region=(2.0, 2.0)).of(1)
     middles = -2.0 + 4.0 * (np.arange(60) + 0.5) / 60
-    area = basins(SYSTEM, theta=middles, velocity=middles)["cells"].sel(attractor=1)
+    area = basins_of_attraction(SYSTEM, theta=middles, velocity=middles)["cells"].sel(attractor=1)
     assert abs(float(area) - sampled.fraction) < 3.0 * sampled.error
 
 
 def test_an_attractor_that_was_not_known_gets_a_label_after_the_others(found: Attractors, picture: xarray.Dataset) -> None:
     less = replace(found, members=found.members[1:])
-    again = basins(SYSTEM, theta=THETA, velocity=VELOCITY, found=less)
+    again = basins_of_attraction(SYSTEM, theta=THETA, velocity=VELOCITY, found=less)
     assert again["attractor"].values.tolist() == [2, 3]
     assert np.array_equal(again["label"].values == 2, picture["label"].values == 2)
     assert np.array_equal(again["label"].values == 3, picture["label"].values == 1)
@@ -62,7 +62,7 @@ def test_an_attractor_that_was_not_known_gets_a_label_after_the_others(found: At
 
 def test_a_cell_on_an_attractor_has_reached_it(found: Attractors) -> None:
     (theta, velocity) = found.of(1).strobes[0]
-    here = basins(SYSTEM, theta=[theta], velocity=[velocity], found=found)
+    here = basins_of_attraction(SYSTEM, theta=[theta], velocity=[velocity], found=found)
     assert int(here["label"][0, 0]) == 1
     assert float(here["time"][0, 0]) == 0.0
 
@@ -76,14 +76,14 @@ def test_blocks_with_plain_arguments_give_the_whole(found: Attractors, picture: 
 
 
 def test_captured_cells_are_at_rest_at_a_time_of_their_own() -> None:
-    picture = basins(loaded(0.05), theta=[0.001, 0.5], velocity=[0.0, 0.3])
+    picture = basins_of_attraction(loaded(0.05), theta=[0.001, 0.5], velocity=[0.0, 0.3])
     assert int(picture["label"][0, 0]) == 0
     assert 0.0 <= float(picture["time"][0, 0]) < 200.0
     assert "rest" in picture["attractor_kind"].values
 
 
 def test_too_few_periods_leave_cells_undecided_and_say_so(found: Attractors) -> None:
-    picture = basins(SYSTEM, theta=THETA[:2], velocity=VELOCITY[:2], found=found, periods=32)
+    picture = basins_of_attraction(SYSTEM, theta=THETA[:2], velocity=VELOCITY[:2], found=found, periods=32)
     assert (picture["label"].values == -1).all()
     assert np.isnan(picture["time"].values).all()
     assert picture.attrs["undecided"] == 1.0
@@ -92,7 +92,7 @@ def test_too_few_periods_leave_cells_undecided_and_say_so(found: Attractors) -> 
 @pytest.mark.thorough
 def test_the_basins_of_mirrored_equilibria_are_mirror_images() -> None:
     theta, velocity = np.linspace(-2.0, 2.0, 21), np.linspace(-1.5, 1.5, 15)
-    label = basins(steady(), theta=theta, velocity=velocity)["label"].values
+    label = basins_of_attraction(steady(), theta=theta, velocity=velocity)["label"].values
     image = np.array([0, 2, 1])[label[::-1, ::-1]]
     assert np.array_equal(label, image)
     assert set(np.unique(label)) == {0, 1, 2}
@@ -100,7 +100,7 @@ def test_the_basins_of_mirrored_equilibria_are_mirror_images() -> None:
 
 def test_a_grid_of_its_own_keeps_to_the_side_of_the_wall() -> None:
     system = walled()
-    picture = basins(system, found=attractors(system, starts=8, region=(0.5, 0.5)), velocity=[0.0], x=None)
+    picture = basins_of_attraction(system, found=find_attractors(system, starts=8, region=(0.5, 0.5)), velocity=[0.0], x=None)
     assert picture["x"].values.max() <= 1.0
     assert (picture["label"].values == 1).all()
 
@@ -109,7 +109,7 @@ def test_a_grid_of_its_own_keeps_to_the_side_of_the_wall() -> None:
 def test_cells_of_a_chaotic_attractor_are_told_from_those_of_a_cycle() -> None:
     grid = np.linspace(-1.9, 1.9, 8)
     system = loaded(3.0, 1.1)
-    picture = basins(system, theta=grid, velocity=grid)
+    picture = basins_of_attraction(system, theta=grid, velocity=grid)
     assert picture["attractor_kind"].values.tolist() == ["periodic", "chaotic"]
     assert picture.attrs["undecided"] == 0.0
     for i, j in ((0, 0), (7, 0), (2, 5), (5, 6)):
@@ -130,12 +130,12 @@ def test_cells_of_a_chaotic_attractor_are_told_from_those_of_a_cycle() -> None:
 )
 def test_senseless_grids_are_refused(arguments: dict, says: str) -> None:
     with pytest.raises(ParameterError, match=says):
-        basins(SYSTEM, **arguments)
+        basins_of_attraction(SYSTEM, **arguments)
 
 
 def test_attractors_of_another_system_are_refused(found: Attractors) -> None:
     with pytest.raises(ParameterError, match="another system"):
-        basins(loaded(), theta=[0.0], velocity=[0.0], found=found)
+        basins_of_attraction(loaded(), theta=[0.0], velocity=[0.0], found=found)
 
 
 def test_the_picture_shows_each_basin_in_its_own_lightness(picture: xarray.Dataset) -> None:

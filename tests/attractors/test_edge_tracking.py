@@ -7,10 +7,10 @@ from attractor_cases import loaded, steady
 from scipy.spatial import cKDTree
 
 import saltus
-from saltus.attractors.basins import basins
-from saltus.attractors.boundaries import clipped, edge_saddles, edges
-from saltus.attractors.found import Attractors, attractors
-from saltus.attractors.labelling import label_states
+from saltus.attractors.basins.boundaries import clipped, edge_saddles, edges
+from saltus.attractors.basins.grid import basins_of_attraction
+from saltus.attractors.basins.labelling import label_states
+from saltus.attractors.find import Attractors, find_attractors
 
 SYSTEM = loaded(W=0.88)
 GRID = np.linspace(-2.5, 2.5, 31)
@@ -18,12 +18,12 @@ GRID = np.linspace(-2.5, 2.5, 31)
 
 @pytest.fixture(scope="module")
 def found() -> Attractors:
-    return attractors(SYSTEM, starts=32)
+    return find_attractors(SYSTEM, starts=32)
 
 
 @pytest.fixture(scope="module")
 def picture(found: Attractors) -> xarray.Dataset:
-    return basins(SYSTEM, theta=GRID, velocity=GRID, found=found, curves=True)
+    return basins_of_attraction(SYSTEM, theta=GRID, velocity=GRID, found=found, curves=True)
 
 
 def label(found: Attractors, states: np.ndarray) -> np.ndarray:
@@ -57,14 +57,14 @@ def test_a_picture_brings_the_curves_where_its_basins_meet(picture: xarray.Datas
 
 
 def test_under_a_constant_load_they_are_separatrices() -> None:
-    picture = basins(steady(), theta=GRID, velocity=GRID, curves=True)
+    picture = basins_of_attraction(steady(), theta=GRID, velocity=GRID, curves=True)
     start = np.array([picture["boundary_theta"].values[0], picture["boundary_velocity"].values[0]])
     assert abs(float(steady().model.acceleration(0.0, start[0], 0.0, np.sign(start[0]), steady().load))) < 1e-5
     assert abs(start[1]) < 1e-5
 
 
 def test_one_basin_has_no_curves() -> None:
-    picture = basins(loaded(), theta=GRID[::6], velocity=GRID[::6], curves=True)
+    picture = basins_of_attraction(loaded(), theta=GRID[::6], velocity=GRID[::6], curves=True)
     assert picture["boundary_theta"].size == 0
 
 

@@ -13,8 +13,8 @@ from verdict_cases import spread, under_force, wall
 import saltus
 from saltus import ParameterError
 from saltus.attractors import lyapunov_many, lyapunov_spectrum
-from saltus.attractors.divergence import Contraction, impact_factor
-from saltus.attractors.pieces import LONGEST, piece_count
+from saltus.attractors.lyapunov.area_contraction import Contraction, impact_factor
+from saltus.attractors.lyapunov.renormalisation import LONGEST, piece_count
 from saltus.theory import equilibria
 
 

@@ -8,7 +8,7 @@ from attractor_cases import FOLDS, HELD, ONSET, loaded, steady, strobes, walled
 
 import saltus
 from saltus.attractors.attractor import Target
-from saltus.attractors.found import attractors
+from saltus.attractors.find import find_attractors
 from saltus.errors import ParameterError
 from saltus.orbits import RestingOrbit
 from saltus.theory import equilibria
@@ -21,7 +21,7 @@ def branch() -> saltus.Branch:
 
 
 def test_the_attractors_between_two_folds_are_the_stable_orbits_of_the_branch(branch: saltus.Branch) -> None:
-    found = attractors(loaded(W=0.88), starts=64)
+    found = find_attractors(loaded(W=0.88), starts=64)
     expected = sorted(orbit.amplitude for orbit in branch.at(0.88) if orbit.stable)
     assert len(expected) == 2
     assert [member.amplitude for member in found] == pytest.approx(expected, rel=1e-9)
@@ -34,14 +34,14 @@ def test_the_attractors_between_two_folds_are_the_stable_orbits_of_the_branch(br
     ("W", "count"), [(FOLDS[0] - 0.004, 1), (FOLDS[0] + 0.004, 2), (FOLDS[1] - 0.004, 2), (FOLDS[1] + 0.004, 1)]
 )
 def test_their_number_changes_at_the_folds(W: float, count: int) -> None:
-    assert len(attractors(loaded(W=W), starts=48)) == count
+    assert len(find_attractors(loaded(W=W), starts=48)) == count
 
 
 @pytest.mark.parametrize(
     ("H", "kinds"), [(ONSET - 5e-4, ["rest"]), (ONSET + 5e-4, ["rest", "periodic"]), (HELD + 2e-3, ["periodic"])]
 )
 def test_rest_and_motion_coexist_from_the_onset_to_the_load_that_releases(H: float, kinds: list[str]) -> None:
-    found = attractors(loaded(H), starts=96)
+    found = find_attractors(loaded(H), starts=96)
     assert [member.kind for member in found] == kinds
     assert found.undecided == 0
     if kinds[0] == "rest":
@@ -50,7 +50,7 @@ def test_rest_and_motion_coexist_from_the_onset_to_the_load_that_releases(H: flo
 
 def test_each_start_ends_where_a_scalar_simulation_says() -> None:
     system = loaded(W=0.88)
-    found = attractors(system, starts=12, seed=3)
+    found = find_attractors(system, starts=12, seed=3)
     for state, label in zip(found.states, found.assigned, strict=True):
         last = strobes(system, state, 80)[-1]
         assert found.of(label).target.distance(last) < 1e-6
@@ -58,28 +58,28 @@ def test_each_start_ends_where_a_scalar_simulation_says() -> None:
 
 def test_mirror_images_are_two_attractors_even_where_no_start_leads_to_one() -> None:
     system = loaded(0.3, V=-1.6)
-    found = attractors(system, starts=64)
+    found = find_attractors(system, starts=64)
     assert [(member.label, member.mirror) for member in found] == [(1, 2), (2, 1)]
     one, other = found
     assert (one.highest, one.lowest) == pytest.approx((-other.lowest, -other.highest), rel=1e-9)
     assert one.highest > other.highest
-    alone = attractors(system, starts=1, seed=5)
+    alone = find_attractors(system, starts=1, seed=5)
     assert sorted(member.starts for member in alone) == [0, 1]
 
 
 def test_a_symmetric_cycle_is_its_own_mirror_image() -> None:
-    found = attractors(loaded(1.0, 2.4), starts=48)
+    found = find_attractors(loaded(1.0, 2.4), starts=48)
     assert [(member.label, member.periods, member.mirror) for member in found] == [(1, 1, 1), (2, 3, 2), (3, 3, 3)]
     assert all(len(member.strobes) == member.periods for member in found)
 
 
 def test_labels_do_not_depend_on_the_sample() -> None:
-    one, other = (attractors(loaded(1.0, 2.4), starts=n, seed=seed) for n, seed in ((40, 1), (56, 9)))
+    one, other = (find_attractors(loaded(1.0, 2.4), starts=n, seed=seed) for n, seed in ((40, 1), (56, 9)))
     assert [m.amplitude for m in one] == pytest.approx([m.amplitude for m in other], rel=1e-9)
 
 
 def test_under_a_constant_load_they_are_rest_and_the_stable_equilibria() -> None:
-    found = attractors(steady(), starts=48)
+    found = find_attractors(steady(), starts=48)
     stable = sorted(e.theta for e in equilibria(steady()) if e.stability.value == "stable")
     assert sorted(float(member.strobes[0, 0]) for member in found) == pytest.approx(stable, abs=1e-9)
     assert found.of(0).kind == "rest"
@@ -87,7 +87,7 @@ def test_under_a_constant_load_they_are_rest_and_the_stable_equilibria() -> None
 
 
 def test_an_oscillator_that_never_reaches_its_wall_has_one_attractor_and_its_closed_form() -> None:
-    found = attractors(walled(), starts=32, region=(2.0, 2.0))
+    found = find_attractors(walled(), starts=32, region=(2.0, 2.0))
     (member,) = found
     assert member.amplitude == pytest.approx(0.2 / abs(1.0 - 1.3**2 + 0.13j), rel=1e-10)
     assert float(found.to_xarray()["multiplier"][0]) == pytest.approx(math.exp(-0.1 * math.pi / 1.3), rel=1e-9)
@@ -95,7 +95,7 @@ def test_an_oscillator_that_never_reaches_its_wall_has_one_attractor_and_its_clo
 
 
 def test_with_losses_an_orbit_may_rest_and_be_an_attractor() -> None:
-    found = attractors(loaded(0.15, 0.2, e=0.3), starts=32)
+    found = find_attractors(loaded(0.15, 0.2, e=0.3), starts=32)
     (member,) = found
     assert isinstance(member.orbit, RestingOrbit)
     assert member.starts == 32
@@ -103,7 +103,7 @@ def test_with_losses_an_orbit_may_rest_and_be_an_attractor() -> None:
 
 def test_known_stable_orbits_count_and_repelling_ones_do_not(branch: saltus.Branch) -> None:
     system = loaded(W=0.88)
-    found = attractors(system, starts=1, known=branch)
+    found = find_attractors(system, starts=1, known=branch)
     assert [member.amplitude for member in found] == pytest.approx(
         sorted(orbit.amplitude for orbit in branch.at(0.88) if orbit.stable), rel=1e-9
     )
@@ -112,8 +112,8 @@ def test_known_stable_orbits_count_and_repelling_ones_do_not(branch: saltus.Bran
 
 def test_further_starts_find_but_do_not_count() -> None:
     system = loaded(W=0.88)
-    whole = attractors(system, starts=32)
-    found = attractors(system, starts=1, also=np.concatenate([member.strobes for member in whole]))
+    whole = find_attractors(system, starts=32)
+    found = find_attractors(system, starts=1, also=np.concatenate([member.strobes for member in whole]))
     assert len(found) == 2
     assert sum(member.starts for member in found) == 1
 
@@ -121,16 +121,16 @@ def test_further_starts_find_but_do_not_count() -> None:
 def test_the_error_of_a_share_is_binomial_and_covers_the_truth() -> None:
     shares, system = [], loaded(W=0.88)
     for seed in range(4):
-        found = attractors(system, starts=64, seed=seed)
+        found = find_attractors(system, starts=64, seed=seed)
         p, n = found.of(1).fraction, 64
         assert found.of(1).error == pytest.approx(math.sqrt(p * (1 - p) / n), rel=1e-12)
         shares.append(p)
-    many = attractors(system, starts=1024, seed=7).of(1)
+    many = find_attractors(system, starts=1024, seed=7).of(1)
     assert np.abs(np.array(shares) - many.fraction).max() < 3.0 * math.hypot(0.5 / 8.0, many.error)
 
 
 def test_the_dataset_says_what_was_found_and_how() -> None:
-    found = attractors(loaded(0.05), starts=40)
+    found = find_attractors(loaded(0.05), starts=40)
     data = found.to_xarray()
     assert data["attractor"].values.tolist() == [0, 1]
     assert data["attractor_kind"].values.tolist() == ["rest", "periodic"]
@@ -155,7 +155,7 @@ def test_a_sampled_set_knows_its_points_from_others() -> None:
 
 @pytest.mark.thorough
 def test_without_losses_nothing_attracts() -> None:
-    found = attractors(loaded(0.05, C=0.0), starts=2)
+    found = find_attractors(loaded(0.05, C=0.0), starts=2)
     assert len(found) == 0
     assert found.undecided == 2
     assert any("areas do not shrink" in reason for reason in found.reasons)
@@ -163,7 +163,7 @@ def test_without_losses_nothing_attracts() -> None:
 
 @pytest.mark.thorough
 def test_chaos_and_a_periodic_motion_coexist() -> None:
-    found = attractors(loaded(3.0, 1.1), starts=64)
+    found = find_attractors(loaded(3.0, 1.1), starts=64)
     assert [member.kind for member in found] == ["periodic", "chaotic"]
     assert found.undecided == 0
     assert found.of(2).amplitude > 4.0
@@ -173,15 +173,15 @@ def test_chaos_and_a_periodic_motion_coexist() -> None:
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: attractors(loaded(), region=(1.0, 0.0)), "half widths"),
-        (lambda: attractors(loaded(), starts=0), "starts"),
-        (lambda: attractors(loaded(), longest=40), "longest"),
-        (lambda: attractors(loaded(), also=[[1.0, np.inf]]), "also"),
-        (lambda: attractors(loaded(), known=[3]), "known must be"),
-        (lambda: attractors("loaded"), "System"),
-        (lambda: attractors(saltus.System(model=saltus.TwoLayer(beta0=1.4))), "one coordinate"),
+        (lambda: find_attractors(loaded(), region=(1.0, 0.0)), "half widths"),
+        (lambda: find_attractors(loaded(), starts=0), "starts"),
+        (lambda: find_attractors(loaded(), longest=40), "longest"),
+        (lambda: find_attractors(loaded(), also=[[1.0, np.inf]]), "also"),
+        (lambda: find_attractors(loaded(), known=[3]), "known must be"),
+        (lambda: find_attractors("loaded"), "System"),
+        (lambda: find_attractors(saltus.System(model=saltus.TwoLayer(beta0=1.4))), "one coordinate"),
         (
-            lambda: attractors(loaded().with_({"load.horizontal": saltus.Record([0.0, 1.0], [0.0, 1.0])})),
+            lambda: find_attractors(loaded().with_({"load.horizontal": saltus.Record([0.0, 1.0], [0.0, 1.0])})),
             "does not repeat",
         ),
     ],
@@ -193,4 +193,4 @@ def test_senseless_questions_are_refused(call, says: str) -> None:
 
 def test_an_orbit_of_another_system_is_refused(branch: saltus.Branch) -> None:
     with pytest.raises(ParameterError, match=r"differs in load\.frequency"):
-        attractors(loaded(W=0.5), known=branch.orbits[0])
+        find_attractors(loaded(W=0.5), known=branch.orbits[0])

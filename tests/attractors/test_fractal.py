@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from saltus.attractors.fractal import basin_entropy, uncertainty_exponent, wada
+from saltus.attractors.basins.fractal import basin_entropy, uncertainty_exponent, wada
 from saltus.errors import ParameterError
 
 

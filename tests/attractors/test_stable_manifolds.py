@@ -9,11 +9,11 @@ from scipy.optimize import brentq
 from scipy.spatial import cKDTree
 
 import saltus
-from saltus.attractors.basins import basins
-from saltus.attractors.manifolds import OFFSET, Manifold, stable_manifold, unstable_manifold
-from saltus.attractors.separatrices import saddles, separatrices
+from saltus.attractors.basins.grid import basins_of_attraction
+from saltus.attractors.manifolds.phase_plane import saddles, separatrices
+from saltus.attractors.manifolds.saddle_manifolds import OFFSET, Manifold, stable_manifold, unstable_manifold
 from saltus.errors import ParameterError
-from saltus.paper.manifolds import manifold
+from saltus.paper.figures.manifolds import manifold
 from saltus.systems.reversed import reversed_load, reversed_system
 from saltus.theory import equilibria, wall_orbits
 
@@ -117,7 +117,7 @@ def test_motions_from_it_approach_the_saddle_and_those_beside_it_leave_to_both_s
 
 def test_the_boundary_of_the_basins_lies_on_it_to_a_cell(curve: Manifold) -> None:
     grid = np.linspace(-3.0, 3.0, 101)
-    labels = basins(curve.orbit.system, theta=grid, velocity=grid)["label"].values
+    labels = basins_of_attraction(curve.orbit.system, theta=grid, velocity=grid)["label"].values
     cell = grid[1] - grid[0]
     edge = grid[edge_of(labels)][:, ::-1]
     on = curve.states[np.isfinite(curve.states).all(axis=1)]
@@ -138,7 +138,7 @@ def test_with_impacts_that_lose_speed_the_multiplier_is_the_closed_forms_and_the
     assert found.multiplier == pytest.approx(min(np.abs(known.multipliers)), rel=1e-9)
     assert len({branch.point for branch in found.curves}) == 2
     grid = np.linspace(-1.0, 0.3, 66), np.linspace(-1.5, 1.5, 61)
-    labels = basins(system, x=grid[0], velocity=grid[1])["label"].values
+    labels = basins_of_attraction(system, x=grid[0], velocity=grid[1])["label"].values
     cell = np.array([grid[0][1] - grid[0][0], grid[1][1] - grid[1][0]])
     places = edge_of(labels)
     edge = np.stack([grid[0][places[:, 1]], grid[1][places[:, 0]]], axis=1) / cell
@@ -239,7 +239,7 @@ def test_separatrices_cross_the_contact_where_an_independent_integration_does() 
 
 def test_separatrices_part_the_basins_of_a_constant_load() -> None:
     system, theta, velocity = steady(), np.linspace(-2.0, 2.0, 61), np.linspace(-1.5, 1.5, 51)
-    labels = basins(system, theta=theta, velocity=velocity)["label"].values
+    labels = basins_of_attraction(system, theta=theta, velocity=velocity)["label"].values
     places = edge_of(labels)
     cell = np.array([theta[1] - theta[0], velocity[1] - velocity[0]])
     edge = np.stack([theta[places[:, 1]], velocity[places[:, 0]]], axis=1) / cell

@@ -9,9 +9,9 @@ from verdict_cases import under_force, wall
 import saltus
 from saltus import ParameterError
 from saltus.attractors import classify, excludes_tori
-from saltus.attractors.certify import certify
-from saltus.attractors.settling import settle
-from saltus.attractors.verdict import KINDS
+from saltus.attractors.orbit_certificate import certify
+from saltus.attractors.recurrence import settle
+from saltus.attractors.verdict.verdict import KINDS
 from saltus.theory import equilibria
 
 
@@ -226,7 +226,7 @@ def test_a_motion_that_ends_is_undecided():
 
 def test_a_longest_period_may_be_longer_than_what_settling_looks_for():
     """A cycle of q periods is the smallest shift that maps the last states onto themselves."""
-    from saltus.attractors.verdict import _long_cycle
+    from saltus.attractors.verdict.verdict import _long_cycle
 
     states = np.tile(np.arange(20.0), 6)[:, None] * [1.0, -2.0]
     assert _long_cycle(states, 32) == 20

@@ -5,7 +5,7 @@ import pytest
 
 from saltus import ParameterError
 from saltus.attractors import zero_one_test
-from saltus.attractors.zero_one import _displacement
+from saltus.attractors.verdict.zero_one_test import _displacement
 
 
 def logistic(rate, count, start=0.3, skip=200):

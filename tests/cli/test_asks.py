@@ -9,20 +9,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from saltus.attractors import attractors, basins
-from saltus.cli.run import check
+from saltus.attractors import basins_of_attraction, find_attractors
+from saltus.cli.run_command import check
 from saltus.config import load_study
-from saltus.config.asks import ASKS, read_grid, read_pairs, read_values
+from saltus.config.questions import ASKS, read_grid, read_pairs, read_values
 from saltus.errors import ParameterError
-from saltus.studies import basin_sweep, bordered_chart, phase_portrait, stability_chart
-from saltus.studies.spectrum import diagram
+from saltus.studies import basin_sweep, bordered_chart, stability_chart
+from saltus.studies import portrait as phase_portrait
+from saltus.studies.diagram.diagram import diagram
 
 FUNCTIONS = {
     "phase_portrait": phase_portrait,
     "response_spectrum": diagram,
     "bifurcation_diagram": diagram,
-    "attractors": attractors,
-    "basins": basins,
+    "attractors": find_attractors,
+    "basins": basins_of_attraction,
     "stability_chart": stability_chart,
 }
 NOT_IN_FILES = {

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import saltus
+from saltus.bounds.capture import capture_speed
 from saltus.config import load_study
-from saltus.flow.capture import capture_speed
 from saltus.systems import IMPACTS, MODELS
 
 ROOT = Path(__file__).parents[2]
@@ -146,7 +146,7 @@ def test_the_kinds_of_special_points_are_all_there():
 
 
 def test_the_options_of_a_diagram_are_all_there():
-    from saltus.studies.spectrum import bifurcation_diagram, diagram, response_spectrum
+    from saltus.studies.diagram.diagram import bifurcation_diagram, diagram, response_spectrum
 
     options = set(inspect.signature(diagram).parameters) - {"system", "path"}
     rows = dict(re.findall(r"^\| (`[^|]*)\|([^|]*)\|[^|]*\|$", orbits_section("Spectra and diagrams"), re.MULTILINE))

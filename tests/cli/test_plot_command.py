@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import xarray
 
-from saltus.cli.plot import open_result
-from saltus.sweep import Plan, Variable, files, run
+from saltus.cli.plot_command import open_result
+from saltus.sweep import Plan, Variable, run
+from saltus.sweep import store_files as files
 
 MODEL = '[model]\ntype = "Metainterface"\nbeta0 = "80 deg"\ndamping = 0.1\n'
 FORCED = MODEL + "[load]\nfrequency = 1.0\nhorizontal = { amplitude = 0.5 }\nvertical = -0.5\n"

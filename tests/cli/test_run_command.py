@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
-from saltus.attractors import basins
+from saltus.attractors import basins_of_attraction
 from saltus.config import load_study
 from saltus.studies import stability_chart
 from saltus.sweep import open_store, status
@@ -92,7 +92,7 @@ def test_basins_are_those_of_python_and_their_cells_stay_in_a_store(saltus, stud
     path = study(FORCED + BASINS + "rows = 2\n")
     result = saltus("run", path, "-o", tmp_path / "out", "--no-plot")
     assert files(tmp_path / "out") == ["basins.nc", "basins.zarr"]
-    whole = basins(load_study(path).system, theta=np.linspace(-2, 2, 6), velocity=np.linspace(-2, 2, 5))
+    whole = basins_of_attraction(load_study(path).system, theta=np.linspace(-2, 2, 6), velocity=np.linspace(-2, 2, 5))
     with xarray.open_dataset(tmp_path / "out" / "basins.nc", engine="h5netcdf") as data:
         for name in ("label", "time", "cells", "strobe_theta"):
             np.testing.assert_array_equal(data[name], whole[name])
@@ -103,7 +103,7 @@ def test_basins_are_those_of_python_and_their_cells_stay_in_a_store(saltus, stud
 def test_what_is_kept_is_not_computed_again(saltus, study, tmp_path, monkeypatch):
     path = study(FORCED + CHART)
     saltus("run", path, "-o", tmp_path / "out", "--no-plot")
-    monkeypatch.setattr("saltus.studies.chart_cells.cells", lambda *args: pytest.fail("it computed the chart again"))
+    monkeypatch.setattr("saltus.studies.chart.cells.cells", lambda *args: pytest.fail("it computed the chart again"))
     result = saltus("run", path, "-o", tmp_path / "out")
     assert result.exit_code == 0
     assert files(tmp_path / "out") == ["stability_chart.pdf", "stability_chart.png", "stability_chart.zarr"]

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from saltus.cli.guard import guarded
-from saltus.cli.status import print_status, size
+from saltus.cli.status_command import print_status, size
 from saltus.errors import SweepError
-from saltus.sweep import Plan, Variable, files, run
+from saltus.sweep import Plan, Variable, run
+from saltus.sweep import store_files as files
 from saltus.sweep.store import opened
 
 

@@ -5,11 +5,11 @@ import math
 
 import numpy as np
 
-from saltus.flow import records
-from saltus.flow.compile import MARKER
-from saltus.flow.emit import Emitter
-from saltus.flow.trace import record_table, trace
+from saltus.flow.compiled import MARKER
 from saltus.systems.parameters import numbers
+from saltus.taylor import records
+from saltus.taylor.scalar_source import Emitter
+from saltus.taylor.tracing import record_table, trace
 
 
 class Interpreted:

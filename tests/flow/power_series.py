@@ -1,7 +1,7 @@
 """Truncated power series in 40 digits, composed by brute force: what the generated recurrences are held against.
 
 f(u) is the sum of f^(j)(u_0) / j! (u - u_0)^j, with the derivatives from mpmath and the powers multiplied out. No recurrence of
-`saltus.flow.emit` is used.
+`saltus.taylor.scalar_source` is used.
 """
 
 import mpmath as mp

@@ -6,11 +6,11 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from saltus.flow.adiabatic import budget, normal_form
-from saltus.flow.intervals import Interval
-from saltus.flow.opening import Leaves, Opening
-from saltus.flow.trace import trace
+from saltus.bounds.adiabatic_invariant import budget, normal_form
+from saltus.bounds.gap_equation import Leaves, Opening
+from saltus.bounds.intervals import Interval
 from saltus.systems import Harmonic, Load, Model, System
+from saltus.taylor.tracing import trace
 
 
 @dataclass(frozen=True, kw_only=True)

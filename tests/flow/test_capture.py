@@ -8,10 +8,10 @@ import pytest
 from flow_references import BETA80, driven
 from xarray import DataArray
 
+from saltus.bounds import capture as module
+from saltus.bounds.capture import capture_speed
 from saltus.errors import ParameterError
 from saltus.flow import EventKind, simulate
-from saltus.flow import capture as module
-from saltus.flow.capture import capture_speed
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,

@@ -14,8 +14,8 @@ from flow_references import BETA80, driven
 from scipy.integrate import quad
 
 from saltus.flow import EventKind, simulate
-from saltus.flow import layout as k
-from saltus.flow.compile import load_kernel
+from saltus.flow import kernel_layout as k
+from saltus.flow.compiled import load_kernel
 from saltus.flow.simulation import _prepare, program
 from saltus.systems import EnergyRestitution, Harmonic, Load, System, WallOscillator
 

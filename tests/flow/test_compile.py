@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from saltus.flow import compile as compilation
-from saltus.flow.compile import cache_directory, load_kernel, load_structure
-from saltus.flow.trace import trace
+from saltus.flow import compiled as compilation
+from saltus.flow.compiled import cache_directory, load_kernel, load_structure
 from saltus.systems import Harmonic, Load, System, WallOscillator
+from saltus.taylor.tracing import trace
 
 SYSTEM = System(model=WallOscillator(damping=0.1), load=Load(force=-0.125))
 SCRIPT = """

@@ -9,7 +9,6 @@ import pytest
 from interpreted import Interpreted
 from power_series import solution
 
-from saltus.flow.trace import trace
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,
@@ -23,6 +22,7 @@ from saltus.systems import (
     VelocityReduction,
     WallOscillator,
 )
+from saltus.taylor.tracing import trace
 
 # Each operation as a function of the coordinate q, the velocity v, the load f and the parameters a, b. Where a function has a
 # restricted domain its argument is kept inside it.

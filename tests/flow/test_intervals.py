@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from saltus.flow.graph import Expr, combine, power
-from saltus.flow.intervals import Interval, enclose
-from saltus.flow.trace import trace
+from saltus.bounds.intervals import Interval, enclose
 from saltus.systems import Harmonic, Load, Metainterface, System
+from saltus.taylor.graph import Expr, combine, power
+from saltus.taylor.tracing import trace
 
 LEAVES = [Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("time")]
 ONE_OPERAND = ("sin", "cos", "exp", "tanh", "sinh", "cosh", "sqrt", "log")

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numba import njit, types
 
-from saltus.flow.jit import OPTIONS
-from saltus.flow.lanes.layout import HIGHEST_ORDER, LOWEST_ORDER, POSITIONS, STRIDE, VELOCITIES
-from saltus.flow.lanes.steps import motion_at, only_root
-from saltus.flow.lanes.vector import (
+from saltus.flow.ensemble.lane_layout import HIGHEST_ORDER, LOWEST_ORDER, POSITIONS, STRIDE, VELOCITIES
+from saltus.flow.ensemble.lane_steps import motion_at, only_root
+from saltus.taylor.private_numba import OPTIONS
+from saltus.taylor.vectors import (
     ALL,
     WIDTH,
     load,

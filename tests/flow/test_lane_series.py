@@ -9,16 +9,16 @@ from numba import njit, types
 from power_series import solution
 from test_emit import OPERATIONS, agrees, force
 
-from saltus.flow import jit
-from saltus.flow.emit import Emitter
-from saltus.flow.lanes.compile import load_lane_functions
-from saltus.flow.lanes.layout import HIGHEST_ORDER, LOWEST_ORDER, NOW, STRIDE
-from saltus.flow.lanes.run import lane_order
-from saltus.flow.lanes.signatures import LANE_SERIES
-from saltus.flow.lanes.vector import WIDTH
+from saltus.flow.ensemble.compiled_lanes import load_lane_functions
+from saltus.flow.ensemble.function_types import LANE_SERIES
+from saltus.flow.ensemble.lane_layout import HIGHEST_ORDER, LOWEST_ORDER, NOW, STRIDE
+from saltus.flow.ensemble.threads import lane_order
 from saltus.flow.simulation import program
-from saltus.flow.trace import RECORD_WIDTH
 from saltus.systems import Harmonic, Load, Model, Record, System, WallOscillator
+from saltus.taylor import private_numba as jit
+from saltus.taylor.scalar_source import Emitter
+from saltus.taylor.tracing import RECORD_WIDTH
+from saltus.taylor.vectors import WIDTH
 
 # Operations on a record, whose series ends: what they make ends soon, or late, or never
 OF_RECORD = {

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from lane_cases import FAMILIES, end_state
 
-import saltus.flow.lanes.run as lanes_run
-from saltus.flow.lanes.vector import WIDTH
+import saltus.flow.ensemble.threads as lanes_run
+from saltus.taylor.vectors import WIDTH
 
 OPTIONS = {"sample": ("state", "extrema", "crossings", "speed"), "last": 3, "tol": 1e-12}
 MANY = 2600  # more than two chunks
@@ -83,7 +83,7 @@ WIDE = """
 import sys
 import numpy as np
 from lane_cases import FAMILIES, end_state, stop_names
-from saltus.flow.lanes.vector import WIDTH
+from saltus.taylor.vectors import WIDTH
 cases = FAMILIES["paper"](np.random.default_rng(8), 400)
 ensemble = cases.in_lanes(tol=1e-14, sample=("state", "extrema"))
 state, extrema = end_state(ensemble, cases.system), np.stack([ensemble.largest_theta, ensemble.smallest_theta])

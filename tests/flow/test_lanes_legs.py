@@ -11,9 +11,9 @@ from numba import njit
 from test_ensemble_samples import KINDS, extrema
 
 import saltus
-from saltus.flow.jit import OPTIONS
-from saltus.flow.lanes.alone import turning_range
+from saltus.flow.ensemble.scalar_fallback import turning_range
 from saltus.systems import Harmonic, Load, Record
+from saltus.taylor.private_numba import OPTIONS
 
 SHORT = {"load.frequency": 40.0, "load.horizontal.amplitude": 0.3}  # periods shorter than a step
 RECORD = Record([-2.0, -0.7, 0.31, 1.3, 2.9, 9.0], [0.0, 0.3, -0.2, 0.4, 0.1, 0.2])

@@ -10,12 +10,12 @@ import pytest
 from interpreted import Interpreted
 from test_emit import LAYERS, LOAD, OPERATIONS, SYSTEMS
 
-from saltus.flow import records
-from saltus.flow.compile import HEADER, MARKER
+from saltus.flow.compiled import HEADER, MARKER
 from saltus.systems import Load, Metainterface, Model, Record, System
+from saltus.taylor import records
 
 PYTHON = """
-from saltus.flow.lowered import lowered_jit as _lowered_jit
+from saltus.taylor.llvm_lowering import lowered_jit as _lowered_jit
 
 
 def lowered_jit(signature, **options):

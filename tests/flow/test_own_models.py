@@ -9,7 +9,7 @@ import pytest
 
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.flow.compile import cache_directory
+from saltus.flow.compiled import cache_directory
 from saltus.flow.simulation import _structures
 from saltus.systems import Harmonic, Load, Model, System, VelocityReduction, WallOscillator
 from saltus.systems.registry import MODELS, register

@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 from interpreted import Interpreted
 
-from saltus.flow import tangent
-from saltus.flow.graph import Expr, differentiate, ordered
-from saltus.flow.trace import record_table, trace
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,
@@ -22,6 +19,9 @@ from saltus.systems import (
     WallOscillator,
 )
 from saltus.systems.parameters import numbers
+from saltus.taylor import derivatives as tangent
+from saltus.taylor.graph import Expr, differentiate, ordered
+from saltus.taylor.tracing import record_table, trace
 
 WEIGHTS = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # central differences of order 8
 STEP = 2e-3

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from saltus.errors import ParameterError, TraceError
-from saltus.flow.graph import Expr, combine, differentiate, number, ordered, power, substitute
 from saltus.flow.simulation import structure_key
-from saltus.flow.trace import trace
 from saltus.systems import Harmonic, Load, Metainterface, Model, Record, System, VelocityReduction, WallOscillator
+from saltus.taylor.graph import Expr, combine, differentiate, number, ordered, power, substitute
+from saltus.taylor.tracing import trace
 
 X, V, T, SIDE = Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("time"), Expr("side")
 ALLOWED = "allowed are + - * /, powers, NumPy's sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, and abs of the coordinate"

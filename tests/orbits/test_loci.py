@@ -10,9 +10,9 @@ import saltus
 from saltus.orbits import Locus, SpecialPoint
 from saltus.orbits.codimension import normal_form
 from saltus.orbits.conditions import Singular
-from saltus.orbits.locus import LocusPoint
 from saltus.orbits.path import Curve
 from saltus.orbits.problem import Problem
+from saltus.orbits.special_curve import LocusPoint
 from saltus.theory.wall_orbits import wall_orbits
 
 FREQUENCY, AMPLITUDE, VERTICAL, FORCE = "load.frequency", "load.horizontal.amplitude", "load.vertical", "load.force.amplitude"

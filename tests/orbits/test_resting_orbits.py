@@ -24,7 +24,7 @@ from saltus import (
 )
 from saltus.errors import MotionError
 from saltus.flow import EventKind
-from saltus.orbits.releases import contact_pull, load_releases
+from saltus.orbits.load_release import contact_pull, load_releases
 from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.resting_branch import RestingBranch
 

@@ -5,8 +5,9 @@ import pytest
 import xarray as xr
 from spectrum_cases import branch, diagram
 
-from saltus.paper import Verdict, statements_chaos
-from saltus.paper.spectra import under_force
+from saltus.paper import Verdict
+from saltus.paper.claims import statements_chaos
+from saltus.paper.figures.spectra import under_force
 
 
 def panel(*spans, wandering=(), bounds=(0.0, 3.0), stable=True):

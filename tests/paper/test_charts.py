@@ -8,9 +8,10 @@ import xarray as xr
 from picture_checks import check_provenance, clipped
 
 from saltus.files import write_dataset
-from saltus.paper import FIGURES, Verdict, chart_measures, statements_charts
+from saltus.paper import FIGURES, Verdict
+from saltus.paper.claims import chart_measures, statements_charts
 from saltus.plots.chart import draw_stability_chart
-from saltus.studies.bordered import static_borders
+from saltus.studies.chart.with_borders import static_borders
 from saltus.theory import high_frequency_onset, is_monostable, unloaded_fold
 
 QUICK = {

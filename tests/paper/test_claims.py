@@ -4,7 +4,7 @@ import pytest
 from picture_checks import check_provenance, clipped
 
 from saltus.paper import FIGURES, Verdict
-from saltus.paper.claim import check, compare, printed_unit, tally, to_markdown
+from saltus.paper.claims.claim import check, compare, printed_unit, tally, to_markdown
 
 WHERE = {"id": "x", "where": "eq", "statement": "s", "evidence": "e"}
 SPECTRA = ("fig09", "fig10", "fig11", "fig12", "fig13", "fig14", "fig15", "quasi")  # made small in tests of their own

@@ -5,8 +5,8 @@ import pytest
 
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.paper.manifolds import manifold
-from saltus.paper.portrait import circled, loop_area, portrait, separatrices, system
+from saltus.paper.figures.manifolds import manifold
+from saltus.paper.figures.portrait import circled, loop_area, portrait, separatrices, system
 from saltus.systems import EnergyRestitution
 from saltus.theory import equilibria, total_energy
 

@@ -7,7 +7,7 @@ from spectrum_cases import branch, diagram, folded, loop
 
 from saltus.files import write_dataset
 from saltus.paper import FIGURES, Verdict
-from saltus.paper.statements_spectra import coexistence
+from saltus.paper.claims.statements_spectra import coexistence
 
 pytestmark = pytest.mark.thorough  # searches and branches for five figures
 QUICK = {

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from saltus.errors import ParameterError
-from saltus.paper import PaperFigure, reproduce, state
-from saltus.paper.claim import check
+from saltus.paper import PaperFigure, reproduce
+from saltus.paper import up_to_date as state
+from saltus.paper.claims.claim import check
 from saltus.paper.provenance import dataset, tree
 from saltus.plots.style import new_figure
 
@@ -89,11 +90,11 @@ def test_other_parameters_make_it_again(tmp_path, registry):
 
 
 def test_the_key_follows_the_source_of_everything_imported(monkeypatch):
-    from saltus.paper import fig08
+    from saltus.paper.figures import fig08
 
     key = state.key(fig08.FIGURE)
-    assert "saltus.theory.quasi_static" in state.closure("saltus.paper.fig08")
-    assert "saltus.flow" not in state.closure("saltus.paper.fig02")
+    assert "saltus.theory.quasi_static" in state.closure("saltus.paper.figures.fig08")
+    assert "saltus.flow" not in state.closure("saltus.paper.figures.fig02")
     original = state._source
     changed = "saltus.theory.quasi_static"
     monkeypatch.setattr(state, "_source", lambda module: original(module) + (b"#" if module == changed else b""))

@@ -12,7 +12,7 @@ from saltus.plots.attractors import draw_attractors
 from saltus.plots.diagram import draw_diagram
 from saltus.plots.plane import draw_plane
 from saltus.plots.style import LIMIT, STABLE, UNSTABLE
-from saltus.studies import phase_portrait
+from saltus.studies import portrait as phase_portrait
 from saltus.systems import Load, Metainterface, System
 
 

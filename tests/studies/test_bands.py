@@ -5,7 +5,7 @@ import pytest
 from study_cases import forced
 
 from saltus import ParameterError, WallOscillator
-from saltus.studies.bands import Band, Bands, Tried, band_dataset, chaotic_bands
+from saltus.studies.diagram.bands import Band, Bands, Tried, band_dataset, chaotic_bands
 from saltus.systems import Harmonic, Load, System
 
 REGION = (4.0, 4.0)

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from study_cases import forced
 
-from saltus.attractors import basins
+from saltus.attractors import basins_of_attraction
 from saltus.errors import ParameterError
 from saltus.studies import basin_sweep
-from saltus.sweep import files, status
+from saltus.sweep import status
+from saltus.sweep import store_files as files
 
 GRID = {"theta": np.linspace(-2.0, 2.0, 9), "velocity": np.linspace(-1.5, 2.0, 7)}
 SYSTEM = forced(W=2.4)  # three attractors
@@ -15,7 +16,7 @@ SYSTEM = forced(W=2.4)  # three attractors
 
 @pytest.mark.parametrize("rows", [1, 3, 100])
 def test_a_sweep_of_basins_is_the_basins(rows):
-    whole = basins(SYSTEM, **GRID)
+    whole = basins_of_attraction(SYSTEM, **GRID)
     assert len(np.unique(whole["label"])) == 3
     assert basin_sweep(SYSTEM, **GRID, rows=rows).identical(whole)
 
@@ -28,8 +29,10 @@ def test_what_is_kept_is_gone_on_with(tmp_path, monkeypatch):
     for name in ("label", "time"):
         files.chunk_file(tmp_path / "store", name, (2, 0), 0).unlink()
     assert status(tmp_path / "store").done == 3
-    seen, cells = [], basins.__globals__["cells"]
-    monkeypatch.setitem(basins.__globals__, "cells", lambda arguments, block: seen.append(block) or cells(arguments, block))
+    seen, cells = [], basins_of_attraction.__globals__["cells"]
+    monkeypatch.setitem(
+        basins_of_attraction.__globals__, "cells", lambda arguments, block: seen.append(block) or cells(arguments, block)
+    )
     assert basin_sweep(SYSTEM, **GRID, rows=2, store=tmp_path / "store").identical(whole)
     assert len(seen) == 1
     np.testing.assert_array_equal(seen[0]["velocity"], GRID["velocity"][4:6])
@@ -37,7 +40,7 @@ def test_what_is_kept_is_gone_on_with(tmp_path, monkeypatch):
 
 def test_the_store_of_something_else_is_refused_before_anything_is_computed(tmp_path, monkeypatch):
     basin_sweep(SYSTEM, theta=[0.5], velocity=[0.0], store=tmp_path / "store")
-    monkeypatch.setattr("saltus.attractors.settling.simulate_many", lambda *args, **more: pytest.fail("it began to compute"))
+    monkeypatch.setattr("saltus.attractors.recurrence.simulate_many", lambda *args, **more: pytest.fail("it began to compute"))
     with pytest.raises(ParameterError, match="of the basins of another system; name another store"):
         basin_sweep(forced(W=2.5), theta=[0.5], velocity=[0.0], store=tmp_path / "store")
     (tmp_path / "file").write_text("mine")

@@ -13,12 +13,12 @@ import saltus
 from saltus.errors import ParameterError
 from saltus.orbits import continue_orbit, continue_special, find_orbit
 from saltus.orbits.branch import follow_stable
-from saltus.studies import chart_follow
-from saltus.studies.bordered import bordered_chart
-from saltus.studies.borders import HARMLESS, Borders, curve_dataset, disagreements, exact_borders, with_borders
-from saltus.studies.chart import stability_chart
-from saltus.studies.chart_ends import ends_of, explained, keys_of, read
-from saltus.studies.chart_follow import KINDS, MISSED, Follower, lost
+from saltus.studies.chart import follow as chart_follow
+from saltus.studies.chart.borders import HARMLESS, Borders, curve_dataset, disagreements, exact_borders, with_borders
+from saltus.studies.chart.changes import ends_of, explained, keys_of, read
+from saltus.studies.chart.chart import stability_chart
+from saltus.studies.chart.follow import KINDS, MISSED, Follower, lost
+from saltus.studies.chart.with_borders import bordered_chart
 from saltus.systems import System, VelocityReduction
 from saltus.theory import high_frequency_onset, unloaded_fold
 

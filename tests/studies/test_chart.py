@@ -9,9 +9,9 @@ from study_cases import forced
 
 from saltus.errors import ParameterError
 from saltus.orbits import find_orbit, search_orbits
-from saltus.studies import chart as charts
-from saltus.studies.chart import monostable, stability_chart
-from saltus.studies.chart_cells import MOTION, Tracks, distinct, has, joined, seeds, starts
+from saltus.studies.chart import chart as charts
+from saltus.studies.chart.cells import MOTION, Tracks, distinct, has, joined, seeds, starts
+from saltus.studies.chart.chart import monostable, stability_chart
 from saltus.systems import Harmonic, Load, TwoLayer
 from saltus.theory import equilibria, unloaded_fold
 

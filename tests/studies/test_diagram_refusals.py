@@ -12,7 +12,8 @@ import pytest
 from study_cases import AMPLITUDE, FREQUENCY, forced
 
 from saltus.errors import ParameterError
-from saltus.studies import bifurcation_diagram, response_spectrum, spectrum
+from saltus.studies import bifurcation_diagram, response_spectrum
+from saltus.studies.diagram import diagram as spectrum
 from saltus.systems import Load, Metainterface, System
 
 UNFORCED = System(model=Metainterface(beta0=1.4), load=Load(vertical=-0.5))

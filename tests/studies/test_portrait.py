@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from saltus.attractors.equilibria import equilibria
+from saltus.attractors.manifolds.equilibria import equilibria
 from saltus.errors import ParameterError
-from saltus.paper.manifolds import manifold
-from saltus.studies import phase_portrait
+from saltus.paper.figures.manifolds import manifold
+from saltus.studies import portrait as phase_portrait
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,
@@ -194,7 +194,7 @@ def test_undamped_separatrices_have_the_energy_of_their_saddle():
 
 
 def test_damped_separatrices_are_those_of_the_paper_module():
-    """`saltus.paper.manifolds` integrates backward by SciPy, with events of its own."""
+    """`saltus.paper.figures.manifolds` integrates backward by SciPy, with events of its own."""
     system, data = paper(0.1, 0.05), portrait(0.1, 0.05)
     saddles = [one for one in known_equilibria(system) if one.eigenvalues and not one.stable and abs(one.theta) < 2.5]
     compared = 0

@@ -9,7 +9,7 @@ from study_cases import AMPLITUDE, forced
 import saltus
 from saltus.orbits import orbits_of
 from saltus.studies import bifurcation_diagram
-from saltus.studies.tree import confirmed
+from saltus.studies.diagram.diagram_dataset import confirmed
 
 SLOW = forced(H=0.15, W=0.2, e=0.3)
 CRITICAL = 0.5 / math.tan(math.radians(80))  # Hcr: below it the load does not pull the contact open

@@ -8,8 +8,8 @@ import subprocess
 import pytest
 
 from saltus.errors import SweepError
+from saltus.sweep import durable_store as whole_module
 from saltus.sweep import run, status
-from saltus.sweep import whole as whole_module
 
 
 def _own_disks() -> bool:

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from saltus.errors import ParameterError
 from saltus.sweep import Variable, run
+from saltus.sweep.chunking import Layout
 from saltus.sweep.jsonable import differences, plain
-from saltus.sweep.layout import Layout
 
 GRID = np.linspace(0.0, 1.0, 4)
 

@@ -10,7 +10,8 @@ import pytest
 import sweep_script
 
 from saltus.errors import SweepError
-from saltus.sweep import Status, files, run, status
+from saltus.sweep import Status, run, status
+from saltus.sweep import store_files as files
 from saltus.sweep.store import opened
 
 CHUNKS = 120

@@ -11,7 +11,8 @@ import sweep_toys
 import xarray as xr
 
 from saltus.errors import ParameterError, SweepError
-from saltus.sweep import Plan, Variable, files, open_store, run
+from saltus.sweep import Plan, Variable, open_store, run
+from saltus.sweep import store_files as files
 from saltus.sweep.store import opened
 
 
@@ -71,7 +72,7 @@ def test_a_function_that_spoils_its_arguments_spoils_no_other_chunk(waves_plan):
 
 
 def test_each_file_is_written_once(waves_plan, monkeypatch, tmp_path):
-    from saltus.sweep import whole as whole_module
+    from saltus.sweep import durable_store as whole_module
 
     written = []
     original = whole_module.write_whole

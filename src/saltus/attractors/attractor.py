@@ -170,7 +170,7 @@ class Attractors:
 
     def to_xarray(self) -> xarray.Dataset:
         """A row for each attractor: kind, periods, fraction and its error, extrema, multipliers, points at phase 0."""
-        from saltus.attractors.dataset import attractors_dataset
+        from saltus.attractors.attractors_dataset import attractors_dataset
 
         return attractors_dataset(self)
 

@@ -79,7 +79,7 @@ def simulate(
     Example: [cyan]saltus simulate study.toml --output runs/first[/]
     """
     with guarded():
-        from saltus.cli.simulate import simulate_study
+        from saltus.cli.simulate_command import simulate_study
 
         simulate_study(study, output, plot)
 
@@ -106,7 +106,7 @@ def run(
     Example: [cyan]saltus run study.toml --output runs/first[/]
     """
     with guarded():
-        from saltus.cli.run import run_study
+        from saltus.cli.run_command import run_study
 
         run_study(study, output, plot, scheduler)
 
@@ -125,7 +125,7 @@ def plot(
     Example: [cyan]saltus plot results/study/stability_chart.zarr[/]
     """
     with guarded():
-        from saltus.cli.plot import plot_store
+        from saltus.cli.plot_command import plot_store
 
         plot_store(store, output)
 
@@ -137,7 +137,7 @@ def status(store: Annotated[Path, typer.Argument(metavar="STORE", help="The .zar
     Example: [cyan]saltus status results/study/stability_chart.zarr[/]
     """
     with guarded():
-        from saltus.cli.status import print_status
+        from saltus.cli.status_command import print_status
 
         print_status(store)
 
@@ -153,7 +153,7 @@ def info(study: Study) -> None:
     Example: [cyan]saltus info study.toml[/]
     """
     with guarded():
-        from saltus.cli.info import print_info
+        from saltus.cli.info_command import print_info
 
         print_info(study)
 
@@ -178,7 +178,7 @@ def reproduce(
     Example: [cyan]saltus reproduce fig04 fig07[/] for two figures
     """
     with guarded():
-        from saltus.cli.reproduce import list_parts, reproduce_paper
+        from saltus.cli.reproduce_command import list_parts, reproduce_paper
 
         if list_:
             list_parts()

@@ -4,7 +4,6 @@ Whatever is wrong with a file is said in one sentence with the file, the line an
 dataclasses in `saltus.systems`; nothing is listed twice. The format is described in docs/study.md.
 """
 
-from saltus.config.settings import Settings
-from saltus.config.study import Study, load_study
+from saltus._front_door import front_door
 
-__all__ = ["Settings", "Study", "load_study"]
+__getattr__, __dir__, __all__ = front_door(__name__, __file__)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from saltus.config.asks import ASKS, Ask, read_ask
 from saltus.config.fields import call
 from saltus.config.loads import read_load
+from saltus.config.questions import ASKS, Ask, read_ask
 from saltus.config.settings import Settings, read_settings
 from saltus.config.source import Source, read_source
 from saltus.config.types import read_part

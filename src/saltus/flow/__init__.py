@@ -5,50 +5,6 @@ their own. Nothing is smoothed. `simulate` is the way in; `Motion` is what it re
 it, and `simulate_many` follows a million of them. Names are imported when they are used: one motion needs no lanes.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from saltus._front_door import front_door
 
-if TYPE_CHECKING:
-    from saltus.flow.capture import capture_speed
-    from saltus.flow.ensemble import simulate_many
-    from saltus.flow.motion import Crossings, DenseOutput, Event, EventKind, Motion, Stop
-    from saltus.flow.sensitivity import Sensitivities, sensitivities
-    from saltus.flow.simulation import simulate
-    from saltus.flow.validity import Validity
-
-_NAMES = {
-    "capture": ("capture_speed",),
-    "ensemble": ("simulate_many",),
-    "motion": ("Crossings", "DenseOutput", "Event", "EventKind", "Motion", "Stop"),
-    "sensitivity": ("Sensitivities", "sensitivities"),
-    "simulation": ("simulate",),
-    "validity": ("Validity",),
-}
-_HOME_OF = {name: f"saltus.flow.{home}" for home, names in _NAMES.items() for name in names}
-
-__all__ = [
-    "Crossings",
-    "DenseOutput",
-    "Event",
-    "EventKind",
-    "Motion",
-    "Sensitivities",
-    "Stop",
-    "Validity",
-    "capture_speed",
-    "sensitivities",
-    "simulate",
-    "simulate_many",
-]
-
-
-if not TYPE_CHECKING:
-
-    def __getattr__(name: str) -> Any:
-        if name in _HOME_OF:
-            return getattr(import_module(_HOME_OF[name]), name)
-        raise AttributeError(f"saltus.flow has no {name!r}; see dir(saltus.flow)")
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__, __all__ = front_door(__name__, __file__)

@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 from saltus.flow.contact import contact_accelerations, rate_of
-from saltus.flow.jit import jit
-from saltus.flow.layout import *
+from saltus.flow.kernel_layout import GAUSS_NODES, GAUSS_WEIGHTS, ORDER, PIECE, SIDE, SIDES, SPEED, TIME
 from saltus.flow.roots import horner
+from saltus.taylor import jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

@@ -7,9 +7,57 @@ from __future__ import annotations
 
 import math
 
-from saltus.flow.jit import jit
-from saltus.flow.layout import *
+from saltus.flow.kernel_layout import (
+    AFTER_IMPACTS,
+    ARC,
+    AT_A_JUMP,
+    AT_A_ROOT,
+    AT_NONE,
+    AT_ONCE,
+    CHATTER,
+    CHATTER_SPEED,
+    CHATTERING,
+    COLUMNS,
+    CONTACT,
+    CROSSING,
+    DOF,
+    END,
+    EVENTS,
+    FORCED,
+    GRAZING,
+    HELD,
+    HORIZON,
+    LAST,
+    LENGTH,
+    LOSSLESS,
+    MODE,
+    NEVER_AGAIN,
+    NO_IMPACT,
+    NOT_UNIQUE,
+    ORDER,
+    OWN,
+    PAUSED,
+    PERIOD,
+    PIECE,
+    RELEASE,
+    REST,
+    RESTING,
+    SIDE,
+    SIDES,
+    SKIP,
+    SLOW,
+    SLOWLY,
+    SPEED,
+    STATE,
+    TIME,
+    TINY,
+    TOLERANCE,
+    TRIPLE,
+    VISIT,
+    ZERO,
+)
 from saltus.flow.steps import forget, record_event, record_shift, record_step
+from saltus.taylor import jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

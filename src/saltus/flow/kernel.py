@@ -25,11 +25,53 @@ import numpy as np
 
 from saltus.flow.chatter import chatter_decay
 from saltus.flow.contact import contact_accelerations, decide, hold, impact, leading, rate_of
-from saltus.flow.jit import ADVANCE, jit
-from saltus.flow.jit import not_here as cached_jit
-from saltus.flow.layout import *
+from saltus.flow.kernel_layout import (
+    ARC,
+    BATCH,
+    CHATTER,
+    CHATTER_SPEED,
+    COLUMNS,
+    CONTACT,
+    DOF,
+    DONE,
+    END,
+    EVENTS,
+    EXACT,
+    FULL,
+    GRAZING,
+    HELD,
+    LAST,
+    LENGTH,
+    LIMIT,
+    LIMITED,
+    MODE,
+    NOT_FINITE,
+    ORDER,
+    OWN,
+    PAUSED,
+    PERIOD,
+    PIECE,
+    ROUGHER,
+    ROWS,
+    SHORTEST,
+    SIDE,
+    SIDES,
+    SKIP,
+    SPEED,
+    STALLED,
+    STATE,
+    STEEP,
+    STEPS,
+    STOPS,
+    TIME,
+    TOLERANCE,
+    VISIT,
+    VISITED,
+)
 from saltus.flow.roots import NEVER, SIMPLE, first_root, horner, scale_gap
 from saltus.flow.steps import column_step, leaps, record_event, record_shift, record_step, step_size
+from saltus.taylor import ADVANCE, jit
+from saltus.taylor import not_here as cached_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

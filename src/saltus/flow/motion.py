@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.flow.dense import DenseOutput
+from saltus.flow.dense_output import DenseOutput
 from saltus.flow.validity import Validity, ValidityCheck
 from saltus.systems import System
 
@@ -178,6 +178,6 @@ class Motion:
 
     def to_xarray(self, times: Any = None) -> xarray.Dataset:
         """The motion as a dataset with units and provenance; by default its samples, or 200 a forcing period, or 2000 in all."""
-        from saltus.flow.dataset import to_dataset
+        from saltus.flow.motion_dataset import to_dataset
 
         return to_dataset(self, times)

@@ -8,8 +8,8 @@ from typing import Any, overload
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow import layout as k
-from saltus.flow.dense import DenseOutput
+from saltus.flow import kernel_layout as k
+from saltus.flow.dense_output import DenseOutput
 from saltus.flow.motion import Crossings, Event, EventKind, Samples
 from saltus.flow.validity import Validity, ValidityCheck
 from saltus.systems import System

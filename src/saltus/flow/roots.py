@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.jit import jit
+from saltus.taylor import jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

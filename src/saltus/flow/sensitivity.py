@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.flow import layout as k
+from saltus.flow import kernel_layout as k
 from saltus.flow.motion import EventKind, Motion, Stop
 from saltus.flow.simulation import Followed, follow
-from saltus.flow.tangent import FREQUENCY
 from saltus.systems import System
+from saltus.taylor import FREQUENCY
 
 
 @dataclass(frozen=True, eq=False)

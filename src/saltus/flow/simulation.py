@@ -9,16 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_number
 from saltus.errors import MotionError, ParameterError, near
-from saltus.flow import layout as k
-from saltus.flow.clock import clock
-from saltus.flow.compile import Structure, load_kernel, load_structure
+from saltus.flow import kernel_layout as k
+from saltus.flow.compiled import Structure, load_kernel, load_structure
+from saltus.flow.forcing_time import clock
 from saltus.flow.motion import Motion, Stop
 from saltus.flow.recorder import Recorder
-from saltus.flow.trace import Trace, record_table, trace
-from saltus.systems import Model, Record, System
-from saltus.systems.checks import check_number
-from saltus.systems.parameters import children, is_number, numbers
+from saltus.systems import Model, Record, System, children, is_number, numbers
+from saltus.taylor import Trace, record_table, trace
 
 MOST_EVENTS = 20_000_000  # that are kept
 MOST_IMPACTS = 1_000_000  # of a unit of time: beyond them an accumulation of impacts is not being resolved but endured

@@ -9,9 +9,25 @@ import math
 
 import numpy as np
 
-from saltus.flow.jit import jit
-from saltus.flow.layout import *
+from saltus.flow.kernel_layout import (
+    COLUMNS,
+    DEFECT,
+    DENSE,
+    DOF,
+    EVENTS,
+    GAP,
+    ORDER,
+    OWN,
+    PERIOD,
+    PIECE,
+    SAFETY,
+    SIDE,
+    SMALLEST,
+    STATE,
+    STEPS,
+)
 from saltus.flow.roots import horner
+from saltus.taylor import jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

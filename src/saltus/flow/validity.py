@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.dense import DenseOutput, evaluate
+from saltus.flow.dense_output import DenseOutput, evaluate
 from saltus.systems import System
 
 SAMPLES = 12  # in each step, to find changes of sign: a step is shorter than a margin's own time scale

@@ -82,7 +82,7 @@ class Branch:
 
     def to_xarray(self) -> xarray.Dataset:
         """The branch as a dataset, see `dataset.py`."""
-        from saltus.orbits.dataset import branch_dataset
+        from saltus.orbits.branch_dataset import branch_dataset
 
         return branch_dataset(self)
 

@@ -14,7 +14,7 @@ from saltus.orbits.grazing import TOGETHER, removed
 from saltus.orbits.orbit import PeriodicOrbit
 
 if TYPE_CHECKING:
-    from saltus.orbits.locus import LocusPoint
+    from saltus.orbits.special_curve import LocusPoint
 
 NARROW = 1e-15  # bracket, in the step that contains the point
 CAP = 1.0  # of the room that a motion has before another grazing, which may be infinite

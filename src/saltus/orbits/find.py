@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_number
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import EventKind, Motion, simulate
+from saltus.orbits.load_release import load_releases
 from saltus.orbits.newton import solve
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
-from saltus.orbits.releases import load_releases
 from saltus.orbits.resting import resting_near
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import half, is_symmetric, keeps_symmetry
 from saltus.systems import System
-from saltus.systems.checks import check_number
 
 LONGEST = 12  # forcing periods of an orbit that is looked for if none are named
 NEAR = 1e-6  # between states a period apart that have settled: Newton's method does the rest

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import Motion, simulate
+from saltus.flow import Motion, Validity, simulate
 from saltus.flow import segments as at
-from saltus.flow.validity import Validity
 from saltus.orbits.newton import Solution
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature

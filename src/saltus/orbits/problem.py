@@ -20,15 +20,12 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.flow import layout as k
+from saltus.flow import kernel_layout as k
+from saltus.flow import load_segments, program, taylor_order
 from saltus.flow import segments as at
-from saltus.flow.compile import load_segments
-from saltus.flow.simulation import program, taylor_order
-from saltus.flow.tangent import FREQUENCY
-from saltus.flow.trace import record_table
 from saltus.orbits.signature import Signature
-from saltus.systems import System
-from saltus.systems.parameters import numbers
+from saltus.systems import System, numbers
+from saltus.taylor import FREQUENCY, record_table
 
 ORBIT_TOLERANCE = 1e-14  # of the segments' steps: the orbits are then exact to rounding
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from saltus.flow import EventKind, Motion, simulate
 from saltus.flow import segments as at
+from saltus.orbits.load_release import Release, load_releases, peak_near
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import TOUCH, PeriodicOrbit
 from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
-from saltus.orbits.releases import Release, load_releases, peak_near
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import is_symmetric, keeps_symmetry
 from saltus.systems import System

@@ -19,10 +19,10 @@ import numpy as np
 
 from saltus.errors import SaltusError
 from saltus.orbits.branch import Branch
+from saltus.orbits.load_release import Release, load_releases, peak_near
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.path import Curve, Point
 from saltus.orbits.problem import Problem
-from saltus.orbits.releases import Release, load_releases, peak_near
 from saltus.orbits.resting import RestingOrbit, resting_orbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.special import Evidence, SpecialPoint, UserFunction
@@ -73,7 +73,7 @@ class RestingBranch(Branch):
 
     def to_xarray(self) -> xarray.Dataset:
         """The family as a dataset, see `dataset.py`, with each orbit's `releases`, `rests` (times) and `rest_share`."""
-        from saltus.orbits.dataset import branch_dataset
+        from saltus.orbits.branch_dataset import branch_dataset
 
         orbits = [point.resting for point in self.points if isinstance(point, RestingPoint)]
         data = branch_dataset(self)

@@ -3,7 +3,9 @@
 `reproduce` makes every figure, table and claim that is not up to date; `FIGURES` holds them by name, in the paper's order.
 """
 
-from saltus.paper import (
+from saltus.paper.claims import statements
+from saltus.paper.claims.claim import Claim, Verdict
+from saltus.paper.figures import (
     appendix,
     fig01c,
     fig02,
@@ -21,11 +23,9 @@ from saltus.paper import (
     fig14,
     fig15,
     quasi,
-    statements,
     table1,
 )
-from saltus.paper.claim import Claim, Verdict
-from saltus.paper.figure import PaperFigure
+from saltus.paper.figures.figure import PaperFigure
 from saltus.paper.reproduce import Result, reproduce
 
 FIGURES: dict[str, PaperFigure] = {

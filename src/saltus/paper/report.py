@@ -10,9 +10,9 @@ from pathlib import Path
 
 import saltus
 from saltus.files import write_text
-from saltus.paper import state
-from saltus.paper.claim import Claim, Verdict, tally, to_markdown
-from saltus.paper.figure import PaperFigure
+from saltus.paper import up_to_date as state
+from saltus.paper.claims.claim import Claim, Verdict, tally, to_markdown
+from saltus.paper.figures.figure import PaperFigure
 
 CSS = """
 body { font: 16px/1.5 Georgia, "Times New Roman", serif; color: #1a1a1a; margin: 2rem auto; max-width: 62rem; padding: 0 1rem; }

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError, near
 from saltus.files import check_writable, write_atomically, write_dataset, write_text
-from saltus.paper import report, state
-from saltus.paper.claim import Claim, tally
-from saltus.paper.figure import PaperFigure
-from saltus.plots.style import style
+from saltus.paper import report
+from saltus.paper import up_to_date as state
+from saltus.paper.claims.claim import Claim, tally
+from saltus.paper.figures.figure import PaperFigure
+from saltus.plots import style
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -31,7 +31,7 @@ def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), width: float = SING
     is marked at phase 0 of the load, one that does not repeat by some of its points.
 
     Args:
-        dataset: from `saltus.attractors.basins`.
+        dataset: from `saltus.attractors.basins.grid`.
         manifolds: arrays (n, 2) of coordinate and velocity, nan between pieces, such as `stable_manifold(orbit).states`, to be
             drawn besides the dataset's own.
         width: of the figure, mm.

@@ -183,7 +183,7 @@ def _line_handles(curves: Sequence[Any], static: bool) -> list[Any]:
     return (handles if static else []) + exact
 
 
-def legend(figure: Any, curves: Sequence[Any], closed_form: bool = False) -> None:
+def chart_legend(figure: Any, curves: Sequence[Any], closed_form: bool = False) -> None:
     """What the lines and fillings mean, below all panels."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from saltus.plots.response import branches, draw_bands, draw_limits, draw_response, legend
+from saltus.plots.response import branches, draw_bands, draw_limits, draw_response, response_legend
 from saltus.plots.style import DOUBLE_COLUMN, INK, new_figure, styled
 
 NAMES = {
@@ -45,7 +45,7 @@ def draw_diagram(tree: Any) -> Figure:
         axes[1].set_ylabel(rf"${symbol}$ at phase 0{unit}")
         axes[1].set_title("stroboscopic points of direct simulation", loc="left", pad=3)
     axes[-1].set_xlabel(parameter_name(tree.attrs["path"]))
-    legend(figure, [tree], limits=limits[0] < 1.08 * top)
+    response_legend(figure, [tree], limits=limits[0] < 1.08 * top)
     return figure
 
 

@@ -20,7 +20,7 @@ ARROWS = 0.6  # window widths between arrows along a motion
 
 @styled
 def draw_plane(dataset: Any, width: float = 1.5 * SINGLE_COLUMN) -> Figure:
-    """A Figure from a dataset of `saltus.studies.phase_portrait`.
+    """A Figure from a dataset of `saltus.studies.portrait`.
 
     Stable equilibria are filled, unstable ones open. Motions from given starts are drawn whole; those that were spread over the
     window end where they come near to one that is drawn, so that lines stay apart.

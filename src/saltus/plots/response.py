@@ -238,7 +238,7 @@ def free_place(
     return (*best, *size)
 
 
-def legend(figure: Any, spectra: list[Any], *, limits: bool = True, critical: bool = False, columns: int = 4) -> None:
+def response_legend(figure: Any, spectra: list[Any], *, limits: bool = True, critical: bool = False, columns: int = 4) -> None:
     """One legend for all panels, above them, of what is in them."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from saltus.errors import ParameterError
-from saltus.orbits.branch import check_bounds
-from saltus.orbits.find import check_whole
+from saltus.orbits import check_bounds, check_whole
 from saltus.systems import System
 
 

@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.equilibria import Equilibrium, equilibria
-from saltus.attractors.separatrices import Separatrix, separatrices
+from saltus.attractors import Equilibrium, Separatrix, equilibria, separatrices
+from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.orbits.find import check_whole
-from saltus.orbits.search import EVEN
+from saltus.orbits import EVEN, check_whole
 from saltus.systems import System, VelocityReduction
-from saltus.systems.checks import check_number
 
 if TYPE_CHECKING:
     import xarray

@@ -4,10 +4,6 @@ A `Plan` is a function, its arguments and a grid cut into chunks. `run` computes
 an earlier run was stopped or killed. `status` says how far a store is, `open_store` reads it. There is no physics here.
 """
 
-from saltus.sweep.chunk import Failure
-from saltus.sweep.plan import Plan, Variable
-from saltus.sweep.run import SweepInterrupted, run
-from saltus.sweep.status import Status, status
-from saltus.sweep.store import open_store
+from saltus._front_door import front_door
 
-__all__ = ["Failure", "Plan", "Status", "SweepInterrupted", "Variable", "open_store", "run", "status"]
+__getattr__, __dir__, __all__ = front_door(__name__, __file__)

@@ -13,8 +13,8 @@ from typing import Any
 
 from saltus.errors import SweepError
 from saltus.sweep.chunk import Raised, attempt
+from saltus.sweep.chunking import Index
 from saltus.sweep.interrupt import remembered
-from saltus.sweep.layout import Index
 from saltus.sweep.plan import Plan
 
 PATIENCE = 5.0  # s, for the scheduler to answer, and for it to have a worker

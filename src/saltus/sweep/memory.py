@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from saltus.sweep.chunk import Arrays, Failure
-from saltus.sweep.layout import Index
+from saltus.sweep.chunking import Index
 from saltus.sweep.plan import Plan
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ import numpy as np
 
 from saltus.errors import ParameterError, near
 from saltus.sweep.chunk import resolve
+from saltus.sweep.chunking import Index, Layout
 from saltus.sweep.jsonable import plain, text
-from saltus.sweep.layout import Index, Layout
 
 NAME = re.compile(r"[A-Za-z][\w.\-]*")  # of an axis, a dimension or a variable: it is a folder's name in a store
 RESERVED = ("zarr.json", "plan")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError, SweepError
 from saltus.sweep.chunk import Failure, Raised, attempt, checked
-from saltus.sweep.layout import Index
+from saltus.sweep.chunking import Index
 from saltus.sweep.memory import Memory
 from saltus.sweep.plan import Plan
 from saltus.sweep.store import Store, opened

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from saltus.errors import ParameterError
-from saltus.sweep import files
+from saltus.sweep import store_files as files
 from saltus.sweep.chunk import Failure
-from saltus.sweep.layout import Layout
+from saltus.sweep.chunking import Layout
 
 
 @dataclass(frozen=True)

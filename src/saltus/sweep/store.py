@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError, SweepError
-from saltus.sweep import files
+from saltus.sweep import store_files as files
 from saltus.sweep.chunk import Arrays, Failure
+from saltus.sweep.chunking import Index
 from saltus.sweep.jsonable import differences
-from saltus.sweep.layout import Index
 from saltus.sweep.plan import Plan
 from saltus.sweep.status import read_plan, status
 

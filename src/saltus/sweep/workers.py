@@ -12,7 +12,7 @@ from typing import Any
 
 from saltus.errors import SweepError
 from saltus.sweep.chunk import Raised, attempt
-from saltus.sweep.layout import Index
+from saltus.sweep.chunking import Index
 from saltus.sweep.plan import Plan
 
 READY = "ready"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.systems.checks import settle_number
+from saltus.checks import settle_number
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 

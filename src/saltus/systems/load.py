@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from saltus.checks import check_number
 from saltus.errors import ParameterError
-from saltus.systems.checks import check_number
 from saltus.systems.signals import Record, Signal, as_signal
 
 

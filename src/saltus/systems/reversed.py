@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from saltus.checks import settle_number
 from saltus.errors import ParameterError
-from saltus.systems.checks import settle_number
 from saltus.systems.impact import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
 from saltus.systems.model import Model

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.systems.checks import settle_number
+from saltus.checks import settle_number
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 from saltus.systems.signals import scaled

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from saltus.checks import settle_number
 from saltus.errors import ParameterError
-from saltus.systems.checks import settle_number
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.signals import Record, Signal, Sum, scaled

@@ -12,8 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from saltus.checks import check_number, settle_number
 from saltus.errors import ParameterError
-from saltus.systems.checks import check_number, settle_number
 
 
 class Signal:

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import settle_number
 from saltus.errors import ParameterError
 from saltus.systems.cell_layout import CellLayout
-from saltus.systems.checks import settle_number
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.si_units import PhysicalCell
 from saltus.systems.two_layer import TwoLayer

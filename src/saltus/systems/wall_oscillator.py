@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from saltus.systems.checks import settle_number
+from saltus.checks import settle_number
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.systems import System
-from saltus.systems.checks import check_number
 from saltus.theory.equilibria import zeros_of_slope
 from saltus.theory.layer import Layer, layers
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.systems import System
-from saltus.systems.checks import check_number
 from saltus.theory.layer import Layer, layers
 from saltus.theory.small_vibrations import vibration
 

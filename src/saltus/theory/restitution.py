@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.systems import EnergyRestitution, System
-from saltus.systems.checks import check_number
 from saltus.theory.layer import metainterface
 
 

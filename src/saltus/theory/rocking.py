@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_number
 from saltus.errors import ParameterError
-from saltus.systems.checks import check_number
 
 
 def rocking_period(theta0: Any, *, alpha: float) -> Any:

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.systems import System
-from saltus.systems.checks import check_number
 from saltus.theory.layer import Layer, layers
 
 UPRIGHT = 1e-15  # moments V cos(beta0) below this are the rounding of cos(pi/2)

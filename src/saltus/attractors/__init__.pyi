@@ -1,0 +1,47 @@
+from .along_parameter import attractors_along
+from .attractor import Attractor, Attractors, Target
+from .basins.fractal import BasinEntropy, UncertaintyExponent, Wada, basin_entropy, uncertainty_exponent, wada
+from .basins.grid import basins_of_attraction, cell_arguments
+from .find import find_attractors
+from .lyapunov.ensemble import lyapunov_many
+from .lyapunov.largest_exponent import largest_exponents
+from .lyapunov.spectrum import Exponents, lyapunov_spectrum
+from .manifolds.equilibria import Equilibrium, equilibria
+from .manifolds.phase_plane import Separatrix, separatrices
+from .manifolds.saddle_manifolds import Manifold, stable_manifold, unstable_manifold
+from .verdict.classification import classify
+from .verdict.tori import excludes_tori
+from .verdict.verdict import Verdict
+from .verdict.zero_one_test import ZeroOne, zero_one_test
+
+__all__ = [
+    "Attractor",
+    "Attractors",
+    "BasinEntropy",
+    "Equilibrium",
+    "Exponents",
+    "Manifold",
+    "Separatrix",
+    "Target",
+    "UncertaintyExponent",
+    "Verdict",
+    "Wada",
+    "ZeroOne",
+    "attractors_along",
+    "basin_entropy",
+    "basins_of_attraction",
+    "cell_arguments",
+    "classify",
+    "equilibria",
+    "excludes_tori",
+    "find_attractors",
+    "largest_exponents",
+    "lyapunov_many",
+    "lyapunov_spectrum",
+    "separatrices",
+    "stable_manifold",
+    "uncertainty_exponent",
+    "unstable_manifold",
+    "wada",
+    "zero_one_test",
+]

@@ -1,0 +1,206 @@
+"""How basins interlace, measured on a grid of labels: basin entropy, uncertainty exponent, Wada property.
+
+All of them see no finer than the grid: structure below a cell is not there for them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.attractors.attractor import UNDECIDED
+from saltus.errors import ParameterError
+from saltus.orbits import check_whole
+
+RADIUS = 5  # cells within which a cell of the boundary must meet all labels
+MOST_CELLS = 0.5  # a share of uncertain cells above this grows less than the boundary does: it meets itself
+AGREES, FAILS = 0.9, 0.5  # shares of boundary cells from which on basins agree with Wada, and up to which they do not
+
+
+@dataclass(frozen=True)
+class BasinEntropy:
+    """Basin entropy of a grid cut into boxes (Daza et al., Sci. Rep. 6 (2016) 31416)."""
+
+    entropy: float  # S_b: the mean over all boxes of sum_j p_j ln(1 / p_j), p_j the share of label j in the box
+    boundary: float  # S_bb: the mean over the boxes with more than one label; nan where there are none
+    boxes: int
+    boundary_boxes: int
+    box: int  # cells along a side
+
+    @property
+    def fractal(self) -> bool:
+        """Whether S_bb > ln 2: then the boundary is fractal. A fractal one may stay below."""
+        return self.boundary > math.log(2.0)
+
+
+def basin_entropy(labels: Any, box: int = 5) -> BasinEntropy:
+    """The basin entropy of a grid of labels, in one or two dimensions, in boxes of `box` cells a side.
+
+    Incomplete boxes at the far edges, and boxes with an undecided cell (-1), are left out. The criterion S_bb > ln 2 holds for
+    boundaries that part two labels almost everywhere, in boxes of which few hold three.
+
+    Raises:
+        ParameterError: a grid smaller than a box.
+    """
+    grid = _labels(labels)
+    check_whole("box", box, 2)
+    if min(grid.shape) < box:
+        raise ParameterError(f"a grid of {grid.shape} cells has no box of {box}; take a finer grid or a smaller box")
+    cut = grid[tuple(slice(0, n - n % box) for n in grid.shape)]
+    boxes = _boxes(cut, box)
+    boxes = boxes[(boxes != UNDECIDED).all(axis=1)]
+    entropy, mixed = np.zeros(len(boxes)), np.zeros(len(boxes), dtype=int)
+    for label in np.unique(boxes):
+        share = (boxes == label).mean(axis=1)
+        entropy -= share * np.log(np.where(share > 0.0, share, 1.0))
+        mixed += share > 0.0
+    edge = mixed > 1
+    mean = float(entropy.mean()) if len(boxes) else math.nan
+    return BasinEntropy(mean, float(entropy[edge].mean()) if edge.any() else math.nan, len(boxes), int(edge.sum()), int(box))
+
+
+def _boxes(grid: np.ndarray, box: int) -> np.ndarray:
+    """The cells of each box in a row."""
+    if grid.ndim == 1:
+        return grid.reshape(-1, box)
+    rows, columns = grid.shape[0] // box, grid.shape[1] // box
+    return grid.reshape(rows, box, columns, box).swapaxes(1, 2).reshape(-1, box * box)
+
+
+@dataclass(frozen=True, eq=False)
+class UncertaintyExponent:
+    """f(eps) ~ eps^alpha, the share of states with a different end within eps (Grebogi et al., Phys. Lett. A 99 (1983) 415)."""
+
+    alpha: float  # 1 for a smooth boundary, towards 0 the more fractal it is; nan without a boundary
+    error: float  # standard error of the fit
+    distances: np.ndarray  # eps in cells
+    shares: np.ndarray  # f
+    cells: int  # dimensions of the grid
+
+    @property
+    def dimension(self) -> float:
+        """Of the boundary: D - alpha."""
+        return self.cells - self.alpha
+
+
+def uncertainty_exponent(labels: Any, distances: Iterable[int] | None = None) -> UncertaintyExponent:
+    """The uncertainty exponent of a grid of labels, in one or two dimensions.
+
+    A cell is uncertain at eps if a cell with another label lies within eps cells of it, along each axis (undecided cells are not
+    counted, and make none uncertain). Cells nearer to the edge than the largest eps are not counted. The slope of ln f over
+    ln eps is fitted, with its standard error, over distances (1, 2, 3, 4, 6, 8, ... up to 1/16 of the grid) at which f is below
+    0.5, unless fewer than three are.
+
+    Raises:
+        ParameterError: a grid too small for three distances; distances that are not whole.
+    """
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    grid = _labels(labels)
+    reach = _distances(grid, distances)
+    inner = tuple(slice(int(reach[-1]), n - int(reach[-1])) for n in grid.shape)
+    known = grid != UNDECIDED
+    high, low = np.where(known, grid, grid.min()), np.where(known, grid, grid.max() + 1)
+    high = np.where(known, high, UNDECIDED)
+    shares = np.array(
+        [
+            ((maximum_filter(high, 2 * int(k) + 1) > minimum_filter(low, 2 * int(k) + 1)) & known)[inner].sum()
+            / max(int(known[inner].sum()), 1)
+            for k in reach
+        ]
+    )
+    alpha, error = _slope(reach, shares)
+    return UncertaintyExponent(alpha, error, reach, shares, grid.ndim)
+
+
+def _distances(grid: np.ndarray, given: Iterable[int] | None) -> np.ndarray:
+    largest = min(grid.shape) // 16
+    steps = [k for p in range(20) for k in (2**p, 3 * 2 ** (p - 1)) if k == int(k) and k <= largest]
+    reach = np.unique(np.array(steps if given is None else list(given), dtype=float))
+    if len(reach) < 3 or not np.equal(reach, np.round(reach)).all() or reach[0] < 1 or 4 * reach[-1] > min(grid.shape):
+        raise ParameterError(
+            f"the exponent needs at least three distances, whole numbers of cells up to a quarter of the grid {grid.shape}; "
+            f"got {reach.tolist()}: take a finer grid, 64 cells a side or more"
+        )
+    return reach.astype(int)
+
+
+def _slope(reach: np.ndarray, shares: np.ndarray) -> tuple[float, float]:
+    """The slope of ln f over ln eps and its standard error."""
+    used = (shares > 0.0) & (shares < MOST_CELLS)
+    if used.sum() < 3:
+        used = shares > 0.0
+    if used.sum() < 3:
+        return math.nan, math.nan
+    x, y = np.log(reach[used]), np.log(shares[used])
+    x = x - x.mean()
+    slope = float(x @ y / (x @ x))
+    residual = y - y.mean() - slope * x
+    return slope, float(np.sqrt(residual @ residual / (len(x) - 2) / (x @ x)))
+
+
+@dataclass(frozen=True, eq=False)
+class Wada:
+    """How near to the boundary all basins are (after Daza et al., Sci. Rep. 5 (2015) 16579)."""
+
+    labels: tuple[int, ...]
+    radii: np.ndarray  # in cells
+    shares: np.ndarray  # of the boundary cells: those with all labels within so many cells of them
+    boundary_cells: int
+
+    @property
+    def verdict(self) -> str:
+        """ "wada", "not wada" or "undecided", by the share at the largest radius; of fewer than three basins "not wada"."""
+        share = self.shares[-1] if len(self.shares) else 0.0
+        if len(self.labels) < 3 or share <= FAILS:
+            return "not wada"
+        return "wada" if share >= AGREES else "undecided"
+
+    @property
+    def resolution(self) -> str:
+        """What the test can see."""
+        return (
+            f"a boundary cell meets all {len(self.labels)} basins if each has a cell within {int(self.radii[-1])} cells of it: "
+            "basins that part there on a finer scale are not told from Wada ones, and threads finer than a cell are not seen"
+        )
+
+
+def wada(labels: Any, radius: int = RADIUS) -> Wada:
+    """Whether every point of the boundary of one basin is one of all basins, as far as a grid of labels shows it.
+
+    Boundary cells have a neighbour, along an axis or diagonally, with another label. Around each a neighbourhood grows, up to
+    `radius` cells, until it meets all labels. In a Wada picture nearly all do; where basins meet in threes only at single points,
+    nearly none. Undecided cells (-1) are no label.
+
+    Raises:
+        ParameterError: labels that are no grid, a radius below 1.
+    """
+    from scipy.ndimage import distance_transform_cdt, maximum_filter, minimum_filter
+
+    grid = _labels(labels)
+    check_whole("radius", radius, 1)
+    known = [int(label) for label in np.unique(grid) if label != UNDECIDED]
+    radii = np.arange(1, int(radius) + 1)
+    if len(known) < 2:
+        return Wada(tuple(known), radii, np.zeros(len(radii)), 0)
+    low = np.where(grid == UNDECIDED, grid.max() + 1, grid)
+    boundary = (maximum_filter(grid, 3) > minimum_filter(low, 3)) & (grid != UNDECIDED)
+    farthest = np.max([distance_transform_cdt(grid != label, "chessboard")[boundary] for label in known], axis=0)
+    shares = np.array([(farthest <= r).mean() for r in radii])
+    return Wada(tuple(known), radii, shares, int(boundary.sum()))
+
+
+def _labels(labels: Any) -> np.ndarray:
+    """Whole numbers over one or two dimensions; a DataArray's values."""
+    try:
+        array = np.asarray(labels)
+        grid = array.astype(int)
+    except (TypeError, ValueError):
+        array, grid = np.empty((0, 0)), np.empty((0, 0), dtype=int)
+    if grid.ndim not in (1, 2) or not grid.size or not np.array_equal(array, grid):
+        raise ParameterError(f"labels must be whole numbers over one or two dimensions, got an array of shape {np.shape(labels)}")
+    return grid

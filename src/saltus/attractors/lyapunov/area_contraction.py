@@ -1,0 +1,86 @@
+"""How fast a motion contracts areas of states, from its impacts and the time spent on each side: the law of the determinant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from saltus.bounds import Interval, Leaves, enclose, reads
+from saltus.flow import EventKind, Motion
+from saltus.systems import System
+from saltus.taylor import Expr, differentiate, substitute, trace
+
+VELOCITY = Expr("velocity", (), 0)
+
+
+class Contraction:
+    """ln det of the flow's derivative along a motion of a system with one coordinate.
+
+    ln det Phi = sum over impacts of ln(R_v v+ / v-) + sum over sides s of (da/dv)_s T_s, where R(v-) is the law of impact and T_s
+    the time on the side; for the metainterface (da/dv)_s = -C c^P / (1 + m)^P, and R_v v+ / v- = e^2 (numerics.md, section 5).
+    Nothing of it is taken from the derivatives that are carried along the motion.
+    """
+
+    def __init__(self, system: System) -> None:
+        traced = trace(system)
+        self._leaves = Leaves([Interval(value) for value in system.parameters.values()], [])
+        sides = system.model.sides or (1,)
+        damping = {s: substitute(differentiate(traced.acceleration[0], VELOCITY), {Expr("side"): float(s)}) for s in sides}
+        after = traced.velocity_after
+        self._slopes = {}
+        if after is not None:
+            self._slopes = {s: differentiate(substitute(after, {Expr("side"): float(s)}), VELOCITY) for s in sides}
+        known = not any(reads(d, "time", "coordinate", "velocity", "record") for d in damping.values())
+        known &= not any(reads(slope, "record") for slope in self._slopes.values())
+        self.known = known and len(system.model.coordinates) == 1  # whether da/dv is constant on each side
+        linear = {s: d for s, d in self._slopes.items() if not reads(d, "time", "velocity", "record")}
+        self._factors = {s: _middle(enclose([d], self._leaves)[0]) for s, d in linear.items()}
+        self._rates = {s: _middle(enclose([d], self._leaves)[0]) for s, d in damping.items()} if self.known else {}
+
+    def along(self, motion: Motion) -> float:
+        """ln det from the start of a motion to its end; -inf if it rests between them, NaN where the law is not so simple."""
+        if not self.known:
+            return float("nan")
+        if len(motion.events.of(EventKind.REST)):
+            return float("-inf")
+        crossings = motion.crossings
+        bounds = np.concatenate([[motion.start], crossings.time, [motion.time]])
+        sides = np.append(crossings.side, motion.side)
+        total = sum(rate * np.diff(bounds)[sides == side].sum() for side, rate in self._rates.items())
+        for side in set(crossings.side.tolist()):
+            here = crossings.side == side
+            before, after = crossings.velocity_before[here], crossings.velocity_after[here]
+            with np.errstate(divide="ignore"):
+                total += np.log(np.abs(self._slope(int(side), crossings.time[here], before) * after / before)).sum()
+        return float(total)
+
+    def _slope(self, side: int, time: np.ndarray, before: np.ndarray) -> Any:
+        """R_v at impacts with these velocities."""
+        if side in self._factors:
+            return self._factors[side]
+        (slope,) = enclose([self._slopes[side]], Leaves(self._leaves.parameters, [], Interval(time), speed=Interval(before)))
+        return _middle(slope)
+
+
+def impact_factor(system: System, parameters: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The product over the sides of abs(dv+/dv-) of impacts without speed, for arrays of parameters: below 1 rest is reached.
+
+    () or the shape of the arrays; NaN where the law has no slope there.
+    """
+    traced = trace(system)
+    if traced.velocity_after is None:
+        return np.ones(())
+    values = [Interval(np.asarray(parameters.get(path, value), dtype=float)) for path, value in system.parameters.items()]
+    product = np.ones(())
+    for side in system.model.sides:
+        slope = differentiate(substitute(traced.velocity_after, {Expr("side"): float(side)}), VELOCITY)
+        product = product * np.abs(_middle(enclose([slope], Leaves(values, []))[0]))
+    return product
+
+
+def _middle(bounds: Interval) -> np.ndarray:
+    """What an expression of numbers without width is: its bounds differ by rounding."""
+    middle: np.ndarray = 0.5 * (bounds.lo + bounds.hi)
+    return middle

@@ -1,0 +1,119 @@
+"""Equilibria of the phase plane under a constant load, of any model of one coordinate, with their eigenvalues.
+
+At an equilibrium (q*, 0) on a side the flow is q'' = a_q (q - q*) + a_v q', with the eigenvalues lambda^2 - a_v lambda - a_q = 0:
+a saddle where a_q > 0. At the contact the system rests while the accelerations of all its sides push it into the contact.
+"""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.attractors.manifolds.saddle_manifolds import check_window
+from saltus.attractors.recurrence import clocked
+from saltus.errors import ParameterError
+from saltus.systems import Constant, System
+
+GRID = 2001  # points of the window between which equilibria are looked for
+SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # of a derivative by central differences
+DIFFERENCE = 1e-3
+NEUTRAL = 1e-9  # a real part up to this, which differences leave where nothing is lost, is 0
+INSIDE = 1e-6  # from the contact, where the pull at the contact itself is 0
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """An equilibrium under a constant load."""
+
+    place: float  # the coordinate
+    side: int  # 0 at the contact
+    eigenvalues: tuple[complex, complex] | None  # the one with the larger real part first; None at the contact
+    stable: bool  # no disturbance grows; it need not decay
+
+    @property
+    def saddle(self) -> bool:
+        """Whether one disturbance grows and another one decays."""
+        return self.eigenvalues is not None and self.eigenvalues[0].real > 0.0 > self.eigenvalues[1].real
+
+
+def equilibria(system: System, window: Any = ((-3.0, 3.0), (-3.0, 3.0))) -> tuple[Equilibrium, ...]:
+    """The equilibria in a window of the phase plane, by their coordinate, the contact among them where it is one.
+
+    They are the zeros of the acceleration at rest between 2001 points of the window: two that are nearer to one another than a
+    thousandth of it, as beside a fold, may be missed.
+
+    Raises:
+        ParameterError: a load that is not constant, several coordinates, a window without meaning.
+    """
+    frame = check_window(window, 0.1)
+    check_constant(system)
+    model, low, high = system.model, float(frame.centre[0] - frame.half[0]), float(frame.centre[0] + frame.half[0])
+    found = []
+    for side in model.sides or (1,):
+        grid = np.linspace(low, high, GRID)
+        if model.sides:
+            grid = np.sort(np.append(grid[np.asarray(model.gap(grid, side)) > 0.0], _beside(system, side)))
+        pull = _pull(system, side)
+        for place in _zeros(pull, grid[(grid >= low) & (grid <= high)]):
+            values = _eigenvalues(system, place, side)
+            found.append(Equilibrium(place, side, values, values[0].real <= NEUTRAL))
+    if model.sides and low <= float(model.contact) <= high:
+        found += _at_contact(system)
+    return tuple(sorted(found, key=lambda one: one.place))
+
+
+def check_constant(system: System) -> None:
+    """Refuse what has no phase plane."""
+    clocked(system)
+    for name, signal in system.load.channels.items():
+        if not isinstance(signal, Constant):
+            raise ParameterError(
+                f"load.{name} varies, so there is no phase plane; `basins` and `stable_manifold` are for loads that repeat"
+            )
+
+
+def _pull(system: System, side: int) -> Callable[[float], float]:
+    """The acceleration at rest on a side, by the coordinate."""
+    return lambda place: float(system.model.acceleration(0.0, place, 0.0, float(side), system.load))
+
+
+def _beside(system: System, side: int) -> float:
+    """A coordinate just inside a side."""
+    contact = float(system.model.contact)
+    return contact + (INSIDE if float(system.model.gap(contact + INSIDE, side)) > 0.0 else -INSIDE)
+
+
+def _zeros(pull: Callable[[float], float], grid: np.ndarray) -> Iterator[float]:
+    """Where the pull is 0, at or between the points of a grid."""
+    from scipy.optimize import brentq
+
+    values = np.array([pull(place) for place in grid])
+    yield from (float(place) for place in grid[values == 0.0])
+    for i in np.flatnonzero(values[:-1] * values[1:] < 0.0):
+        yield float(brentq(pull, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-15))
+
+
+def _eigenvalues(system: System, place: float, side: int) -> tuple[complex, complex]:
+    def pull(q: float, v: float) -> float:
+        return float(system.model.acceleration(0.0, q, v, float(side), system.load))
+
+    h = DIFFERENCE
+    slope = sum(w * (pull(place + j * h, 0.0) - pull(place - j * h, 0.0)) for j, w in SIXTH_ORDER) / h
+    loss = sum(w * (pull(place, j * h) - pull(place, -j * h)) for j, w in SIXTH_ORDER) / h
+    root = cmath.sqrt(0.25 * loss * loss + slope)
+    return 0.5 * loss + root, 0.5 * loss - root
+
+
+def _at_contact(system: System) -> list[Equilibrium]:
+    """The contact, where all sides push towards it; or where two push away from it, so that neither wins."""
+    contact, outward = float(system.model.contact), []
+    for side in system.model.sides:
+        place = _beside(system, side)
+        pull = _pull(system, side)
+        outward.append((pull(contact) or pull(place)) * (place - contact) > 0.0)
+    none = any(outward) and (len(outward) == 1 or not all(outward))
+    return [] if none else [Equilibrium(contact, 0, None, not any(outward))]

@@ -1,0 +1,198 @@
+"""Stable and unstable manifolds of saddle orbits in the stroboscopic section: the curves that bound basins, computed.
+
+The stroboscopic map P takes a state at phase 0 to the one a forcing period later. A saddle orbit of q periods has q points x_i
+with P(x_i) = x_{i+1}, and P^q has there the multipliers mu_s, mu_u with abs(mu_s) < 1 < abs(mu_u) and their directions. The
+stable manifold of x_0 is the union of the images of its fundamental segment
+
+    x_0 + d rho^s v_s,    0 <= s <= 1,    rho = 1 / abs(mu_s),
+
+under P^{-q}, P^{-2q}, ..., d small and of both signs; the images under other powers of P^{-1} lie on those of the other points.
+P^{-1} is the flow of the reversed system over a period, event by event, as exact as the forward one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.attractors.manifolds.manifold_growth import Level, Window, grow
+from saltus.attractors.recurrence import ensemble
+from saltus.attractors.registry import strobes_from
+from saltus.checks import check_number
+from saltus.errors import MotionError, ParameterError
+from saltus.flow import sensitivities
+from saltus.orbits import PeriodicOrbit, check_whole
+from saltus.systems import System, reversed_system
+
+OFFSET = 1e-6  # d: the segment lies off the manifold by its square, which shrinks from there on
+TOLERANCE = 1e-13
+HYPERBOLIC = 1e-6  # by which multipliers must differ from 1 in modulus
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One branch of a manifold of one point of the orbit: from the orbit on, nan where it is outside the window."""
+
+    point: int  # of the orbit, which at phase 0 is at `strobes[point]`
+    side: int  # +1 or -1: along or against the direction
+    states: np.ndarray  # (n, 2): coordinate and velocity at phase 0
+    place: np.ndarray  # (n,): s + forcing periods / q, which the map shifts by 1 / q
+    ends: str  # why it does not go on
+
+
+@dataclass(frozen=True, eq=False)
+class Manifold:
+    """The stable or unstable manifold of a saddle orbit."""
+
+    orbit: PeriodicOrbit
+    stable: bool
+    multiplier: float  # mu_s or mu_u, of the orbit's whole period
+    strobes: np.ndarray  # (q, 2): the orbit at phase 0
+    directions: np.ndarray  # (q, 2): unit vectors along the manifold there
+    curves: tuple[Curve, ...]
+
+    @property
+    def states(self) -> np.ndarray:
+        """All curves in a row, (n, 2), with nan between them: as lines are drawn."""
+        gap = np.full((1, 2), np.nan)
+        return np.concatenate([part for curve in self.curves for part in (curve.states, gap)])
+
+    @property
+    def length(self) -> float:
+        """The length of what was computed, in the units of the section."""
+        chords = np.diff(self.states, axis=0)
+        return float(np.nansum(np.hypot(chords[:, 0], chords[:, 1])))
+
+    def __repr__(self) -> str:
+        kind = "stable" if self.stable else "unstable"
+        return f"Manifold({kind}, of {self.orbit!r}, multiplier {self.multiplier:.6g}, length {self.length:.4g})"
+
+
+def stable_manifold(
+    orbit: PeriodicOrbit,
+    *,
+    window: tuple[tuple[float, float], tuple[float, float]] = ((-3.0, 3.0), (-3.0, 3.0)),
+    periods: int = 40,
+    step: float = 0.01,
+    points: int = 100_000,
+) -> Manifold:
+    """The states that the flow takes to a saddle orbit, as curves in the section at phase 0: where basins meet.
+
+    Args:
+        orbit: with one multiplier inside the unit circle and one outside.
+        window: of the coordinate and of the velocity, in which the curves are wanted; they are followed outside it up to three
+            half widths from its middle.
+        periods: for how many forcing periods back.
+        step: the longest distance between neighbours in the window, in its half widths; they are closer in bends.
+        points: the most for each of the two sides.
+
+    Raises:
+        ParameterError: an orbit that is no saddle, or whose system cannot be run backward (v+ = e v- with e > 0 can).
+        MotionError: the orbit is at the contact at phase 0, where the map has no derivative.
+    """
+    return _manifold(orbit, True, window, periods, step, points)
+
+
+def unstable_manifold(
+    orbit: PeriodicOrbit,
+    *,
+    window: tuple[tuple[float, float], tuple[float, float]] = ((-3.0, 3.0), (-3.0, 3.0)),
+    periods: int = 40,
+    step: float = 0.01,
+    points: int = 100_000,
+) -> Manifold:
+    """The states that the flow takes away from a saddle orbit: as `stable_manifold`, forward in time."""
+    return _manifold(orbit, False, window, periods, step, points)
+
+
+def _manifold(orbit: PeriodicOrbit, stable: bool, window: Any, periods: int, step: float, points: int) -> Manifold:
+    if not isinstance(orbit, PeriodicOrbit):
+        raise ParameterError(f"a manifold belongs to a periodic orbit, got {orbit!r}; find_orbit and search_orbits return them")
+    check_whole("periods", periods, 1)
+    check_whole("points", points, 100)
+    check_number("step", step, above=0.0, at_most=1.0)
+    size = np.sort(np.abs(orbit.multipliers))
+    if len(size) != 2 or not (0.0 < size[0] < 1.0 - HYPERBOLIC and size[1] > 1.0 + HYPERBOLIC):
+        raise ParameterError(f"only a saddle has such manifolds, and the multipliers of this orbit are {orbit.multipliers}")
+    frame = check_window(window, step)
+    system = orbit.system
+    moving = reversed_system(system) if stable else system
+    q = orbit.periods
+    strobes = np.roll(strobes_from(system, np.array([orbit.state]), q)[0], 1, axis=0)
+    multiplier, directions = _directions(system, strobes, stable)
+    ratio = 1.0 / abs(multiplier) if stable else abs(multiplier)
+    curves: list[Curve] = []
+    for side in (1, -1):
+        levels, ends = grow(_segment(strobes[0], side * directions[0], ratio), _flow(moving, stable), periods, frame, points)
+        curves += _curves(levels, q, side, stable, multiplier < 0.0, ends)
+    return Manifold(orbit, stable, multiplier, strobes, directions, tuple(curves))
+
+
+def check_window(window: Any, step: float) -> Window:
+    """A window as two pairs of bounds."""
+    try:
+        bounds = np.asarray(window, dtype=float)
+    except (TypeError, ValueError):
+        bounds = np.empty(0)
+    if bounds.shape != (2, 2) or not np.isfinite(bounds).all() or not (bounds[:, 0] < bounds[:, 1]).all():
+        raise ParameterError(f"window must be ((least, largest coordinate), (least, largest velocity)), got {window!r}")
+    return Window(bounds.mean(axis=1), 0.5 * np.diff(bounds, axis=1)[:, 0], step)
+
+
+def _directions(system: System, strobes: np.ndarray, stable: bool) -> tuple[float, np.ndarray]:
+    """The multiplier and the unit vector along the manifold at each point of the orbit, carried on by the map's derivative."""
+    name = system.model.coordinates[0]
+    maps = []
+    for theta, velocity in strobes:
+        start: dict[str, Any] = {name: float(theta), "velocity": float(velocity)}
+        found = sensitivities(system, **start, periods=1, tol=TOLERANCE, dense=False)
+        if found.undefined:
+            raise MotionError(f"the orbit's map has no derivative at phase 0: {found.undefined}")
+        maps.append(found.state)
+    whole = np.linalg.multi_dot([*reversed(maps)]) if len(maps) > 1 else maps[0]
+    values, vectors = np.linalg.eig(whole)
+    chosen = int(np.argmin(np.abs(values)) if stable else np.argmax(np.abs(values)))
+    directions = [np.real(vectors[:, chosen])]
+    for step in maps[:-1]:
+        directions.append(step @ directions[-1])
+    unit = np.array([v / np.hypot(*v) for v in directions])
+    return float(np.real(values[chosen])), unit
+
+
+def _segment(point: np.ndarray, direction: np.ndarray, ratio: float) -> Any:
+    return lambda places: point + OFFSET * ratio ** np.asarray(places)[:, None] * direction
+
+
+def _flow(system: System, backward: bool) -> Any:
+    """The stroboscopic map, or its inverse by the reversed system, whose velocities have the other sign."""
+    name, sign = system.model.coordinates[0], -1.0 if backward else 1.0
+
+    def flow(points: np.ndarray, periods: int) -> np.ndarray:
+        result = ensemble(system, points * np.array([1.0, sign]), periods=periods, sample=(), tol=TOLERANCE)
+        ends = np.stack([result[name].values, sign * result["velocity"].values], axis=1)
+        ends[result["periods"].values < periods] = np.nan
+        return ends
+
+    return flow
+
+
+def _curves(levels: list[Level], q: int, side: int, stable: bool, turns: bool, ends: str) -> list[Curve]:
+    """The levels that belong to each point of the orbit, put together from the orbit on.
+
+    Where mu < 0 a round of the orbit, from point 0 to point 0, turns the side.
+    """
+    curves = []
+    for first in range(min(q, len(levels))):
+        own = levels[first::q]
+        point = (-first if stable else first) % q
+        parts: dict[int, list[Level]] = {}
+        for level in own:
+            rounds = -(-level.periods // q) if stable else level.periods // q
+            parts.setdefault(side * (-1) ** rounds if turns else side, []).append(level)
+        for sign, chosen in parts.items():
+            states = np.concatenate([level.points for level in chosen])
+            place = np.concatenate([level.places + level.periods / q for level in chosen])
+            curves.append(Curve(point, sign, states, place, ends))
+    return curves

@@ -1,0 +1,94 @@
+"""Certifying that a motion which repeats itself is on an attracting orbit: the orbit's own equations, and a look from outside."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import MotionError
+from saltus.flow import simulate_many
+from saltus.orbits import PeriodicOrbit, Problem, Signature, orbit_from
+from saltus.systems import System
+
+RESIDUAL = 1e-9  # of the orbit's equations
+DEFECT = 1e-6  # of its repetition in direct simulation, and of the motion's states from its own
+NEUTRAL = 1e-9  # a multiplier this near to 1 does not show that an orbit attracts
+SLOW = 1e-3  # a motion that approaches slowly may still be as far away
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What was found of the orbit under a motion."""
+
+    orbit: PeriodicOrbit | None
+    distance: float  # between the motion's state and the nearest of the orbit's, at phase 0
+    within: float  # the distance that was asked for
+
+    @property
+    def doubt(self) -> str | None:
+        """Why the orbit does not explain the motion; None if it does."""
+        orbit = self.orbit
+        if orbit is None:
+            return "Newton's method finds no orbit there"
+        if not orbit.admissible or not orbit.residual < RESIDUAL:
+            return f"no admissible orbit solves the equations there (residual {orbit.residual:.1g})"
+        if orbit.grazes:
+            return "the orbit there touches the contact without speed, and has no multipliers"
+        if not orbit.stable or abs(orbit.multipliers[0]) > 1.0 - NEUTRAL:
+            return f"the orbit there does not attract: its largest multiplier is {abs(orbit.multipliers[0]):.9g}"
+        if not orbit.defect < DEFECT:
+            return f"in direct simulation the orbit there misses itself by {orbit.defect:.1g}"
+        if not self.distance < self.within:
+            return f"the orbit found passes {self.distance:.1g} beside the motion"
+        return None
+
+    @property
+    def sound(self) -> bool:
+        """Whether the motion is on an attracting orbit."""
+        return self.doubt is None
+
+    @property
+    def evidence(self) -> dict[str, Any]:
+        """The numbers, by name."""
+        if self.orbit is None:
+            return {}
+        multiplier = float(abs(self.orbit.multipliers[0]))
+        return {
+            "residual": self.orbit.residual,
+            "largest_multiplier": multiplier,
+            "largest_exponent": math.log(multiplier) / self.orbit.duration if multiplier > 0.0 else -math.inf,
+            "defect": self.orbit.defect,
+            "distance": self.distance,
+            "amplitude": self.orbit.amplitude,
+            "impacts": self.orbit.signature.crossings,
+        }
+
+
+def certify(system: System, state: np.ndarray, period: int | None, longest: int = 16) -> Certificate:
+    """The orbit under a motion with this state (coordinate, velocity) at phase 0, which repeats itself after `period` periods.
+
+    Without a period the one of its nearest return within `longest` is tried, and a motion on its way there may be farther off.
+    """
+    name = system.model.coordinates[0]
+    begin = {name: float(state[0]), "velocity": float(state[1])}
+    strobes = np.concatenate([[state], _strobes(system, begin, period or longest)])
+    q = period or 1 + int(np.argmin(np.abs(strobes[1:] - strobes[0]).max(axis=1)))
+    try:
+        orbit = orbit_from(Problem(system, Signature((), 1)), begin, q)
+    except MotionError:
+        orbit = None
+    within = DEFECT if period else SLOW
+    if orbit is None:
+        return Certificate(None, np.inf, within)
+    apart = np.abs(strobes[:q] - np.array(orbit.state)).max(axis=1)
+    return Certificate(orbit, float(apart.min()), within)
+
+
+def _strobes(system: System, begin: dict[str, float], count: int) -> np.ndarray:
+    """The next states at phase 0, (count, 2)."""
+    result = simulate_many(system, **begin, periods=count, sample=("state",), last="all")  # type: ignore[arg-type]
+    name = system.model.coordinates[0]
+    return np.stack([result[f"sampled_{name}"].values, result["sampled_velocity"].values], axis=-1).reshape(count, 2)

@@ -1,0 +1,89 @@
+"""Classification: where one motion ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from saltus.attractors.lyapunov.averages import BATCHES
+from saltus.attractors.recurrence import clocked, settle
+from saltus.attractors.verdict.nonsettling import STAGES, STROBES, wandering
+from saltus.attractors.verdict.verdict import DRIVEN_LONGEST, Case, Verdict, settled
+from saltus.checks import check_number
+from saltus.errors import ParameterError
+from saltus.systems import System
+
+
+def classify(
+    system: System,
+    *,
+    velocity: float = 0.0,
+    periods: int = 4000,
+    transient: int = 500,
+    longest: int = DRIVEN_LONGEST,
+    seed: int = 0,
+    tol: float = 1e-12,
+    progress: Callable[[float], object] | None = None,
+    **coordinates: float,
+) -> Verdict:
+    """Where a motion ends: at rest, on a periodic orbit, on a torus, in chaos, or undecided, each with its evidence.
+
+    * `rest`: proved to stay at the contact for all later loads (`capture_speed`), or at rest there where the load never pulls.
+    * `periodic`: it repeats itself, and the orbit solves its own equations, has all multipliers inside the unit circle, repeats
+      in direct simulation, and is met by the motion. Under constant loads an equilibrium is such an orbit, of period 1.
+    * `chaotic`: not settled after transient + periods; then a largest Lyapunov exponent above 0 by more than its error and the
+      growth of regular motions, in both halves of a run and of one twice as long that goes on from it; and none of 128 motions
+      from states beside the last one settles within `periods`, or 2000 forcing periods if that is more. Chaotic transients,
+      which end at random, are told by that with a probability of 95 % while they last less than 43 times as long in the mean.
+      The 0-1 test is recorded beside it, and must not contradict.
+    * `quasi-periodic`: only where `excludes_tori` knows no reason against it: exponents of 0 within their error and resolution,
+      and a 0-1 test that sees order.
+    * `undecided`: everything else, with the reason.
+
+    Args:
+        system: a model with one coordinate, under constant or harmonic loads.
+        velocity, coordinates: the state at the start, at phase 0.
+        periods: how long it may take, in forcing periods: so many for settling, so many for the exponents; at least 96.
+        transient: how many to let pass first.
+        longest: the longest period looked for, at least 16.
+        seed: of the companions' states and the frequencies of the 0-1 test.
+        tol: the error that one step may make.
+        progress: called with the fraction done.
+
+    Raises:
+        ParameterError: an argument without meaning.
+    """
+    clock, start = clocked(system), _start(system, velocity, coordinates)
+    for name, value, least in (
+        ("periods", periods, STAGES * 2 * BATCHES),
+        ("transient", transient, 0),
+        ("longest", longest, DRIVEN_LONGEST),
+    ):
+        check_number(name, value, at_least=least)
+        if value != int(value):
+            raise ParameterError(f"{name} must be a whole number, got {value!r}")
+    case = Case(system, clock, int(periods), int(longest), int(seed), float(tol), progress or (lambda done: None))
+    ends = settle(
+        clock, start, int(transient + periods), kept=max(STROBES, 4 * int(longest)), tol=tol, progress=case.part(0.0, 0.1)
+    )
+    verdict = settled(case, ends, start[0]) or wandering(case, ends)
+    case.progress(1.0)
+    return verdict
+
+
+def _start(system: System, velocity: Any, coordinates: dict[str, float]) -> np.ndarray:
+    """The state at the start as a row.
+
+    Raises:
+        ParameterError: names or values that are none.
+    """
+    name = system.model.coordinates[0]
+    if set(coordinates) != {name}:
+        raise ParameterError(
+            f"the state at the start is {name}=... and velocity=..., got {', '.join(coordinates) or 'no coordinate'}"
+        )
+    check_number(name, coordinates[name])
+    check_number("velocity", velocity)
+    return np.array([[coordinates[name], velocity]], dtype=float)

@@ -1,0 +1,81 @@
+"""The 0-1 test for chaos, a second opinion that knows nothing of derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import check_number
+from saltus.errors import ParameterError
+
+SHORTEST = 100  # entries: lags reach a tenth of them
+STILL = 1e-9  # relative: a series that varies less does not vary
+
+
+@dataclass(frozen=True, slots=True)
+class ZeroOne:
+    """The outcome: near 0 for regular motion, near 1 for chaos."""
+
+    K: float  # the median over the frequencies
+    spread: float  # half the distance between their quartiles
+    samples: int
+
+
+def zero_one_test(series: Any, *, seed: int = 0, count: int = 100) -> ZeroOne:
+    """The 0-1 test of Gottwald and Melbourne (SIAM J. Appl. Dyn. Syst. 8 (2009) 129), by the correlation method.
+
+    At random frequencies c in (pi/5, 4 pi/5) the series phi drives p + i q = sum of phi_j exp(i j c), which wanders like a
+    Brownian path in chaos and stays bounded in regular motion. Its mean square displacement M(n) over lags n up to a tenth of the
+    series, less the term E[phi]^2 (1 - cos n c) / (1 - cos c) that oscillates with n, is compared with n: K is their
+    correlation, and the median over the frequencies is taken.
+
+    The series must be sampled coarsely, as once a forcing period: of a finely sampled one the test says 0 whatever it is. Weak
+    chaos takes long series, and a fine structure of many tori short of the noise is not resolved.
+
+    Args:
+        series: (samples,) numbers, at least 100.
+        seed: of the frequencies.
+        count: how many of them.
+
+    Raises:
+        ParameterError: a series of other shape, too short, or not finite; a count below 1.
+    """
+    try:
+        values = np.asarray(series, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError("the 0-1 test takes a series of numbers, one a forcing period") from None
+    if values.ndim != 1 or values.size < SHORTEST or not np.isfinite(values).all():
+        raise ParameterError(f"the 0-1 test takes at least {SHORTEST} finite numbers in one row, got shape {values.shape}")
+    check_number("count", count, at_least=1)
+    if np.ptp(values) <= STILL * max(1.0, float(np.abs(values).max())):
+        return ZeroOne(0.0, 0.0, values.size)
+    lags = np.arange(1, values.size // 10 + 1)
+    c = np.random.default_rng(seed).uniform(np.pi / 5, 4 * np.pi / 5, (int(count), 1))
+    bounded = values.mean() ** 2 * (1 - np.cos(lags * c)) / (1 - np.cos(c))
+    found = [_correlation(lags, row) for row in _displacement(values, c, lags.size) - bounded]
+    low, middle, high = np.quantile(found, [0.25, 0.5, 0.75])
+    return ZeroOne(float(middle), float(high - low) / 2, values.size)
+
+
+def _displacement(values: np.ndarray, c: np.ndarray, longest: int) -> np.ndarray:
+    """M(n) for n = 1, ..., longest: the mean of abs(z_{j+n} - z_j)^2 over all j with j + longest <= samples, (frequencies, lags).
+
+    The squares are summed by cumulative sums, the products by Fourier transforms.
+    """
+    path = np.cumsum(values * np.exp(1j * c * np.arange(1, values.size + 1)), axis=1)
+    base = values.size - longest
+    size = 1 << (values.size + base - 1).bit_length()
+    spectrum = np.fft.fft(path, size) * np.conj(np.fft.fft(path[:, :base], size))
+    products = np.fft.ifft(spectrum)[:, 1 : longest + 1].real
+    squares = np.cumsum(np.pad(np.abs(path) ** 2, ((0, 0), (1, 0))), axis=1)
+    later = squares[:, base + 1 : base + longest + 1] - squares[:, 1 : longest + 1]
+    result: np.ndarray = (later + squares[:, base : base + 1] - 2.0 * products) / base
+    return result
+
+
+def _correlation(lags: np.ndarray, displacement: np.ndarray) -> float:
+    if np.ptp(displacement) == 0.0:
+        return 0.0
+    return float(np.corrcoef(lags, displacement)[0, 1])

@@ -1,0 +1,251 @@
+"""Capture at rest, proved: from which speed after an impact a motion never leaves the contact again and comes to rest there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from saltus.bounds.adiabatic_invariant import budget, first_guess, largest_start, normal_form
+from saltus.bounds.energy_barrier import WIDEST, climb
+from saltus.bounds.gap_equation import SPEED, Leaves, Opening, reads
+from saltus.bounds.intervals import SLACK, Interval, enclose
+from saltus.errors import ParameterError
+from saltus.flow import broadcast, check_parameters, numeric, parameter_table
+from saltus.systems import System
+from saltus.taylor import Expr, Trace, differentiate, number, record_table, substitute, trace
+
+CELLS = 16  # of the forcing period
+BATCH, CELL_BATCH = 8192, 512  # parameter sets at once, without and with cells: their arrays then stay in the cache
+ONE = 1e-14  # a product of impact factors this close to 1 is 1: no law states its numbers more exactly
+BOXES = (0.7, 0.2)  # of the bounds of the corrected invariant: shares of the speed that those at the contact suggest
+
+
+def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -> Any:
+    """The speed of the gap just after an impact below which a motion is provably captured at the contact.
+
+    From any impact, at any time and to any side, that leaves abs(gap_rate * velocity) below the returned speed, the motion
+    stays near the contact under all later loads and its speed falls to zero: in finite time where impacts lose speed, else as
+    damping has it. No later release is possible: the contact accelerations press on every side at all times. 0 where nothing
+    is proved, as where the load can lift the system off, where neither impacts nor damping take energy, or where the law of
+    impact has no bounded slope at rest (`EnergyRestitution`). Margins of the model that a motion is asked to stop at are not
+    looked at.
+
+    On side s the gap obeys w'' = A(t, w, u), u = w'. With f the factor of the gap's speed at impact, and the gap of one side in
+    units that make the factors of both sides equal, the larger of two speeds is returned.
+
+    *Energy.* Let A_u <= 0 and 0 < lo(w) <= -A(t, w, 0) <= hi(w) for all t. A flight that leaves with speed v turns before W,
+    where 2 int_0^W lo dw = v^2, and comes back with rho^2 v^2 <= 2 int_0^W hi dw. So it is captured if f rho < 1 up to v; and
+    where A does not depend on the time, rho <= 1, if the flights stay below the first W at which lo may be 0 (the barrier), and
+    f < 1, or f <= 1 and A_u < 0.
+
+    *Corrected adiabatic invariant.* Under periodic loads these bounds do not close for f near 1, as flights gain speed while
+    the pull grows and lose it after. There L = 3 ln v + ln sum 1/alpha + O(v) falls, see `adiabatic.py`; so that damping
+    captures at f = 1 too. Records of samples are not periodic: only the first bound is used with them.
+
+    All bounds are interval bounds over the whole forcing period, or the whole record, and over all openings and speeds in
+    question.
+
+    Args:
+        system: a model with a contact.
+        parameters: arrays or numbers by dotted path, which broadcast; all others are the system's.
+
+    Returns:
+        the speeds, an array of the shape to which the parameters broadcast; a DataArray where they are DataArrays.
+
+    Raises:
+        ParameterError: what is no system; a path that is not a number of it; values that are none or that it refuses; shapes
+            that do not fit.
+    """
+    if not isinstance(system, System):
+        raise ParameterError(f"capture_speed takes a System(model=..., load=..., impact=...), got {system!r}")
+    arrays = {path: numeric(path, given) for path, given in parameter_table(system, parameters).items()}
+    dims, shape, coords, columns = broadcast(arrays)
+    check_parameters(system, columns)
+    speeds = proved_speeds(system, columns).reshape(shape)
+    if all(not hasattr(a, "dims") or not a.ndim for a in arrays.values()):
+        return speeds
+    from xarray import DataArray
+
+    return DataArray(speeds, dims=dims, coords=coords, name="capture_speed")
+
+
+def proved_speeds(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
+    """`capture_speed` for flat columns of numbers that the system takes; (n,), or (1,) for numbers alone."""
+    traced = trace(system)
+    arrays = (given.get(path, np.asarray(value)) for path, value in system.parameters.items())
+    columns = np.broadcast_arrays(*map(np.atleast_1d, arrays))
+    result = np.zeros(columns[0].size)
+    if not traced.sides:
+        return result
+    records = _record_ranges(system, traced)
+    law = _Law(traced)
+    for start in range(0, result.size, BATCH):
+        part = slice(start, start + BATCH)
+        leaves = Leaves([Interval(c[None, part]) for c in columns], records)
+        result[part] = law.capture(leaves, result[part].size)
+    return result
+
+
+def _record_ranges(system: System, traced: Trace) -> list[Interval]:
+    """Bounds of every record (and derivative) that the trace reads, over all time; scales left out."""
+    breaks, table = record_table(system, traced.records)
+    if not breaks.size:
+        return []
+    length = np.concatenate([[0.0], np.diff(breaks), [0.0]])
+    span = Interval(np.zeros_like(length), length)
+    ranges = []
+    for row in table:
+        drifts = np.any(row[[0, -1], 1:] != 0.0)  # before and after the record, without end
+        value = reduce(lambda total, c: total * span + Interval(c), row.T[-2::-1], Interval(row.T[-1]))
+        ranges.append(Interval(-np.inf, np.inf) if drifts else value.over_cells())
+    return ranges
+
+
+@dataclass
+class _Impacts:
+    """What the impacts do in one cycle of sides: -ln of their factor, and the units of the gap that make the factors equal."""
+
+    loss: np.ndarray  # (1, n), at least 0; NaN where nothing is known
+    stretch: dict[int, np.ndarray]  # by side, (1, n)
+
+
+class _Law:
+    """The expressions of a system near its contact, and the bounds that follow from them for many parameter sets."""
+
+    def __init__(self, traced: Trace) -> None:
+        sides = (1, -1)[: traced.sides]
+        self.sides = {s: Opening(traced, s) for s in sides}
+        pairs = {s: _factor(traced, s) for s in sides}
+        self.cycles = _cycles({s: following for s, (following, _, _) in pairs.items()})
+        self.factors = {s: [factor, at_rest] for s, (_, factor, at_rest) in pairs.items()}
+        accelerations = [side.a for side in self.sides.values()]
+        self.recorded = any(reads(a, "record") for a in accelerations)
+        self.timed = any(reads(a, "time") for a in accelerations)
+        self.by_speed = any(reads(f, "velocity") for f, _ in self.factors.values())
+        self.frequency = next((i for i, path in enumerate(traced.parameters) if path == "load.frequency"), None)
+
+    def capture(self, leaves: Leaves, n: int) -> np.ndarray:
+        """The speeds below which capture is proved, (n,)."""
+        with np.errstate(all="ignore"):
+            always = replace(leaves, time=self._time(leaves, 1))
+            speed = self._proved(always, np.zeros((1, n)), np.full((1, n), WIDEST))
+            if self.by_speed:  # the factors of the slowest impacts, then those of all that are slower than what they give
+                speed = self._proved(always, speed, speed)
+        return speed[0]
+
+    def _time(self, leaves: Leaves, cells: int) -> Interval:
+        """The forcing period in cells, (cells, n); all time if there is none."""
+        if self.frequency is None:
+            return Interval(-1e300, 1e300)
+        edges = np.arange(cells + 1)[:, None] * (2 * np.pi / cells)
+        return Interval(edges[:-1], edges[1:] * (1 + SLACK)) / leaves.parameters[self.frequency]
+
+    def _proved(self, always: Leaves, reach: np.ndarray, limit: np.ndarray) -> np.ndarray:
+        """The speeds, with the factors of impacts up to the speed `reach`, where no speed passes `limit`."""
+        least = np.full_like(limit, np.inf)
+        for cycle in self.cycles:
+            impacts = self._impacts(cycle, always, reach)
+            narrow, wide = (reduce(f, impacts.stretch.values()) for f in (np.minimum, np.maximum))
+            speed, steady = self._energy(cycle, impacts, always, limit / wide)
+            chosen = np.flatnonzero((~steady | ~(speed > 0)) & (impacts.loss >= 0))
+            if not self.recorded and (self.frequency is not None or not self.timed):
+                for start in range(0, chosen.size, CELL_BATCH):
+                    part = chosen[start : start + CELL_BATCH]
+                    found = self._by_invariant(cycle, impacts, always, limit / wide, part)
+                    speed[:, part] = np.fmax(speed[:, part], found)
+            least = np.minimum(least, np.where(impacts.loss >= 0, speed * narrow, 0.0))
+        return np.where(np.isfinite(least), least, 0.0)
+
+    def _impacts(self, cycle: tuple[int, ...], always: Leaves, reach: np.ndarray) -> _Impacts:
+        around = replace(always, speed=Interval(np.zeros_like(reach), reach))
+        factors = []
+        for side in cycle:
+            factor, at_rest = enclose(self.factors[side], around)
+            sound = (factor.lo >= 0) & (at_rest.lo == 0) & (at_rest.hi == 0)
+            factors.append(np.where(sound, factor.hi, np.nan) + np.zeros_like(reach))
+        first, last = factors[0], factors[-1]
+        ratio = np.where((first > 0) & (last > 0), np.sqrt(first / last), 1.0)
+        e = np.maximum(first / ratio, last * ratio)
+        e = np.where(np.abs(e - 1) <= ONE, 1.0, e)
+        stretch = dict(zip(cycle, (np.ones_like(ratio), ratio), strict=False))
+        return _Impacts(np.where(e <= 1, np.minimum(-np.log(e) * (1 - SLACK), 10.0), np.nan), stretch)
+
+    def _energy(self, cycle: tuple[int, ...], impacts: _Impacts, always: Leaves, limit: Any) -> tuple[Any, Any]:
+        """The speed from the bounds of the energy, and whether the accelerations do not depend on the time; (1, n)."""
+        everywhere = replace(always, opening=Interval(0.0, WIDEST), speed=Interval(-WIDEST, WIDEST))
+        steady, alive = np.full(limit.shape, not self.recorded), impacts.loss >= 0
+        for side in cycle:
+            here = replace(always, stretch=Interval(impacts.stretch[side]))
+            change, pull = enclose([self.sides[side].a_t, self.sides[side].jets[0][0]], replace(everywhere, stretch=here.stretch))
+            steady &= (change.lo == 0) & (change.hi == 0)
+            alive &= pull.lo > 0
+        speed = np.where(alive & (steady | (impacts.loss > 0)), limit, 0.0)
+        chosen = np.flatnonzero(speed)
+        for side in cycle if chosen.size else ():
+            leaves = replace(always, stretch=Interval(impacts.stretch[side])).only(chosen)
+            top = self._by_energy(side, leaves, impacts.loss[:, chosen], steady[:, chosen], limit[:, chosen])
+            speed[:, chosen] = np.minimum(speed[:, chosen], top)
+        return speed * (1 - SLACK), steady
+
+    def _by_energy(self, side: int, leaves: Leaves, loss: Any, steady: Any, limit: Any) -> Any:
+        """The speed up to which flights on one side, with the impact after, lose energy."""
+        a, a_w, a_u = (getattr(self.sides[side], name) for name in ("a", "a_w", "a_u"))
+        allowed = np.where(steady, np.inf, np.exp(2 * loss) * (1 - SLACK))
+        pull, slope = (lambda w, e=e: -enclose([e], replace(leaves, opening=w))[0] for e in (a, a_w))
+        turning, lo, hi = climb(pull, slope, allowed)
+        top = np.sqrt(2 * hi)
+        (growth,) = enclose([a_u], replace(leaves, opening=Interval(0 * turning, turning), speed=Interval(-top, top)))
+        falls = (lo > 0) & ((growth.hi < 0) | ((growth.hi <= 0) & (loss > 0)))
+        gain = np.where(steady, 1.0, np.sqrt(hi / lo))
+        return np.where(falls, np.minimum(np.sqrt(2 * lo), limit / gain), 0.0)
+
+    def _by_invariant(self, cycle: tuple[int, ...], impacts: _Impacts, always: Leaves, limit: Any, chosen: Any) -> Any:
+        """The speed from the corrected adiabatic invariant, for the chosen parameter sets, (1, chosen.size)."""
+        result = np.zeros((1, chosen.size))
+        here = [replace(always, stretch=Interval(impacts.stretch[s])).only(chosen) for s in cycle]
+        pulls = [enclose([self.sides[s].jets[0][0]], self._in_cells(x))[0] for s, x in zip(cycle, here, strict=True)]
+        alive = np.flatnonzero(reduce(np.minimum, [(p.lo + result).min(axis=0) for p in pulls]) > 0)
+        here = [self._in_cells(x.only(alive)) for x in here]
+        bounds = [self.sides[s].bounds(x) for s, x in zip(cycle, here, strict=True)]
+        forms = [normal_form(side, None if len(cycle) == 1 else bounds[1 - i]) for i, side in enumerate(bounds)]
+        loss, period = impacts.loss[:, chosen[alive]], np.atleast_1d(here[0].time.hi)[-1:]
+        top = np.minimum(first_guess(forms, loss), limit[:, chosen[alive]])
+        for v in (fraction * top for fraction in BOXES):
+            boxes = [self.sides[s].boxed(x, f.pull, v) for s, x, f in zip(cycle, here, forms, strict=True)]
+            budgets = [budget(form, box, v) for form, box in zip(forms, boxes, strict=True)]
+            found = largest_start(budgets, loss, period, v)
+            result[:, alive] = np.where(result[:, alive] > 0, result[:, alive], found)
+            if (result[:, alive] > 0).all():
+                break
+        return result
+
+    def _in_cells(self, leaves: Leaves) -> Leaves:
+        return replace(leaves, time=self._time(leaves, CELLS if self.timed else 1))
+
+
+def _factor(traced: Trace, side: int) -> tuple[int, Expr, Expr]:
+    """The side after an impact on `side` (0 where it is no fixed one), the derivative of the gap's speed after it to that before
+    it, as a function of that, and the velocity after an impact without speed.
+    """
+    leaf = {Expr("side"): float(side)}
+    assert traced.gap_rate is not None
+    assert traced.next_side is not None
+    assert traced.velocity_after is not None
+    following = substitute(traced.next_side, leaf)
+    if following.op != "number" or following.value not in (1.0, -1.0)[: traced.sides]:
+        return 0, number(np.nan), number(np.nan)
+    rate, next_rate = (substitute(traced.gap_rate, {Expr("side"): s}) for s in (float(side), following.value))
+    after = substitute(traced.velocity_after, leaf)
+    change = substitute(differentiate(after, SPEED), {SPEED: -1.0 / rate * SPEED})
+    return int(following.value), -1.0 * (next_rate / rate) * change, substitute(after, {SPEED: 0.0})
+
+
+def _cycles(following: dict[int, int]) -> list[tuple[int, ...]]:
+    """The sides that a motion visits in turn, for every side at which it may begin; none where that is not known."""
+    if all(after == -side for side, after in following.items()):
+        return [tuple(following)]
+    return [(side,) for side in following] if all(after == side for side, after in following.items()) else []

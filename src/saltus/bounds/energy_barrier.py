@@ -1,0 +1,58 @@
+"""How far flights open under bounds of their pull: the energy that it takes, and the energy with which they come back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from saltus.bounds.intervals import SLACK, Interval
+
+WIDEST = 1e6  # openings up to this are looked at
+TRIES = 30
+STEPS = 20  # of the opening, each at most a third of it
+
+Bounds = Callable[[Interval], Interval]
+Work = tuple[Any, Any, Any]
+
+
+def climb(pull: Bounds, slope: Bounds, allowed: Any) -> Work:
+    """Open a gap from 0 while the pull is above 0 at all times, and the ratio of the two works below `allowed`.
+
+    Args:
+        pull: bounds of -A(t, w, 0) over all t for w in an interval, arrays (1, n).
+        slope: bounds of its derivative to w.
+        allowed: (1, n).
+
+    Returns:
+        how far it opens, W, and lower and upper bounds of the work, int_0^W min_t(-A) dw and int_0^W max_t(-A) dw; arrays
+        (1, n), 0 where nothing is proved. For all smaller openings too, the ratio of the works is below `allowed`.
+    """
+    done: Work = (np.zeros_like(allowed), np.zeros_like(allowed), np.zeros_like(allowed))
+    step = np.ones_like(allowed)
+    for _ in range(TRIES):  # until the whole of it can be one step
+        _, holds = _step(pull, slope, allowed, done, step)
+        if holds.all():
+            break
+        step = np.where(holds, step, step / 4)
+    first = step = step / 2
+    for _ in range(STEPS):
+        new, holds = _step(pull, slope, allowed, done, step)
+        done = tuple(np.where(holds, x, y) for x, y in zip(new, done, strict=True))
+        step = np.where(holds, np.minimum(2 * step, np.maximum(done[0] / 3, first)), step / 2)
+    return done
+
+
+def _step(pull: Bounds, slope: Bounds, allowed: Any, done: Work, step: Any) -> tuple[Work, Any]:
+    """The works after one more step, and whether it may be taken.
+
+    From the middle the pull changes by its slope: over a step h the work is h pull, to within h^2 / 8 of the slope's range.
+    Anywhere in the step the ratio of the works lies between that before it and that with the extreme pulls of the step.
+    """
+    opening, lo, hi = done
+    middle, change = pull(Interval(opening + step / 2)), slope(Interval(opening, opening + step))
+    reach, spread = step / 2 * change.magnitude(), step * step / 8 * (change.hi - change.lo)
+    low, high = (middle.lo - reach) * (1 - SLACK), (middle.hi + reach) * (1 + SLACK)
+    new = (opening + step, lo + (step * middle.lo - spread) * (1 - SLACK), hi + (step * middle.hi + spread) * (1 + SLACK))
+    return new, (low > 0) & (hi + high * step < allowed * (lo + low * step)) & (new[0] <= WIDEST)

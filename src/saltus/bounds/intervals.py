@@ -1,0 +1,194 @@
+"""Interval arithmetic on a traced graph: bounds of an expression that hold for every value of its leaves in given ranges.
+
+Arrays of intervals run over parameter sets and cells of the time or the state. After every operation a bound moves outward by
+more than its rounding; zero stays zero, so that what is multiplied by 0 is exactly 0. (An underflow, below 1e-307, is not
+accounted for.) Where an operation leaves its domain the bounds are NaN, and no comparison with them holds: nothing is proved.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from saltus.taylor import Expr, ordered
+
+ROUNDING = 2.0**-51  # relative, four times that of + - * / and sqrt: a literal factor such as 1/3 may be rounded too
+LIBRARY = 2.0**-48  # relative, of the elementary functions: NumPy promises 4 units in the last place
+SLACK = 1e-9  # relative, far above the rounding of the few steps after the intervals
+TURN = 2 * math.pi
+EXACT = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # factors that do not round
+
+
+class Interval:
+    """Bounds `lo` <= `hi`, arrays that broadcast."""
+
+    __slots__ = ("hi", "lo")
+    __array_ufunc__ = None
+
+    def __init__(self, lo: Any, hi: Any = None) -> None:
+        self.lo = np.asarray(lo, dtype=float)
+        self.hi = self.lo if hi is None else np.asarray(hi, dtype=float)
+
+    def __add__(self, other: Any) -> Interval:
+        o = as_interval(other)
+        return outward(self.lo + o.lo, self.hi + o.hi)
+
+    def __sub__(self, other: Any) -> Interval:
+        o = as_interval(other)
+        return outward(self.lo - o.hi, self.hi - o.lo)
+
+    def __mul__(self, other: Any) -> Interval:
+        if isinstance(other, (int, float)):
+            lo, hi = (self.lo, self.hi) if other >= 0 else (self.hi, self.lo)
+            return Interval(lo * other, hi * other) if abs(other) in EXACT else outward(lo * other, hi * other)
+        a, b, c, d = self.lo * other.lo, self.lo * other.hi, self.hi * other.lo, self.hi * other.hi
+        return outward(np.minimum(np.minimum(a, b), np.minimum(c, d)), np.maximum(np.maximum(a, b), np.maximum(c, d)))
+
+    def __truediv__(self, other: Any) -> Interval:
+        return self * as_interval(other).inverse()
+
+    def __neg__(self) -> Interval:
+        return Interval(-self.hi, -self.lo)
+
+    def __radd__(self, other: Any) -> Interval:
+        return self + other
+
+    def __rsub__(self, other: Any) -> Interval:
+        return as_interval(other) - self
+
+    def __rmul__(self, other: Any) -> Interval:
+        return self * other
+
+    def inverse(self) -> Interval:
+        """1 / x; NaN where x may be 0."""
+        safe = (self.lo > 0) | (self.hi < 0)
+        return outward(np.where(safe, 1 / self.hi, np.nan), np.where(safe, 1 / self.lo, np.nan))
+
+    def square(self) -> Interval:
+        """x^2, which is not the product of two that vary apart."""
+        low, high = self.lo * self.lo, self.hi * self.hi
+        least = np.where((self.lo <= 0) & (self.hi >= 0), 0.0, np.minimum(low, high))
+        return outward(least, np.maximum(low, high))
+
+    def magnitude(self) -> Any:
+        """The largest abs(x)."""
+        return np.maximum(-self.lo, self.hi)
+
+    def over_cells(self) -> Interval:
+        """The hull over the first axis, kept with length 1."""
+        return Interval(np.min(self.lo, axis=0, keepdims=True), np.max(self.hi, axis=0, keepdims=True))
+
+
+def as_interval(value: Any) -> Interval:
+    """A number or an array becomes an interval without width."""
+    return value if isinstance(value, Interval) else Interval(value)
+
+
+def outward(lo: Any, hi: Any, error: float = ROUNDING) -> Interval:
+    """The bounds moved apart by a relative error."""
+    return Interval(lo - error * np.abs(lo), hi + error * np.abs(hi))
+
+
+def enclose(roots: list[Expr], leaf: Callable[[Expr], Interval]) -> list[Interval]:
+    """Bounds of expressions for all values of their leaves (time, coordinate, parameter, ...) in the ranges that `leaf` gives."""
+    values: dict[int, Interval] = {}
+    with np.errstate(all="ignore"):
+        for node in ordered(roots):
+            if node.op == "number":
+                values[id(node)] = Interval(node.value)
+            elif not node.args:
+                values[id(node)] = leaf(node)
+            else:
+                values[id(node)] = _apply(node, [values[id(a)] for a in node.args])
+    return [values[id(root)] for root in roots]
+
+
+def _apply(node: Expr, x: list[Interval]) -> Interval:
+    if node.op == "mul" and node.args[0] is node.args[1]:
+        return x[0].square()
+    return _OPERATIONS[node.op](*x)
+
+
+def _increasing(function: Any) -> Callable[[Interval], Interval]:
+    """A function that increases; where it has no value at the lower end, nothing is known of the upper one either."""
+
+    def bounds(x: Interval) -> Interval:
+        low = function(x.lo)
+        return outward(low, np.where(np.isnan(low), np.nan, function(x.hi)), LIBRARY)
+
+    return bounds
+
+
+def _wave(function: Any, peak: float) -> Callable[[Interval], Interval]:
+    """A sine or cosine, whose maxima are at `peak` + 2 pi k and whose minima are half a turn later."""
+
+    def bounds(x: Interval) -> Interval:
+        x = outward(x.lo, x.hi, LIBRARY)
+        at_lo, at_hi = function(x.lo), function(x.hi)
+
+        def passes(point: float) -> Any:
+            return np.floor((x.hi - point) / TURN + LIBRARY) >= np.ceil((x.lo - point) / TURN - LIBRARY)
+
+        result = outward(np.minimum(at_lo, at_hi), np.maximum(at_lo, at_hi), LIBRARY)
+        whole = x.hi - x.lo >= TURN  # and a NaN stays one
+        result.lo, result.hi = (np.where(whole, 0.0, end) for end in (result.lo, result.hi))  # the sine of infinity is a NaN
+        low = np.where(whole | passes(peak + math.pi), -1.0, np.maximum(result.lo, -1.0))
+        return Interval(low, np.where(whole | passes(peak), 1.0, np.minimum(result.hi, 1.0)))
+
+    return bounds
+
+
+def _cosh(x: Interval) -> Interval:
+    low, high = np.cosh(x.lo), np.cosh(x.hi)
+    least = np.where((x.lo <= 0) & (x.hi >= 0), 1.0, np.minimum(low, high))
+    return outward(least, np.maximum(low, high), LIBRARY)
+
+
+def _pow(x: Interval, exponent: Interval) -> Interval:
+    """x^p for x >= 0, monotone in both; NaN for negative x."""
+    corners = [base**p for base in (x.lo, x.hi) for p in (exponent.lo, exponent.hi)]
+    low, high = np.minimum.reduce(np.broadcast_arrays(*corners)), np.maximum.reduce(np.broadcast_arrays(*corners))
+    unsafe = (x.lo < 0) | ((x.lo == 0) & (exponent.lo <= 0))
+    return outward(np.where(unsafe, np.nan, low), np.where(unsafe, np.nan, high), LIBRARY)
+
+
+def _greater(x: Interval, y: Interval) -> Interval:
+    """1 where x > y for all their values, 0 where for none, [0, 1] where that is open."""
+    return Interval(np.where(x.lo > y.hi, 1.0, 0.0), np.where(x.hi <= y.lo, 0.0, 1.0))
+
+
+def _greater_equal(x: Interval, y: Interval) -> Interval:
+    return Interval(np.where(x.lo >= y.hi, 1.0, 0.0), np.where(x.hi < y.lo, 0.0, 1.0))
+
+
+def _where(condition: Interval, x: Interval, y: Interval) -> Interval:
+    low, high = np.minimum(x.lo, y.lo), np.maximum(x.hi, y.hi)
+    yes, no = condition.lo == 1.0, condition.hi == 0.0
+    return Interval(np.where(yes, x.lo, np.where(no, y.lo, low)), np.where(yes, x.hi, np.where(no, y.hi, high)))
+
+
+_OPERATIONS: dict[str, Callable[..., Interval]] = {
+    "add": Interval.__add__,
+    "sub": Interval.__sub__,
+    "mul": Interval.__mul__,
+    "div": Interval.__truediv__,
+    "pow": _pow,
+    "sqrt": _increasing(np.sqrt),
+    "exp": _increasing(np.exp),
+    "log": _increasing(np.log),
+    "sinh": _increasing(np.sinh),
+    "tanh": _increasing(np.tanh),
+    "cosh": _cosh,
+    "sin": _wave(np.sin, math.pi / 2),
+    "cos": _wave(np.cos, 0.0),
+    "greater": _greater,
+    "less": lambda x, y: _greater(y, x),
+    "greater_equal": _greater_equal,
+    "less_equal": lambda x, y: _greater_equal(y, x),
+    "where": _where,
+    "maximum": lambda x, y: Interval(np.maximum(x.lo, y.lo), np.maximum(x.hi, y.hi)),
+    "minimum": lambda x, y: Interval(np.minimum(x.lo, y.lo), np.minimum(x.hi, y.hi)),
+}

@@ -1,0 +1,110 @@
+"""`saltus plot`: the picture of a result that is on disk."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from saltus.errors import ParameterError
+
+DRAWN = {
+    "motion": "motion:draw_motion",
+    "phase_portrait": "plane:draw_plane",
+    "response_spectrum": "diagram:draw_diagram",
+    "bifurcation_diagram": "diagram:draw_diagram",
+    "attractors": "attractors:draw_attractors",
+    "basins": "basins:draw_basins",
+    "stability_chart": "chart:draw_stability_chart",
+}  # modules and functions of `saltus.plots`
+
+
+def plot_store(path: Path, output: Path | None) -> None:
+    """Draw the result at `path` (netCDF, or the Zarr store of a sweep) beside it, or into the folder `output`.
+
+    Raises:
+        ParameterError: there is no result of saltus at `path`, a sweep is not complete, a folder cannot be written to.
+    """
+    from saltus.files import check_writable
+
+    folder = path.parent if output is None else output
+    check_writable(folder)
+    files = draw_file(path, folder / path.stem, open_result(path))
+    names = ", ".join(file.name for file in files)
+    Console(highlight=False).print(f"The picture is in {folder}: {names}", markup=False, soft_wrap=True)
+
+
+def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
+    """Draw a result as `stem`.png and `stem`.pdf.
+
+    Raises:
+        ParameterError: it is of no kind that has a picture, or lacks what its kind has.
+    """
+    from saltus.files import write_figure
+    from saltus.plots import style
+
+    kind = kind_of(data)
+    if kind not in DRAWN:
+        what = f"its kind is {kind!r}" if kind else "it does not say of what kind it is"
+        raise ParameterError(f"{path} is no result that `saltus plot` draws: {what}; it draws {', '.join(DRAWN)}")
+    module, name = DRAWN[kind].split(":")
+    draw = getattr(import_module(f"saltus.plots.{module}"), name)
+    try:
+        figure = draw(data)
+    except (LookupError, AttributeError, StopIteration) as error:
+        raise ParameterError(f"{path} says that it is of the kind {kind!r}, but lacks {error}; compute it again") from error
+    with style():
+        return write_figure(stem, figure)
+
+
+def open_result(path: Path) -> Any:
+    """The Dataset or DataTree at `path`.
+
+    Raises:
+        ParameterError: no such file, or one that is not of saltus; a sweep that is not complete.
+    """
+    import xarray
+
+    if not path.exists():
+        raise ParameterError(f"there is no file or folder {path}; give the .nc or .zarr that `saltus run` has written")
+    if path.is_dir():
+        return _open_store(path)
+    try:
+        with xarray.open_datatree(path, engine="h5netcdf") as tree:
+            tree.load()
+    except (OSError, ValueError, KeyError, TypeError) as error:  # h5netcdf has many ways to say so
+        raise ParameterError(f"{path} is no netCDF file that can be read ({_first_line(error)})") from error
+    return tree if tree.children else tree.to_dataset()
+
+
+def _open_store(path: Path) -> Any:
+    """The dataset of a complete sweep."""
+    from saltus.sweep import open_store, status
+
+    found = status(path)
+    if not found.complete:
+        raise ParameterError(f"{path} has {found.done} of {found.total} chunks; run the study again to go on, then plot it")
+    data = open_store(path)
+    if kind_of(data) == "basin_cells":
+        raise ParameterError(f"{path} keeps the cells of basins alone; plot {path.with_suffix('.nc').name} beside it")
+    return _with_limits(data) if kind_of(data) == "stability_chart" and "system" in data.attrs else data
+
+
+def _with_limits(chart: Any) -> Any:
+    """A chart with the limits of its mechanism, which follow from the system and are not in the store."""
+    from saltus.studies import with_limits
+    from saltus.systems import System
+
+    return with_limits(chart, System.from_json(chart.attrs["system"]), chart.attrs["path"])
+
+
+def _first_line(error: Exception) -> str:
+    return f"{next(iter(str(error).splitlines()), type(error).__name__):.80}"
+
+
+def kind_of(data: Any) -> str:
+    """What a result says that it is, in its attributes."""
+    kind = str(data.attrs.get("kind", "")) or str(data.attrs.get("title", "")).removesuffix(" computed by saltus")
+    return kind.replace(" ", "_")

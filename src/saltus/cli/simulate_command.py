@@ -1,0 +1,92 @@
+"""`saltus simulate`: a study's motion, computed, written and summarised."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+if TYPE_CHECKING:
+    from saltus.config import Study
+    from saltus.flow import Motion
+
+MOST_SAMPLES = 1_000_000  # written unless the study asks for more
+LONG = 20_000  # periods; beyond this a motion is sampled as it goes, so that memory is bounded
+
+
+def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
+    """Run the study at `path`, write its motion into `output`, and print a summary.
+
+    Raises:
+        SaltusError: a bad study, a folder that cannot be written to (before anything is computed), a motion that cannot go on.
+    """
+    from saltus.cli.summary import print_summary
+    from saltus.config import load_study
+    from saltus.files import check_writable
+
+    study = load_study(path)
+    study.settings()
+    output = Path("results") / study.name if output is None else output
+    check_writable(output)
+    console, messages = Console(highlight=False), Console(stderr=True, highlight=False)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn())
+    with Progress(*columns, console=messages, transient=True, disable=not messages.is_terminal) as progress:
+        task = progress.add_task("", total=1.0)
+        tell = _teller(messages, progress, task)
+        tell(f"computing {path}")
+        motion = study.run(progress=lambda done: progress.update(task, completed=done), samples=long_samples(study))
+        tell(f"writing to {output}")
+        files = write_motion(motion, study, output, plot)
+    print_summary(motion, console)
+    console.print(f"Results are in {output}: {', '.join(file.name for file in files)}", markup=False, soft_wrap=True)
+
+
+def _teller(console: Console, progress: Progress, task: Any) -> Any:
+    """Say what goes on: beside the clock on a terminal, line by line elsewhere."""
+
+    def tell(what: str) -> None:
+        progress.update(task, description=what.replace("[", r"\["))
+        if not console.is_terminal:
+            print(what, file=console.file, flush=True)
+
+    return tell
+
+
+def write_motion(motion: Motion, study: Study, output: Path, plot: bool) -> list[Path]:
+    """Write motion.nc and, with `plot`, motion.png and motion.pdf, each whole or not at all; their paths."""
+    from saltus.files import write_dataset, write_figure
+
+    dataset = motion.to_xarray(sample_times(motion, study.settings().samples))
+    dataset.attrs["study"] = study.source.path.name
+    files = [write_dataset(output / "motion.nc", dataset)]
+    if plot:
+        from saltus.plots import draw_motion, style
+
+        figure = draw_motion(dataset)
+        with style():
+            files += write_figure(output / "motion", figure)
+    return files
+
+
+def long_samples(study: Study) -> Any:
+    """The times at which to keep the states of a motion too long to be kept whole, or None for one that is not."""
+    import numpy as np
+
+    settings, period = study.settings(), study.system.load.period
+    span = settings.duration if settings.periods is None else settings.periods * (period or 1.0)
+    if span is None or span / (period or 2 * np.pi) <= LONG:
+        return None
+    return np.linspace(settings.time, settings.time + span, settings.samples or MOST_SAMPLES)
+
+
+def sample_times(motion: Motion, samples: int | None) -> Any:
+    """Evenly spaced times over a motion, or None for its own choice where that is no more than `MOST_SAMPLES`."""
+    import numpy as np
+
+    period = motion.system.load.period
+    short = period is None or 200 * (motion.time - motion.start) / period <= MOST_SAMPLES
+    if motion.samples is not None or (samples is None and short):
+        return None
+    return np.linspace(motion.start, motion.time, MOST_SAMPLES if samples is None else samples)

@@ -1,0 +1,256 @@
+"""An ensemble as an xarray Dataset, with units and provenance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.flow import kernel_layout as k
+from saltus.flow.ensemble import lane_layout as at
+from saltus.taylor import FREQUENCY
+
+if TYPE_CHECKING:
+    import xarray
+
+    from saltus.flow.ensemble.inputs import Inputs
+    from saltus.flow.ensemble.threads import Ends, Jobs
+    from saltus.systems import System
+
+# Which columns of the driver's samples a name of `sample` keeps, for so many coordinates.
+KEPT: dict[str, Callable[[int], list[int]]] = {
+    "state": lambda own: list(range(2 * own)),
+    "extrema": lambda own: [2 * own, 2 * own + 1],
+    "speed": lambda own: [2 * own + 2],
+    "crossings": lambda own: [2 * own + 3],
+}
+# Why a trajectory ended: the driver's reason, and its name.
+STOPS = {
+    k.DONE: "horizon",
+    -1: "rest",  # the time asked for, at rest
+    k.LIMITED: "limit",
+    at.CAPTURED: "captured",
+    at.SETTLED: "settled",
+    k.NOT_UNIQUE: "not_unique",
+    k.NO_IMPACT: "no_impact",
+    k.NOT_FINITE: "not_finite",
+    k.STALLED: "stalled",
+    at.OUTSIDE: "outside",
+    at.UNRESOLVED: "unresolved",
+}
+MEANINGS = {
+    "horizon": "the time asked for",
+    "rest": "the time asked for, at rest",
+    "limit": "a margin of the model reached zero",
+    "captured": "proved to be captured at rest for all later loads",
+    "settled": "repeats itself every `cycle` forcing periods",
+    "not_unique": "the motion from rest at contact is not unique",
+    "no_impact": "the impact law has no velocity after the impact",
+    "not_finite": "the motion leaves the range of numbers",
+    "stalled": "the acceleration is singular",
+    "outside": "the state at the start lies beyond the contact",
+    "unresolved": "impacts accumulate too slowly to be followed: more than a million in a unit of time",
+}
+
+
+# What a dataset has besides the coordinates and velocities of the model and what is called after those.
+FIXED = (
+    *("time", "side", "stop", "limit", "cycle", "crossings", "grazings", "periods", "chatter_speed", "derivative"),
+    *("least_speed", "overall_least_speed", "period_crossings", "start_time"),
+)
+DIMENSIONS = ("period", "state", "column")
+
+
+def rate_name(name: str, names: tuple[str, ...]) -> str:
+    """The name of a coordinate's velocity."""
+    return "velocity" if len(names) == 1 else f"{name}_velocity"
+
+
+def start_name(name: str) -> str:
+    """The name in a dataset of a coordinate, a velocity or the time at the start."""
+    return f"start_{name}"
+
+
+def result_names(names: tuple[str, ...]) -> set[str]:
+    """Every name that a dataset may need for itself, of a model with these coordinates."""
+    states = [*names, *(rate_name(name, names) for name in names)]
+    extrema = [f"{which}_{names[0]}" for which in ("largest", "smallest")]
+    further = [*(f"{kind}_{name}" for kind in ("sampled", "start") for name in states), *(f"overall_{name}" for name in extrema)]
+    return {*FIXED, *DIMENSIONS, *states, *extrema, *further}
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be computed: how exactly, how long, and what is kept of it."""
+
+    tol: float
+    periods: float | None  # None where a duration is asked for
+    limits: tuple[str, ...]  # margins to stop at
+    sample: tuple[str, ...]
+    until: tuple[str, ...]
+    paths: tuple[str, ...] | None  # of the parameters to differentiate to; None without derivatives
+
+
+def to_dataset(system: System, inputs: Inputs, wanted: Wanted, jobs: Jobs, ends: Ends) -> xarray.Dataset:
+    """The ends of all trajectories and what was sampled of them."""
+    import xarray
+
+    from saltus import __version__
+
+    writer = _Writer(system.model.coordinates, inputs)
+    _add_ends(writer, jobs, ends)
+    _add_stops(writer, ends, wanted)
+    _add_samples(writer, ends, wanted.sample)
+    if wanted.paths is not None:
+        _add_derivatives(writer, jobs, ends, wanted.paths, wanted.periods)
+    attributes: dict[str, Any] = {
+        "title": "ensemble computed by saltus",
+        "saltus_version": __version__,
+        "system": system.to_json(),
+        "tol": wanted.tol,
+        "Conventions": "CF-1.8",
+    }
+    attributes |= _add_inputs(writer, inputs)
+    return xarray.Dataset(writer.variables, writer.coords, attributes)
+
+
+class _Writer:
+    """Collects variables over the dimensions of an ensemble."""
+
+    def __init__(self, names: tuple[str, ...], inputs: Inputs) -> None:
+        self.names, self.rates = names, tuple(rate_name(name, names) for name in names)
+        self.dims, self.shape, self.coords = inputs.dims, inputs.shape, dict(inputs.coords)
+        self.variables: dict[str, Any] = {}
+
+    def add(self, name: str, values: np.ndarray, unit: str, text: str, *extra: str, **more: Any) -> None:
+        """Add a variable that has a row for each trajectory, over further dimensions `extra`."""
+        import xarray
+
+        reshaped = values.reshape((*self.shape, *values.shape[1:]))
+        attributes = {"units": unit, "long_name": text} | more
+        # `fastpath`, as xarray would import Dask, where there is one, to see that a numpy array is none of Dask's
+        self.variables[name] = xarray.Variable((*self.dims, *extra), reshaped, attributes, fastpath=True)
+
+
+def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends) -> None:
+    """The states at the end, and what happened until then."""
+    rows = jobs.states.shape[1] // 2
+    for i, (name, rate) in enumerate(zip(writer.names, writer.rates, strict=True)):
+        unit = _unit(name)
+        writer.add(name, ends.states[:, i], unit, f"{name} at the end")
+        writer.add(rate, ends.states[:, rows + i], unit, f"d {name} / d tau at the end")
+    lengths, legs = jobs.numbers[:, 1], ends.labels[:, 4] - jobs.labels[:, 0]  # legs that were ended
+    writer.add("time", ends.labels[:, 4] * lengths + ends.numbers[:, 0], "1", "dimensionless time tau at the end")
+    held = (ends.labels[:, 2] == k.REST) | (ends.labels[:, 2] == k.CHATTER)
+    writer.add("side", np.where(held, 0, ends.labels[:, 3]).astype(np.int8), "1", "side at the end, 0 at rest")
+    writer.add("crossings", ends.labels[:, 5], "1", "impacts")
+    writer.add("grazings", ends.labels[:, 6], "1", "touches of the contact without an impact")
+    if (lengths > 0).all():
+        done = legs + (ends.numbers[:, 0] - jobs.numbers[:, 0]) / lengths
+        writer.add("periods", done, "1", "forcing periods from the start to the end")
+    text = "speed of the gap after impacts too small to be followed, else 0"
+    writer.add("chatter_speed", ends.numbers[:, 1], "1", text)
+
+
+def _add_inputs(writer: _Writer, inputs: Inputs) -> dict[str, float]:
+    """The arguments: arrays as variables, unless a coordinate is the same; returns those that are one number."""
+    single = {}
+    for name, values in inputs.values.items():
+        parameter = name in inputs.paths
+        where = name if parameter else start_name(name)
+        if not np.ndim(values):
+            single[where] = float(values)
+        elif not _is_coordinate(name if parameter else f"initial_{name}", values, inputs):
+            writer.add(
+                where, values, "1" if parameter else _unit(name), f"parameter {name}" if parameter else f"{name} at the start"
+            )
+    return single
+
+
+def _is_coordinate(name: str, values: np.ndarray, inputs: Inputs) -> bool:
+    """Whether the coordinate of this name holds these values."""
+    if name not in inputs.coords:
+        return False
+    whole = inputs.coords[name].variable.set_dims(dict(zip(inputs.dims, inputs.shape, strict=True)))
+    return bool(np.array_equal(whole.values.reshape(-1), values))
+
+
+def _unit(name: str) -> str:
+    return "rad" if name.startswith("theta") else "1"
+
+
+def _add_stops(writer: _Writer, ends: Ends, wanted: Wanted) -> None:
+    """Why each trajectory ended."""
+    reasons = ends.labels[:, 0].copy()
+    reasons[(reasons == k.DONE) & (ends.labels[:, 2] == k.REST)] = -1
+    codes = np.full(reasons.shape, -1, dtype=np.int8)
+    for code, reason in enumerate(STOPS):
+        codes[reasons == reason] = code
+    comment = "; ".join(f"{name}: {MEANINGS[name]}" for name in STOPS.values())
+    writer.add("stop", codes, "1", "why it ended", **_flags(tuple(STOPS.values())), comment=comment)
+    if wanted.limits:
+        which = np.where(reasons == k.LIMITED, ends.labels[:, 1], -1).astype(np.int8)
+        writer.add("limit", which, "1", "the margin that ended it, -1 for none", **_flags(wanted.limits))
+    if "settled" in wanted.until:
+        cycle = np.where(reasons == at.SETTLED, ends.labels[:, 1], 0)
+        writer.add("cycle", cycle, "1", "forcing periods after which it repeats itself, 0 where it has not settled")
+
+
+def _flags(names: tuple[str, ...]) -> dict[str, Any]:
+    """What the numbers 0, 1, ... stand for, as the CF conventions write it."""
+    return {"flag_values": np.arange(len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
+
+
+def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
+    """What was kept of the last forcing periods, in the order of time, nan where there were fewer; and of the whole motion."""
+    kept, done = ends.samples.shape[1], ends.labels[:, 7]
+    order = (done[:, None] + np.arange(kept)) % kept  # the ring's oldest first
+    missing = np.arange(kept)[None, :] < (kept - done)[:, None]
+    samples = np.take_along_axis(ends.samples, order[:, :, None], axis=1)
+    samples[missing] = np.nan
+    first, column = writer.names[0], 0
+    slowest = "the least speed before an impact, inf without impacts"
+    texts = {
+        "state": [(f"sampled_{name}", f"{name} at the end of the forcing period") for name in (*writer.names, *writer.rates)],
+        "extrema": [(f"{which}_{first}", f"the {which} {first} in the forcing period") for which in ("largest", "smallest")],
+        "speed": [("least_speed", f"{slowest}, in the forcing period")],
+        "crossings": [("period_crossings", "impacts in the forcing period")],
+    }
+    for name in KEPT:
+        if name in sample:
+            for variable, text in texts[name]:
+                writer.add(variable, np.ascontiguousarray(samples[:, :, column]), "1", text, "period")
+                column += 1
+    if "extrema" in sample:
+        for i, which in enumerate(("largest", "smallest")):
+            text = f"the {which} {first} from the start to the end"
+            writer.add(f"overall_{which}_{first}", ends.numbers[:, 2 + i], _unit(first), text)
+    if "speed" in sample:
+        writer.add("overall_least_speed", ends.numbers[:, 4], "1", f"{slowest}, from the start to the end")
+
+
+def _add_derivatives(writer: _Writer, jobs: Jobs, ends: Ends, paths: tuple[str, ...], periods: float | None) -> None:
+    """The derivatives of the end state to the initial one and to parameters, (..., state, column).
+
+    The time at the start is fixed. The time at the end is, too, but for two: where whole periods were asked for and the motion
+    ends after n of them, start + n 2 pi / W moves with the frequency W; and where a margin ends it, with the margin.
+    """
+    states = [*writer.names, *writer.rates]
+    own, rows, columns = len(writer.names), jobs.states.shape[1] // 2, [*states, *paths]
+    q = ends.states[:, own:rows].reshape(-1, len(columns), own)
+    v = ends.states[:, rows + own :].reshape(-1, len(columns), own)
+    derivative = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
+    slope = np.concatenate([ends.states[:, rows : rows + own], ends.numbers[:, 5 : 5 + own]], axis=1)
+    limited = ends.labels[:, 0] == k.LIMITED
+    with np.errstate(invalid="ignore"):  # the instant of a margin met without speed has no derivative
+        derivative[limited] += slope[limited, :, None] * ends.numbers[limited, None, 5 + own :]
+    if periods is not None and FREQUENCY in paths:
+        moving = np.isin(ends.labels[:, 0], (k.DONE, at.SETTLED)) & (ends.labels[:, 2] == k.ARC)
+        length = jobs.numbers[:, 1]
+        span = (ends.labels[:, 4] - jobs.labels[:, 0]) * length + (ends.numbers[:, 0] - jobs.numbers[:, 0])
+        shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # of the end, -span / W
+        derivative[:, :, columns.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)
+    writer.coords |= {"state": ("state", states), "column": ("column", columns)}
+    writer.add("derivative", derivative, "1", "derivative of the state at the end", "state", "column")

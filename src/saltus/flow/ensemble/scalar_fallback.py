@@ -1,0 +1,72 @@
+"""What a lane cannot decide with the others, decided for it alone with the scalar kernel's roots.
+
+This text is compiled by itself, and called through pointers: linked into every function above it, it would be compiled again
+with each of them.
+"""
+
+from __future__ import annotations
+
+from saltus.flow.ensemble.function_types import LANE_ROOT, TURNING_RANGE
+from saltus.flow.ensemble.lane_layout import NO_ROOT, TOUCH
+from saltus.flow.roots import SIMPLE, first_root, horner, scale_gap
+from saltus.taylor import WIDTH, lean_jit
+from saltus.taylor import not_here as cached_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+MOST_TURNS = 16  # turning points within one step that are looked for
+
+
+@cached_jit(LANE_ROOT)
+def lane_root(m, series, order, lane, h, sign, g0, skip, poly, gap):
+    """The first root of one lane's gap by `roots.first_root`: its time, NO_ROOT, or TOUCH where it touches zero before."""
+    for k in range(order + 1):
+        gap[k] = sign * m[(series + k) * WIDTH + lane]
+    gap[0] = g0
+    scale_gap(gap, skip, order, h, poly)
+    kind, u, touch = first_root(poly, order - skip)
+    if touch <= 1.0:
+        return TOUCH
+    return u * h if kind == SIMPLE else NO_ROOT
+
+
+@lean_jit
+def move(p, n, u):
+    """Replace p(s) by p(u + (1 - u) s)."""
+    for k in range(n):
+        for j in range(n - 1, k - 1, -1):
+            p[j] += u * p[j + 1]
+    power = 1.0
+    for k in range(n + 1):
+        p[k] *= power
+        power *= 1.0 - u
+
+
+@cached_jit(TURNING_RANGE)
+def turning_range(q, order, begin, h, p):
+    """The largest and the smallest value of a series on (begin, h]: at its end, or where its derivative vanishes between."""
+    high = low = horner(q, order, h)
+    n, power = order - 1, 1.0
+    for k in range(order):
+        p[k] = (k + 1) * q[k + 1] * power
+        power *= h
+    start, left = begin / h, 1.0 - begin / h
+    if begin > 0.0:
+        move(p, n, start)
+    for _ in range(MOST_TURNS):
+        while n > 0 and p[0] == 0.0:
+            for k in range(n):
+                p[k] = p[k + 1]
+            n -= 1
+        if p[0] < 0.0:
+            for k in range(n + 1):
+                p[k] = -p[k]
+        kind, u, _ = first_root(p, n)
+        if kind != SIMPLE or u >= 1.0:
+            break
+        start, left = start + u * left, (1.0 - u) * left
+        x = horner(q, order, start * h)
+        high, low = max(high, x), min(low, x)
+        move(p, n, u)
+        p[0] = 0.0
+    return high, low

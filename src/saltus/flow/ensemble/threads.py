@@ -1,0 +1,164 @@
+"""Run many trajectories on all cores: chunks of jobs, handed to threads that work without Python's lock."""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.flow import kernel_layout as k
+from saltus.flow.compiled import Pointer
+from saltus.flow.ensemble import lane_layout as at
+from saltus.flow.ensemble.compiled_lanes import load_advance, load_driver, load_helpers
+from saltus.flow.simulation import Program, taylor_order
+from saltus.taylor import CACHE_LINE, WIDTH, Slots
+
+CHUNK = 1024  # trajectories that one call of the driver runs: some milliseconds a forcing period
+PATIENCE = 0.1  # seconds between looks at Ctrl-C and at the progress
+
+
+@dataclass(frozen=True)
+class Jobs:
+    """Trajectories to run, an array with a row for each; see `fill` of `legs.py` for the columns."""
+
+    states: np.ndarray  # (n, 2 coordinates): coordinates, then velocities
+    numbers: (
+        np.ndarray
+    )  # (n, 4): local time at the start, forcing period, local time at the end, speed below which it is captured
+    labels: np.ndarray  # (n, 4): first and last forcing period, side to leave by, piece of the records
+    columns: dict[int, np.ndarray]  # by the parameter's place, (n,)
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+
+@dataclass(frozen=True)
+class Ends:
+    """How the trajectories ended; see `finish` and `keep_sample` of `legs.py` for the columns."""
+
+    states: np.ndarray  # (n, 2 coordinates)
+    numbers: np.ndarray  # (n, 5 + own coordinates + columns of the tangent)
+    labels: np.ndarray  # (n, 8)
+    samples: np.ndarray  # (n, kept, columns asked for)
+
+
+def available_cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """A structure ready to run in lanes, with what is the same for all of its trajectories."""
+
+    program: Program
+    slots: Slots
+    functions: tuple[Pointer, ...]  # lane_series, lane_impact, lane_field
+    parameters: np.ndarray  # of the system; `Jobs.columns` replaces some
+    records: tuple[np.ndarray, np.ndarray]
+    tol: float
+    kept: int  # how many of the last forcing periods are kept
+    sampled: list[int]  # which columns of a sample are
+    watch: bool  # whether extrema are recorded
+    settle: bool  # whether a trajectory ends when it has settled on a cycle
+
+    def run(self, jobs: Jobs, threads: int, progress: Callable[[float], object] | None, total: float) -> Ends:
+        """Run all jobs; `total` is how many forcing periods they are, for the progress.
+
+        Raises:
+            KeyboardInterrupt: after Ctrl-C, within a step of every lane.
+        """
+        n, own = len(jobs), self.own
+        ends = Ends(
+            np.empty((n, jobs.states.shape[1])),
+            np.zeros((n, 5 + own + self.program.structure.module.COLUMNS)),
+            np.empty((n, 8), dtype=np.int64),
+            np.empty((n, self.kept, len(self.sampled))),
+        )
+        controls = [np.zeros(2, dtype=np.int64) for _ in range(threads)]
+        chunks, lock = iter(range(0, n, CHUNK)), threading.Lock()
+        load_driver(), load_helpers(), load_advance()  # compiled here, not by each thread
+        with ThreadPoolExecutor(threads) as pool:
+            try:  # an interrupt while they are begun must stop them too, or the pool would wait for their end
+                workers = [pool.submit(self._work, jobs, ends, chunks, lock, control) for control in controls]
+                while wait(workers, PATIENCE).not_done:
+                    if progress is not None and total > 0:
+                        progress(min(1.0, sum(int(c[1]) for c in controls) / total))
+            except BaseException:
+                for control in controls:
+                    control[0] = 1
+                raise
+            for worker in workers:
+                worker.result()
+        if progress is not None:
+            progress(1.0)
+        return ends
+
+    @property
+    def own(self) -> int:
+        """The model's coordinates."""
+        return int(self.program.structure.module.OWN)
+
+    def _work(self, jobs: Jobs, ends: Ends, chunks: Iterator[int], lock: threading.Lock, control: np.ndarray) -> None:
+        """Run chunk after chunk until there are none."""
+        fixed = self._arguments()
+        memory = self._memory()
+        while True:
+            with lock:
+                first = next(chunks, None)
+            if first is None or control[0]:
+                return
+            self._run_chunk(fixed, memory, jobs, ends, slice(first, first + CHUNK), control)
+
+    def _run_chunk(
+        self, fixed: tuple[Any, ...], memory: np.ndarray, jobs: Jobs, ends: Ends, rows: slice, control: np.ndarray
+    ) -> None:
+        states = np.ascontiguousarray(jobs.states[rows])
+        parameters = np.tile(self.parameters, (len(states), 1))
+        for place, column in jobs.columns.items():
+            parameters[:, place] = column[rows]
+        samples = np.full((len(states), self.kept, 2 * self.own + 4), np.nan)
+        results = (ends.states[rows], ends.numbers[rows], ends.labels[rows], samples)
+        chunk = (states, jobs.numbers[rows], jobs.labels[rows], parameters)
+        load_driver()(*fixed, memory, chunk, self.records, results, control)
+        ends.samples[rows] = samples[:, :, self.sampled]
+
+    def _arguments(self) -> tuple[Any, ...]:
+        """What every call of the driver is given: functions, sizes, places and settings."""
+        structure, order = self.program.structure, lane_order(self.tol)
+        module, scalar = structure.module, structure.functions
+        code = (*self.functions, Pointer(module.constants), Pointer(module.geometry))
+        sizes = np.zeros(at.SIZES, dtype=np.int64)
+        sizes[[at.MODEL_ROWS, at.COLUMN_COUNT, at.STOP_ROWS]] = module.OWN, module.COLUMNS, module.STOPS
+        sizes[[at.SIDED, at.BENDS, at.RECORD_ROWS]] = module.SIDES, module.STEEP, self.slots.records
+        sizes[[at.LANE_ORDER, at.SCALAR_ORDER, at.WORKSPACE]] = order, taylor_order(self.tol), module.ROWS
+        sizes[[at.LAST_KEPT, at.WATCH, at.SETTLE]] = self.kept, self.watch, self.settle
+        sizes[at.ENDS_ASKED] = self.settle or bool(self.sampled)
+        sizes[at.EVERY_END] = self.settle or self.kept > 1
+        settings = np.zeros(at.SETTINGS)
+        settings[k.TOLERANCE], settings[at.SHORTEST_STEP] = self.tol, k.SHORTEST
+        settings[at.SLOWEST_IMPACT] = max(k.SLOW * math.sqrt(self.tol), k.CHATTER_SPEED)
+        places = np.array(list(self.slots.places.values()), dtype=np.int64)
+        return code, (load_advance(), scalar), load_helpers(), sizes, places, settings
+
+    def _memory(self) -> np.ndarray:
+        """The lanes' memory; vectors lie within one line of the cache each, or every load would touch two."""
+        size, line = self.slots.places["end"] * WIDTH, CACHE_LINE // 8
+        buffer = np.zeros(size + line)
+        start = -(buffer.ctypes.data // 8) % line
+        return buffer[start : start + size]
+
+
+def lane_order(tol: float) -> int:
+    """The order that pays in lanes: 14 at 1e-6, 18 at 1e-10, 22 at 1e-14; always even (see `layout.py`).
+
+    Two more take up to 5 % less time, but where the last coefficients nearly vanish the step is too long by a factor, and the
+    error by that factor to the power of the order.
+    """
+    return 2 * math.ceil((7 - math.log10(tol)) / 2 - 1e-9)

@@ -1,0 +1,50 @@
+"""Time as the flow counts it: whole forcing periods and a local time within one, so that the phase is exact over any number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import check_number
+from saltus.errors import ParameterError
+
+MOST_PERIODS = 2**53  # as many as can be counted exactly
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When motions start and end; each a number, or an array for many motions."""
+
+    first: Any  # the forcing period that they start in; 0 where the load has none
+    local: Any  # the time within it
+    last: Any  # the forcing period that they end in
+    end: Any  # the local time within that
+    length: Any  # of a forcing period; 0 where the load has none
+
+
+def clock(time: Any, length: Any, periods: float | None, duration: float | None) -> Clock:
+    """When motions start and end that begin at `time`, under loads of period `length` (or None), and go on for so long.
+
+    Raises:
+        ParameterError: both of periods and duration or neither, a negative one, periods without a period, too many to count.
+    """
+    if (periods is None) == (duration is None):
+        raise ParameterError("say how long: either periods=... or duration=...")
+    span = periods if duration is None else duration
+    check_number("periods" if duration is None else "duration", span, at_least=0.0)
+    assert span is not None
+    if length is None:
+        if periods is not None:
+            raise ParameterError("the load has no frequency, so there are no forcing periods; give duration=... instead")
+        return Clock(0, time, 0, time + span, 0.0)
+    reach = np.max(np.abs(time) / length + (span / length if periods is None else span), initial=0.0)
+    if not reach < MOST_PERIODS:
+        raise ParameterError(f"the motion must start and end within 2^53 forcing periods, got {reach:g} of them")
+    first, local = np.divmod(time, length)
+    if periods is None:
+        whole, end = np.divmod(local + span, length)
+    else:
+        whole, end = np.floor(periods), local + (periods - np.floor(periods)) * length
+    return Clock(first, local, first + whole, end, length)

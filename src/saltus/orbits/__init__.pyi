@@ -1,0 +1,53 @@
+from .branch import STEP, Branch, check_bounds, continue_orbit, follow_stable
+from .codimension import CodimensionTwo
+from .find import check_whole, find_orbit, orbit_from
+from .from_dataset import orbits_of
+from .load_release import Release, load_releases
+from .newton import solve
+from .orbit import PeriodicOrbit
+from .problem import Problem
+from .resting import RestingOrbit
+from .search import EVEN, REGION, Search, check_region, initial_states, same_orbit, search_orbits
+from .signature import Signature
+from .special import Evidence, SpecialPoint
+from .special_curve import Locus
+from .special_curves import continue_special
+from .switching import Cascade, doubling_cascade, switch_branch
+from .symmetry import is_symmetric
+from .verify import defects
+
+__all__ = [
+    "EVEN",
+    "REGION",
+    "STEP",
+    "Branch",
+    "Cascade",
+    "CodimensionTwo",
+    "Evidence",
+    "Locus",
+    "PeriodicOrbit",
+    "Problem",
+    "Release",
+    "RestingOrbit",
+    "Search",
+    "Signature",
+    "SpecialPoint",
+    "check_bounds",
+    "check_region",
+    "check_whole",
+    "continue_orbit",
+    "continue_special",
+    "defects",
+    "doubling_cascade",
+    "find_orbit",
+    "follow_stable",
+    "initial_states",
+    "is_symmetric",
+    "load_releases",
+    "orbit_from",
+    "orbits_of",
+    "same_orbit",
+    "search_orbits",
+    "solve",
+    "switch_branch",
+]

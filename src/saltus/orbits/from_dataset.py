@@ -1,0 +1,87 @@
+"""Orbits from the dataset of a branch or of a curve: what is kept of each is all that it is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.orbits.load_release import load_releases
+from saltus.orbits.newton import Solution
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.problem import Problem
+from saltus.orbits.resting import resting_orbit
+from saltus.orbits.signature import Signature
+from saltus.systems import System
+
+if TYPE_CHECKING:
+    import xarray
+
+NEEDED = ("parameter", "unknowns")
+
+
+def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
+    """The orbits along `point` of a dataset that `Branch.to_xarray` or `Locus.to_xarray` made, bit for bit, in order.
+
+    Nothing is solved again: the equations are evaluated at the unknowns as they are kept, and orbits that rest are flown from
+    their first release. `continue_orbit` goes on from any.
+
+    Raises:
+        ParameterError: a dataset of something else; a model of one's own that is not registered (`saltus.register`).
+    """
+    missing = [name for name in NEEDED if name not in dataset] + [name for name in ("system", "tol") if name not in dataset.attrs]
+    if missing:
+        raise ParameterError(
+            f"orbits_of takes the dataset of a branch or of a curve of special points; this one lacks {missing[0]!r}"
+        )
+    system, tol = System.from_json(dataset.attrs["system"]), float(dataset.attrs["tol"])
+    if "releases" in dataset:
+        return _resting_orbits(dataset, system)
+    paths = tuple(map(str, dataset["path"].values)) if "path" in dataset.coords else (str(dataset.attrs["path"]),)
+    values = np.atleast_2d(dataset["parameter"].values.T).T
+    problems: dict[Signature, Problem] = {}
+    orbits = []
+    for signature, row, value in zip(_signatures(dataset), dataset["unknowns"].values, values, strict=True):
+        if signature not in problems:
+            problems[signature] = Problem(system, signature, paths, tol)
+        orbits.append(_orbit(problems[signature], row, value))
+    return orbits
+
+
+def _signatures(dataset: xarray.Dataset) -> list[Signature]:
+    """The signature of each orbit: of a branch one a point, of a curve one for all."""
+    if "sides" not in dataset:
+        one, sides = dataset.attrs, np.atleast_1d(dataset.attrs["sides"])
+        return [_signature(sides, one["periods"], one["symmetric"], one["side"])] * dataset.sizes["point"]
+    columns = (dataset[name].values for name in ("sides", "periods", "symmetric", "side"))
+    return [_signature(*row) for row in zip(*columns, strict=True)]
+
+
+def _signature(sides: np.ndarray, periods: Any, symmetric: Any, side: Any) -> Signature:
+    """Sides are filled up with 0, which is none."""
+    return Signature(tuple(int(s) for s in sides if s), int(periods), bool(symmetric), int(side))
+
+
+def _orbit(problem: Problem, row: np.ndarray, value: np.ndarray) -> PeriodicOrbit:
+    unknowns, values = row[: problem.size].copy(), value.astype(float)
+    equations = problem.evaluate(unknowns, values, look=True)
+    if equations is None:
+        raise ParameterError(
+            f"the motion of the orbit at {problem.paths[0]} = {values[0]:g} cannot be followed: the file is damaged"
+        )
+    return PeriodicOrbit(problem, Solution(unknowns, values, equations, 0))
+
+
+def _resting_orbits(dataset: xarray.Dataset, system: System) -> list[PeriodicOrbit]:
+    """The orbits of a family that rests for a part of its period: the load's release that they begin with says all."""
+    path, columns = str(dataset.attrs["path"]), ("parameter", "periods")
+    orbits: list[PeriodicOrbit] = []
+    for first, value, periods in zip(dataset["releases"].values[:, 0], *(dataset[name].values for name in columns), strict=True):
+        here = system.with_({path: float(value)})
+        nearest = min(load_releases(here), key=lambda release: abs(release.time - first), default=None)
+        orbit = resting_orbit(Problem(here, Signature((), 1), (path,)), nearest, int(periods)) if nearest else None
+        if orbit is None:
+            raise ParameterError(f"no orbit rests at {path} = {value:g}: the file is damaged, or of another version of saltus")
+        orbits.append(orbit)
+    return orbits

@@ -1,0 +1,1 @@
+"""The numbers and statements of the paper beside what is computed here."""

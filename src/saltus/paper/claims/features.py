@@ -1,0 +1,122 @@
+"""What a spectrum or a diagram shows, as numbers, from its DataTree alone: peaks, detached loops, coexisting motions, onsets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from saltus.plots import pieces, runs
+
+PROMINENT = 0.05  # of the highest amplitude, by which a resonance rises above the valleys beside it
+FREE_ENDS = ("closes", "bound")  # of a branch that hangs on no other
+
+
+def named_branches(spectrum: Any) -> Iterator[tuple[str, Any]]:
+    """(name, Dataset) of every branch, in order."""
+    for name in sorted(spectrum.children):
+        if name.startswith("branch_"):
+            yield name, spectrum[name].to_dataset()
+
+
+def within(spectrum: Any, branch: Any) -> np.ndarray:
+    """Which points lie within the study's range: families of longer periods are followed beyond."""
+    low, high = spectrum.attrs["bounds"]
+    values = branch["parameter"].values
+    return np.asarray((values >= low) & (values <= high))
+
+
+def main_branch(spectrum: Any) -> Any:
+    """The period-1 branch that covers most of the range."""
+    return max((b for _, b in named_branches(spectrum) if int(b["periods"][0]) == 1), key=lambda b: np.ptp(b["parameter"].values))
+
+
+def detached(spectrum: Any) -> list[tuple[str, Any]]:
+    """The branches that no special point ties to another one and that reach into the range, without the main one."""
+    found = []
+    for name, branch in named_branches(spectrum):
+        free = all(str(end).startswith(FREE_ENDS) for end in np.atleast_1d(branch.attrs["ends"]))
+        same = branch.equals(main_branch(spectrum))
+        if branch.attrs["origin"] == "start" and free and not same and within(spectrum, branch).any():
+            found.append((name, branch))
+    return found
+
+
+def peaks(branch: Any, share: float = PROMINENT) -> np.ndarray:
+    """(parameter, amplitude, rise) of the maxima along a branch that rise by a share of the highest one, (n, 3)."""
+    from scipy.signal import find_peaks
+
+    x, y = branch["parameter"].values, branch["amplitude"].values
+    at, facts = find_peaks(y, prominence=share * y.max())
+    rows = np.stack([x[at], y[at], facts["prominences"]], axis=1)
+    return np.asarray(rows[np.argsort(rows[:, 0])])
+
+
+def superharmonic(branch: Any, share: float = PROMINENT) -> np.ndarray:
+    """The peaks at frequencies below 2/3 of that of the highest one, (n, 3): primary resonance is one to one, these are not."""
+    top = float(branch["parameter"].values[int(np.argmax(branch["amplitude"].values))])
+    found = peaks(branch, share)
+    return np.asarray(found[found[:, 0] < 2 / 3 * top])
+
+
+def amplitudes_at(branch: Any, value: float, stable: bool | None = None) -> np.ndarray:
+    """The amplitudes with which the line of a branch passes a value of the parameter, of (un)stable motions only if said so."""
+    return passing(list(pieces(branch)), value, stable)
+
+
+def passing(lines: list[Any], value: float, stable: bool | None = None) -> np.ndarray:
+    """The same of the lines of one or more branches, as `pieces` gives them."""
+    found = [np.empty(0)]
+    for holds, x, y in lines:
+        if stable in (None, holds):
+            i = np.flatnonzero(_passes(x, value))
+            found.append(y[i] + (value - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i]))
+    return np.concatenate(found)
+
+
+def _passes(x: np.ndarray, value: Any) -> np.ndarray:
+    """Which steps from x[i] to x[i + 1] contain a value, or the values (n, 1), their lower ends counted in."""
+    return np.asarray((np.minimum(x[:-1], x[1:]) <= value) & (value < np.maximum(x[:-1], x[1:])))
+
+
+def stable_motions(spectrum: Any, values: np.ndarray) -> np.ndarray:
+    """How many stable periodic motions coexist at values of the parameter (n,), mirror images counted once, (n,)."""
+    values = np.asarray(values, dtype=float)
+    number = np.zeros(values.shape, dtype=int)
+    for _, branch in named_branches(spectrum):
+        for stable, x, _ in pieces(branch):
+            if stable:
+                number += _passes(x, values[:, None]).sum(axis=1)
+    return number
+
+
+def first_fold(branch: Any) -> tuple[float, float]:
+    """(parameter, amplitude) at which a branch begins: its fold of least parameter, nan where it has none."""
+    kinds = branch["kind"].values if "kind" in branch else np.empty(0)
+    folds = np.flatnonzero(kinds == "LP")
+    if not folds.size:
+        return (np.nan, np.nan)
+    least = folds[int(np.argmin(branch["special_parameter"].values[folds]))]
+    return float(branch["special_parameter"][least]), float(branch["special_amplitude"][least])
+
+
+def count(spectrum: Any, kind: str) -> int:
+    """How many special points of a kind lie on all branches within the range."""
+    low, high = spectrum.attrs["bounds"]
+    return sum(
+        int(((b["kind"] == kind) & (b["special_parameter"] >= low) & (b["special_parameter"] <= high)).sum())
+        for _, b in named_branches(spectrum)
+        if "kind" in b
+    )
+
+
+def turning(branch: Any) -> np.ndarray:
+    """The parameters of the folds at which the stability changes: there motions jump, (n,)."""
+    if "kind" not in branch:
+        return np.empty(0)
+    folds = branch["special_parameter"].values[branch["kind"].values == "LP"]
+    lines = list(runs(branch))
+    meets = [one[-1, 0] for (before, _, one), (after, _, _) in pairwise(lines) if before != after]
+    return np.array([fold for fold in folds if fold in meets])

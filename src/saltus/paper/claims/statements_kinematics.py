@@ -1,0 +1,203 @@
+"""Section 2: geometry, kinematics and dimensionless numbers of the unit cell (errata 1, 2, 3, 13, 19, 20)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from saltus.paper.claims.claim import Claim, check, compare
+from saltus.paper.provenance import dataset
+
+CELLS = ((0.5, 1.2), (0.8, 1.4), (1.1, 0.9), (0.6, 1.9))  # alpha0, beta0, rad
+
+
+def compute() -> Any:
+    """Largest residuals over several cells and openings."""
+    rows = [_cell(*angles) for angles in CELLS]
+    worst = {name: max(row[name] for row in rows) for name in rows[0]}
+    values = {**worst, **_limits(), **_dimensions()}
+    return dataset({name: ((), value) for name, value in values.items()}, what="residuals of the kinematics")
+
+
+def _cell(alpha0: float, beta0: float) -> dict[str, float]:
+    from saltus.systems import UnitCell
+
+    cell = UnitCell(alpha0=alpha0, beta0=beta0)
+    theta = np.linspace(1e-3, 0.95 * cell.line_limit, 60)
+    phi = np.asarray(cell.phi(theta))
+    chi_printed = math.sin(2 * alpha0 + beta0) / math.sin(alpha0 + beta0)
+    base = cell.psi / (2 * cell.lambda_)
+    misread = math.sin(beta0**2) / (2 * math.sin(alpha0) * math.sin(alpha0 + beta0))
+    exact = np.cos(cell.alpha_of_phi(phi))
+    return {
+        "chi_printed": abs(base + chi_printed - math.cos(alpha0)),
+        "chi_corrected": abs(base + cell.chi - math.cos(alpha0)),
+        "psi_misread": abs(misread / (2 * cell.lambda_) + cell.chi - math.cos(alpha0)),
+        "theta_1_drop": float((cell.beta_of_phi(phi) - beta0).max()),
+        "theta_1_corrected": float(abs(cell.theta(phi, layer=1) - theta).max()),
+        "configalpha_printed": float(abs(_cos_alpha(cell, beta0 - theta, chi_printed) - exact).max()),
+        "configalpha_corrected": float(abs(_cos_alpha(cell, beta0 + theta, cell.chi) - exact).max()),
+        **_drawn(cell, theta[::10]),
+    }
+
+
+def _cos_alpha(cell: Any, angle: np.ndarray, chi: float) -> np.ndarray:
+    """cos(alpha_j) of `configalpha` with the given argument of its cosine and the given chi."""
+    lowering = math.cos(cell.beta0) - np.cos(angle)
+    root = np.sqrt(np.abs(cell.psi / (lowering + cell.psi)))
+    return root * (lowering + 2 * cell.lambda_ * chi + cell.psi) / (2 * cell.lambda_)
+
+
+def _drawn(cell: Any, openings: np.ndarray) -> dict[str, float]:
+    """The constructed positions: lengths of the bars, angles alpha_j, displacements xi_j and heights eta_j."""
+    lengths, angles, places = 0.0, 0.0, 0.0
+    for one, two in zip(openings, -openings[::-1], strict=True):
+        layout = cell.layout(float(one), float(two))
+        bars = [np.diff(layout.segment(pair), axis=0)[0] for pair in layout.bars]
+        wanted = [cell.base, 1, 1, cell.base, 1, 1, cell.base, *[cell.lambda_] * 4]
+        lengths = max(lengths, *(abs(float(np.hypot(*bar)) - length) for bar, length in zip(bars, wanted, strict=True)))
+        run = layout.middle_right - layout.lower_left
+        angles = max(angles, abs(math.atan2(run[1], run[0]) - float(cell.alpha(one))))
+        offset = math.sin(cell.alpha0 - cell.beta0) / (2 * math.sin(cell.alpha0))
+        step = layout.mass_2 - layout.mass_1
+        found = (layout.mass_1[0] + offset, layout.mass_1[1], step[0] - math.cos(cell.beta0), step[1])
+        stated = (cell.xi(one), cell.eta(one), cell.xi(two), cell.eta(two))
+        places = max(places, *(abs(a - b) for a, b in zip(found, stated, strict=True)))
+    return {"bar_lengths": lengths, "alpha_drawn": angles, "places": places}
+
+
+def _limits() -> dict[str, float]:
+    """The straight line and the kinematic limit at beta0 = 80 degrees."""
+    from saltus.systems import UnitCell
+
+    cell = UnitCell(alpha0=math.radians(45), beta0=math.radians(80))
+    theta = np.linspace(0, cell.kinematic_limit, 2001)
+    return {
+        "line_limit": math.degrees(cell.line_limit),
+        "height_on_line": float(cell.eta(cell.line_limit)),
+        "kinematic_limit": math.degrees(cell.kinematic_limit),
+        "phi_at_limit": float(cell.phi(cell.kinematic_limit)),
+        "cosine_needed_beyond": float(math.cos(cell.beta0) - np.cos(cell.beta0 + cell.kinematic_limit + 0.01)),
+        "largest_displacement": float(np.max(cell.xi(theta))),
+        "bound": cell.max_displacement,
+        "second_line": math.degrees(2 * math.pi - cell.beta0),
+    }
+
+
+def _dimensions() -> dict[str, float]:
+    """One cell written in seconds and in milliseconds: what changes has a dimension. tau against tau = t sqrt(M2 / K2)."""
+    from saltus.systems import PhysicalCell
+
+    seconds = PhysicalCell(length=0.2, upper_mass=1.5, upper_stiffness=3.0, upper_damping=0.07)
+    millis = PhysicalCell(length=0.2, upper_mass=1.5, upper_stiffness=3.0e-6, upper_damping=0.07e-3)
+    inertia = seconds.upper_mass * seconds.length**2
+    return {
+        "damping_printed_ratio": (millis.upper_damping / inertia) / (seconds.upper_damping / inertia),
+        "damping_ratio": millis.ratios["damping"] / seconds.ratios["damping"],
+        "tau_printed": math.sqrt(seconds.upper_mass / seconds.upper_stiffness) * 1.0,
+        "tau_corrected": float(seconds.time(1.0)),
+        "tau_of_frequency": 1 / math.sqrt(inertia / seconds.upper_stiffness),
+    }
+
+
+def claims(data: Any) -> list[Claim]:
+    """Section 2."""
+    r = {name: float(value) for name, value in data.to_dataset().items()}
+    cells = f"{len(CELLS)} cells"
+    return [
+        check(
+            "chi",
+            "psi_lambda_chi",
+            "With χ = sin(2α₀ + β₀)/sin(α₀ + β₀), αⱼ(φⱼ = 0) = α₀",
+            printed=r["chi_printed"],
+            corrected=r["chi_corrected"],
+            erratum=1,
+            evidence=f"residual of cos α at φ = 0 over {cells}; χ needs a factor 1/2, and ψ sin²β₀ (sin(β₀²) "
+            f"leaves {r['psi_misread']:.2f})",
+        ),
+        check(
+            "theta-definition",
+            "definition of θⱼ",
+            "θⱼ = (−1)ʲ (βⱼ − β₀), so that θ₁ ≥ 0",
+            printed=r["theta_1_drop"] <= 0,
+            corrected=r["theta_1_corrected"] < 1e-10,
+            erratum=2,
+            evidence=f"as printed θ₁ falls to −{r['theta_1_drop']:.3f} rad where βⱼ > β₀; θⱼ = −(−1)ʲ (βⱼ − β₀) "
+            "gives the angles back",
+        ),
+        check(
+            "configalpha",
+            "configalpha",
+            "αⱼ(θⱼ) in closed form agrees with αⱼ(φⱼ)",
+            printed=r["configalpha_printed"],
+            corrected=r["configalpha_corrected"],
+            erratum=3,
+            evidence=f"residual of cos α against `gen_conf` over {cells}, openings up to 0.95 of the straight line",
+        ),
+        check(
+            "geometry",
+            "gen_conf",
+            "The bars keep their lengths and the diagonals their angles αⱼ in every configuration",
+            printed=max(r["bar_lengths"], r["alpha_drawn"]),
+            evidence=f"constructed positions of all bars, {cells}",
+        ),
+        check(
+            "configdbeta",
+            "configdbeta",
+            "ξⱼ and ηⱼ as functions of θⱼ",
+            printed=r["places"],
+            evidence=f"against the constructed positions of both masses, {cells}",
+        ),
+        compare(
+            "line-limit",
+            "line_cond, section 6",
+            "A layer becomes a line segment at π − β₀ for β₀ = 80°",
+            printed="110",
+            corrected="100",
+            erratum=19,
+            unit="deg",
+            value=r["line_limit"],
+            evidence=f"the height of the layer there is η = {r['height_on_line']:.1e}",
+        ),
+        check(
+            "kinematic-limit",
+            "line_cond",
+            "Rotations have no limit, so that lines with n ≥ 2 are reached too",
+            printed=r["second_line"] <= r["kinematic_limit"],
+            corrected=r["second_line"] > r["kinematic_limit"] and abs(r["phi_at_limit"]) < 1e-6 and r["cosine_needed_beyond"] < 0,
+            erratum=20,
+            evidence=f"n = 2 would need {r['second_line']:.0f}°; at {r['kinematic_limit']:.0f}° = 2(π − β₀) the "
+            "slider closes again "
+            f"(φ = {r['phi_at_limit']:.0e}) and beyond it tan²φ would be negative",
+        ),
+        check(
+            "max-displacement",
+            "max_disp_condition",
+            "|ξⱼ| is bounded by 1 + cos β₀",
+            printed=max(0.0, r["largest_displacement"] - r["bound"]),
+            evidence=f"largest {r['largest_displacement']:.6f}, bound {r['bound']:.6f}, at the straight line",
+        ),
+        check(
+            "damping-dimension",
+            "disip_ratio",
+            "The damping ratio C₂/(M₂ l²) is dimensionless",
+            printed=r["damping_printed_ratio"] - 1,
+            corrected=r["damping_ratio"] - 1,
+            erratum=13,
+            evidence="the same cell in seconds and in milliseconds: the printed ratio changes by "
+            f"{r['damping_printed_ratio']:g}; "
+            "C₂ T/(M₂ l²) does not",
+        ),
+        check(
+            "time-scale",
+            "section 5.3, timeT",
+            "τ = t √(M₂/K₂)",
+            printed=r["tau_printed"] - r["tau_of_frequency"],
+            corrected=r["tau_corrected"] - r["tau_of_frequency"],
+            erratum=13,
+            evidence=f"l = 0.2 m, M₂ = 1.5 kg, K₂ = 3 N m: 1 s is τ = {r['tau_corrected']:.4f}, as printed "
+            f"{r['tau_printed']:.4f}",
+        ),
+    ]

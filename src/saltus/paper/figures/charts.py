@@ -1,0 +1,106 @@
+"""What Figs. 14 and 15 share: a panel is a stability chart with its exact and quasi-static borders, and what disagrees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from saltus.paper.figures import spectra
+from saltus.paper.figures.panels import each
+from saltus.plots import (
+    DOUBLE_COLUMN,
+    chart_legend,
+    curves_of,
+    draw_chart,
+    draw_closed_form,
+    draw_lines,
+    new_figure,
+    panel_label,
+    styled,
+)
+
+REGION = (2.0, 2.0)  # of the initial states
+LOWEST = -2.0  # V
+WIDEST = 0.5  # Hhat
+FAST = 2.0  # Omega from which the closed form of the onset is drawn too
+CURVES = 20  # on which motions end, at most, for one chart
+
+
+def system(beta0: float = 80.0, damping: float = 0.1, frequency: float = 1.0) -> Any:
+    """The paper's system under load (i), `loadpatha`; beta0 in degrees."""
+    from saltus.systems import Harmonic, Load, Metainterface, System
+
+    model = Metainterface(beta0=math.radians(beta0), damping=damping)
+    return System(model=model, load=Load(frequency=frequency, horizontal=Harmonic(amplitude=0.1), vertical=-0.5))
+
+
+def compute(panels: Mapping[str, Mapping[str, Any]], size: int, curves: int = CURVES, **options: Any) -> Any:
+    """A chart of `size` x `size` cells for each panel; options are those of `stability_chart`."""
+    made = each(
+        _panel, {name: {"curves": curves} | dict(values) for name, values in panels.items()}, "first", size=size, **options
+    )
+    return spectra.together(made, what="stability charts under load (i)")
+
+
+def _panel(values: Mapping[str, Any], **options: Any) -> Any:
+    return panel(**values, **options)
+
+
+def panel(
+    *, beta0: float, damping: float, frequency: float, widest: float, size: int, curves: int = CURVES, **options: Any
+) -> Any:
+    """A `saltus.studies.bordered_chart` of the paper's system."""
+    from saltus.studies import bordered_chart
+
+    here = system(beta0, damping, frequency)
+    horizontal, vertical = np.linspace(0.0, widest, size), np.linspace(LOWEST, 0.0, size)
+    tree = bordered_chart(here, curves=curves, horizontal=horizontal, vertical=vertical, **({"region": REGION} | options))
+    tree["static"].attrs |= {"what": "quasi-static borders", "saltus_version": tree["chart"].attrs["saltus_version"]}
+    tree.attrs = {"system": here.to_json(), "beta0_degrees": beta0, "damping": damping, "frequency": frequency}
+    return tree
+
+
+@styled
+def draw(data: Any, columns: int, height: float) -> Any:
+    """A chart for each panel, `columns` in a row, all in one scale of colours."""
+    panels = list(data.children.items())
+    figure = new_figure(DOUBLE_COLUMN, height)
+    axes = np.atleast_1d(figure.subplots(-(-len(panels) // columns), columns, squeeze=False)).ravel()
+    top = max(float(np.nanmax(tree["chart"]["amplitude"].values, initial=1e-3)) for _, tree in panels)
+    cells, fast = None, False
+    for ax, (name, tree) in zip(axes, panels, strict=False):
+        cells = draw_chart(ax, tree["chart"].to_dataset(), top) or cells
+        draw_lines(ax, tree)
+        fast |= _closed_form(ax, tree)
+        panel_label(ax, name)
+        attrs = tree.attrs
+        ax.set_title(
+            rf"$\Omega={attrs['frequency']:g}$, $\beta_0={attrs['beta0_degrees']:g}^\circ$, $\mathcal{{C}}={attrs['damping']:g}$",
+            pad=4,
+        )
+        ax.set_xlabel(r"load amplitude $\widehat{\mathcal{H}}$")
+        ax.set_ylabel(r"vertical load $\overline{\mathcal{V}}$")
+    for ax in axes[len(panels) :]:
+        ax.remove()
+    if cells is not None:
+        bar = figure.colorbar(cells, ax=axes[: len(panels)].tolist(), fraction=0.03, pad=0.01, format="%.2g")
+        bar.set_label(r"largest $\max_\tau|\theta|$ of the stable motions (rad)")
+    chart_legend(figure, [curve for _, tree in panels for curve in curves_of(tree)], fast)
+    return figure
+
+
+def _closed_form(ax: Any, tree: Any) -> bool:
+    """Mark the onset's closed form (erratum 28) where the load is fast; returns whether it is."""
+    from saltus.theory import high_frequency_onset
+
+    frequency = float(tree.attrs["frequency"])
+    if frequency < FAST:
+        return False
+    vertical = np.linspace(LOWEST, -0.1, 20)
+    beta0, damping = math.radians(float(tree.attrs["beta0_degrees"])), float(tree.attrs["damping"])
+    onset = [high_frequency_onset(frequency, beta0=beta0, vertical=v, damping=damping, order=2) for v in vertical]
+    draw_closed_form(ax, np.array(onset), vertical)
+    return True

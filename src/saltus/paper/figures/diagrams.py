@@ -1,0 +1,81 @@
+"""What Figs. 11 to 13 share: bifurcation diagrams over the amplitude of the horizontal load, and what becomes of rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from saltus.paper.figures import spectra
+from saltus.paper.figures.panels import each
+from saltus.paper.provenance import dataset
+from saltus.plots import (
+    DOUBLE_COLUMN,
+    draw_critical,
+    draw_limits,
+    draw_response,
+    draw_zoom,
+    highest,
+    new_figure,
+    panel_label,
+    response_legend,
+    styled,
+)
+
+LEAST = 1e-3  # Hhat at which the diagrams begin: without a load nothing moves
+NEAR = 1e-3  # relative distance from Hcr at which rest is tried
+WAIT, LAST = 300, 10  # forcing periods
+
+
+def compute(frequencies: Mapping[str, float], largest: Mapping[float, float], **options: Any) -> Any:
+    """One diagram under load (i) for each frequency, up to the amplitude for it, with the fate of rest on both sides of Hcr."""
+    return spectra.together(each(_panel, frequencies, largest=largest, **options), what="bifurcation diagram under load (i)")
+
+
+def _panel(frequency: float, largest: Mapping[float, float], **options: Any) -> Any:
+    system = spectra.under_force(frequency=frequency)
+    tree = spectra.diagram(system, (LEAST, largest[frequency]), **options)
+    return spectra.with_groups(tree, {"undeformed": undeformed(system, tree.attrs["critical"])})
+
+
+def undeformed(system: Any, critical: float) -> Any:
+    """Started at rest in theta = 0 just below and just above Hcr: whether it stays there, and how far it moves much later."""
+    from saltus.flow import simulate_many
+
+    amplitudes = critical * np.array([1 - NEAR, 1 + NEAR])
+    ends = simulate_many(
+        system, theta=0.0, parameters={spectra.AMPLITUDE: amplitudes}, periods=WAIT, sample=("extrema",), last=LAST
+    )
+    moved = np.maximum(ends["overall_largest_theta"].values, -ends["overall_smallest_theta"].values)
+    late = np.maximum(ends["largest_theta"].values, -ends["smallest_theta"].values)
+    values = {"held_below": int(moved[0] == 0.0), "held_above": int(moved[1] == 0.0), "later": float(late[1].max())}
+    return dataset({name: ((), value) for name, value in values.items()}, what="rest beside Hcr", system=system)
+
+
+@styled
+def draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
+    """A panel for each frequency; an inset with what happens up to the amplitude `zoomed`, about Hcr."""
+    panels = {name: tree for name, tree in data.children.items() if name in frequencies}
+    figure = new_figure(DOUBLE_COLUMN, 25.0 + 80.0 * len(panels))
+    axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
+    for ax, (name, tree) in zip(axes, panels.items(), strict=True):
+        _, high = tree.attrs["bounds"]
+        ax.set_xlim(0.0, high)
+        ax.set_ylim(0.0, 1.08 * highest(tree, 0.0, high))
+        frame(ax, tree)
+        panel_label(ax, name)
+        ax.set_title(rf"$\Omega={frequencies[name]:g}$", pad=4)
+        ax.set_ylabel(r"$\max_\tau|\theta|$ (rad)")
+        draw_response(ax, tree)
+        inset = draw_zoom(ax, tree, (0.24, 0.39), (0.0, zoomed, 0.0, 1.1 * highest(tree, 0.0, zoomed)))
+        draw_critical(inset, tree.attrs["critical"])
+    response_legend(figure, list(panels.values()), critical=True)
+    return figure
+
+
+def frame(ax: Any, tree: Any, mirrored: bool = False) -> None:
+    """The limits of the mechanism, the quasi-static bifurcation and the name of the parameter."""
+    draw_limits(ax, tree.attrs["line"], tree.attrs["farthest"], mirrored=mirrored)
+    draw_critical(ax, tree.attrs["critical"])
+    ax.set_xlabel(r"load amplitude $\widehat{\mathcal{H}}$")

@@ -1,0 +1,207 @@
+"""Fig. 8: loading paths in the plane of the loads, and the quasi-static monostable domain with both of its borders."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from saltus.paper.claims.claim import Claim, check
+from saltus.paper.figures.figure import PaperFigure
+from saltus.paper.provenance import dataset, tree
+from saltus.plots import DOUBLE_COLUMN, draw_domain, draw_path, new_figure, panel_label, styled
+
+SEGMENTS = ((0.05, -0.5, 0.0), (0.2, -0.7, 0.0), (0.16, -1.2, 0.0))  # Hhat, Vbar, Vhat of load (i)
+ELLIPSES = ((0.05, -0.5, 0.25), (0.2, -0.5, 0.25))  # of load (iii)
+LOWEST = -1.6
+
+
+def compute(beta0: float = 80.0) -> Any:
+    """Both borders, the paths, and the counts of equilibria that prove which border is the true one; `beta0` in degrees."""
+    groups = {
+        "borders": _borders(np.deg2rad(beta0)),
+        "i": _paths(np.deg2rad(beta0), SEGMENTS, "load (i), `loadpatha`"),
+        "iii": _paths(np.deg2rad(beta0), ELLIPSES, "load (iii), `loadpathb`"),
+        "numbers": _numbers(),
+    }
+    return tree(groups, what="loading paths and the quasi-static monostable domain", beta0_degrees=beta0)
+
+
+def _borders(beta0: float) -> Any:
+    from saltus.theory import critical_horizontal, fold_horizontal, subcritical_vertical, unloaded_fold
+
+    vertical = np.linspace(LOWEST, 0.0, 321)
+    start, lowest = subcritical_vertical(beta0), unloaded_fold(beta0)[0]
+    folded = start + (lowest - start) * np.linspace(0, 1, 121) ** 2
+    return dataset(
+        {
+            "critical": (
+                "vertical",
+                critical_horizontal(beta0, vertical),
+                "1",
+                "Hcr, where theta = 0 is lost (the paper's border)",
+            ),
+            "fold": ("folded", fold_horizontal(beta0, folded), "1", "H at the fold of deformed equilibria (erratum 23)"),
+        },
+        {
+            "vertical": ("vertical", vertical, "1", "V"),
+            "folded": ("folded", folded, "1", "V from -sin(beta0) to where the fold reaches H = 0"),
+        },
+        what="borders of the monostable domain",
+        subcritical_below=start,
+        deformed_without_h_below=lowest,
+    )
+
+
+def _paths(beta0: float, loads: tuple[tuple[float, float, float], ...], what: str) -> Any:
+    from saltus.systems import Harmonic, Load, Metainterface, System
+    from saltus.theory import is_monostable, paper_monostable
+
+    phase = np.linspace(0, 2 * np.pi, 241)
+    rows, systems = [], []
+    for amplitude, mean, swing in loads:
+        vertical = Harmonic(mean=mean, amplitude=swing, phase=np.pi / 2) if swing else mean
+        load = Load(frequency=1.0, horizontal=Harmonic(amplitude=amplitude), vertical=vertical)
+        systems.append(System(model=Metainterface(beta0=beta0), load=load).to_json())
+        rows.append([np.broadcast_to(channel(phase), phase.shape) for channel in (load.horizontal, load.vertical)])
+    horizontal, vertical = np.moveaxis(np.array(rows), 1, 0)
+    return dataset(
+        {
+            "horizontal": (("path", "phase"), horizontal, "1", "H"),
+            "vertical": (("path", "phase"), vertical, "1", "V"),
+            "within": ("path", is_monostable(beta0, horizontal, vertical).all(axis=1), "1", "whole path in the true domain"),
+            "within_printed": ("path", paper_monostable(beta0, horizontal, vertical).all(axis=1), "1", "in the printed domain"),
+            "system": ("path", np.array(systems), "1", "the System as JSON"),
+        },
+        {"phase": ("phase", phase, "rad", "Omega tau")},
+        what=what,
+    )
+
+
+def _numbers() -> Any:
+    """Erratum 23 in numbers: the fold and Hcr at V = -1.2, and how many equilibria there are on each side of the fold."""
+    from saltus.flow import Stop, simulate
+    from saltus.systems import Load, Metainterface, System
+    from saltus.theory import critical_horizontal, equilibria, fold_horizontal, unloaded_fold
+
+    beta0, vertical = np.deg2rad(80.0), -1.2
+    fold = float(fold_horizontal(beta0, vertical))
+
+    critical = float(critical_horizontal(beta0, vertical))
+
+    def under(horizontal: float) -> System:
+        return System(model=Metainterface(beta0=beta0), load=Load(horizontal=horizontal, vertical=vertical))
+
+    def count(horizontal: float) -> int:
+        return len(equilibria(under(horizontal)))
+
+    def held(horizontal: float) -> int:
+        return int(simulate(under(horizontal), theta=0.0, duration=100.0).stop is Stop.REST)
+
+    values = {
+        "fold": fold,
+        "critical": critical,
+        "held_below": held(critical * 0.999),
+        "held_above": held(critical * 1.001),
+        "count_below_fold": count(fold * 0.999),
+        "count_above_fold": count(fold * 1.001),
+        "lowest_80": unloaded_fold(beta0)[0],
+        "lowest_60": unloaded_fold(np.deg2rad(60.0))[0],
+        "count_at_rest_above": count_unloaded(beta0, unloaded_fold(beta0)[0] + 1e-3),
+        "count_at_rest_below": count_unloaded(beta0, unloaded_fold(beta0)[0] - 1e-3),
+    }
+    return dataset({name: ((), value) for name, value in values.items()}, what="numbers of erratum 23")
+
+
+def count_unloaded(beta0: float, vertical: float) -> int:
+    """How many equilibria there are under V alone."""
+    from saltus.systems import Load, Metainterface, System
+    from saltus.theory import equilibria
+
+    return len(equilibria(System(model=Metainterface(beta0=beta0), load=Load(vertical=vertical))))
+
+
+@styled
+def draw(data: Any) -> Any:
+    """(a) load (i), (b) load (iii), both over the domain."""
+    figure = new_figure(DOUBLE_COLUMN, 86.0)
+    axes = figure.subplots(1, 2, sharey=True)
+    for ax, name, label in zip(axes, ("i", "iii"), "ab", strict=True):
+        draw_domain(ax, data["borders"], label=label == "a")
+        draw_path(ax, data[name])
+        ax.set_xlim(-0.33, 0.33)
+        ax.set_ylim(LOWEST, 0.25)
+        ax.set_xlabel(r"horizontal load $\mathcal{H}$")
+        panel_label(ax, label)
+    axes[0].set_ylabel(r"vertical load $\mathcal{V}$")
+    return figure
+
+
+def claims(data: Any) -> list[Claim]:
+    """The domain (erratum 23) and the paths."""
+    numbers = {name: float(value) for name, value in data["numbers"].to_dataset().items()}
+    paths_i, paths_iii = data["i"], data["iii"]
+    printed_alone = numbers["count_above_fold"] == 1 or numbers["fold"] >= numbers["critical"]
+    counts = f"{numbers['count_below_fold']:.0f} equilibria just below, {numbers['count_above_fold']:.0f} just above"
+    wrong = int((paths_i["within_printed"] & ~paths_i["within"]).sum())
+    return [
+        check(
+            "fig08-domain",
+            "Fig. 8, section 6",
+            "The undeformed state is the only equilibrium wherever V cos β₀ < −|H| sin β₀",
+            printed=bool(printed_alone),
+            corrected=numbers["count_below_fold"] == 1
+            and numbers["count_above_fold"] > 1
+            and numbers["fold"] < numbers["critical"],
+            erratum=23,
+            evidence=f"β₀ = 80°, V = −1.2: fold of deformed equilibria at H = {numbers['fold']:.5f} ({counts}), below Hcr = "
+            f"{numbers['critical']:.5f}; {wrong} of the drawn paths lies in the printed domain but not in the true one",
+        ),
+        check(
+            "fig08-domain-without-h",
+            "Fig. 8, section 6",
+            "Without a horizontal load, the undeformed state alone is an equilibrium for every V cos β₀ < 0",
+            printed=numbers["count_at_rest_below"] == 1,
+            corrected=numbers["count_at_rest_above"] == 1 and numbers["count_at_rest_below"] > 1,
+            erratum=23,
+            evidence=f"deformed equilibria exist for V < {numbers['lowest_80']:.5f} at β₀ = 80° and V < "
+            f"{numbers['lowest_60']:.5f} at 60°",
+        ),
+        check(
+            "fig08-paths",
+            "Fig. 8",
+            "By its amplitude, a loading path lies within the monostable domain or leaves it",
+            printed=_both(paths_i["within"].values) and _both(paths_iii["within"].values),
+            evidence=f"(i): within {paths_i['within'].values.tolist()}; (iii): within {paths_iii['within'].values.tolist()}",
+        ),
+        check(
+            "fig08-critical",
+            "section 6",
+            "The undeformed state is held exactly where V cos β₀ < −|H| sin β₀",
+            printed=numbers["held_below"] == 1 and numbers["held_above"] == 0,
+            evidence="simulated from θ = 0 at rest under H = 0.999 Hcr and 1.001 Hcr, Hcr = |V / tan β₀| = "
+            f"{numbers['critical']:.5f} (β₀ = 80°, V = −1.2)",
+        ),
+    ]
+
+
+def _both(flags: np.ndarray) -> bool:
+    return bool(flags.any() and not flags.all())
+
+
+FIGURE = PaperFigure(
+    name="fig08",
+    title="Fig. 8: loading paths and the quasi-static monostable domain",
+    caption=(
+        "Loading paths for β₀ = 80°: (a) load (i), horizontal force at constant vertical load; (b) load (iii), "
+        "both forces. Blue solid: "
+        "paths within the monostable domain (shaded); red dashed: paths that leave it. The paper's border V cos β₀ = −|H| sin β₀ "
+        "(thin solid) is where the undeformed state is lost; for V < −sin β₀ the domain ends earlier, at a fold "
+        "of deformed equilibria "
+        "(heavy dotted, erratum 23), so that in the hatched region, which the paper counts as monostable, deformed equilibria "
+        "coexist with the undeformed one. The path at V = −1.2 lies in the printed domain and not in the true one."
+    ),
+    compute=compute,
+    draw=draw,
+    claims=claims,
+)

@@ -1,0 +1,45 @@
+"""Fig. 15: stability charts under load (i) at Omega = 1 for another angle, and for less and more damping."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from saltus.paper.claims.claim import Claim
+from saltus.paper.claims.statements_charts import over_parameters
+from saltus.paper.figures import charts
+from saltus.paper.figures.figure import PaperFigure
+
+REFERENCE = "reference"  # Fig. 14 (d) again, which all are compared with
+PANELS: dict[str, dict[str, Any]] = {
+    name: {"beta0": beta0, "damping": damping, "frequency": 1.0, "widest": charts.WIDEST, "curves": 12}
+    for name, beta0, damping in (("a", 60.0, 0.1), ("b", 80.0, 0.05), ("c", 80.0, 0.15), (REFERENCE, 80.0, 0.1))
+}
+
+
+def compute(panels: Mapping[str, Mapping[str, Any]] = PANELS, size: int = 101, **options: Any) -> Any:
+    """One chart for each system; options are those of `stability_chart`."""
+    return charts.compute(panels, size, **options)
+
+
+def draw(data: Any) -> Any:
+    """(a) to (c), a panel for each system."""
+    return charts.draw(data.filter(lambda node: REFERENCE not in node.path.split("/")), columns=2, height=175.0)
+
+
+def claims(data: Any) -> list[Claim]:
+    """The statements of the text on Fig. 15."""
+    return over_parameters(data)
+
+
+FIGURE = PaperFigure(
+    name="fig15",
+    title="Fig. 15: stability charts for another angle, less and more damping",
+    caption=(
+        "As Fig. 14 for Ω = 1: (a) β₀ = 60°, C = 0.1; (b) β₀ = 80°, C = 0.05; (c) β₀ = 80°, C = 0.15. The reference, β₀ = 80° "
+        "and C = 0.1, is Fig. 14 (d)."
+    ),
+    compute=compute,
+    draw=draw,
+    claims=claims,
+)

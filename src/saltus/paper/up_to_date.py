@@ -1,0 +1,107 @@
+"""Whether an output is up to date: a key from what made it, and the fingerprints of what it left."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import json
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import saltus
+from saltus.files import write_text
+from saltus.paper.claims.claim import Claim, Verdict
+from saltus.paper.figures.figure import PaperFigure
+
+FOLDER = ".saltus"  # inside the output folder
+
+
+def key(figure: PaperFigure) -> str:
+    """A fingerprint of saltus' version, of the sources of the figure and of what it imports of saltus, and of its parameters."""
+    digest = hashlib.sha256(saltus.__version__.encode())
+    for module in sorted(closure(figure.module)):
+        digest.update(module.encode() + b"\0" + _source(module) + b"\0")
+    digest.update(json.dumps(dict(figure.parameters), sort_keys=True).encode())
+    return digest.hexdigest()
+
+
+@cache
+def closure(module: str) -> frozenset[str]:
+    """`module` and every module of saltus that it imports, directly or not, at its top or inside functions."""
+    found: set[str] = set()
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name in found or _path(name) is None:
+            continue
+        found.add(name)
+        waiting += _imports(name)
+    return frozenset(found)
+
+
+@cache
+def _imports(module: str) -> list[str]:
+    names: list[str] = []
+    for node in ast.walk(ast.parse(_source(module))):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return [name for name in names if name.startswith("saltus.")]
+
+
+@cache
+def _path(module: str) -> Path | None:
+    try:
+        spec = importlib.util.find_spec(module)
+    except ModuleNotFoundError:
+        return None
+    return Path(spec.origin) if spec is not None and spec.origin else None
+
+
+@cache
+def _source(module: str) -> bytes:
+    path = _path(module)
+    return path.read_bytes() if path else b""
+
+
+def up_to_date(figure: PaperFigure, folder: Path) -> bool:
+    """Whether every output is there, unchanged, and made by what `key` stands for."""
+    record = read(figure, folder)
+    if record is None or record.get("key") != key(figure):
+        return False
+    prints = record.get("files", {})
+    return "claims" in record and all(name in prints and fingerprint(folder / name) == prints[name] for name in figure.files())
+
+
+def read(figure: PaperFigure, folder: Path) -> dict[str, Any] | None:
+    """The record that `write` left, or None where there is none that can be read."""
+    try:
+        record = json.loads((folder / FOLDER / f"{figure.name}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return record if isinstance(record, dict) else None
+
+
+def claims(figure: PaperFigure, folder: Path) -> list[Claim]:
+    """The claims of a figure that is up to date, as recorded when it was made."""
+    rows = (read(figure, folder) or {}).get("claims", [])
+    return [Claim(**{**row, "verdict": Verdict(row["verdict"])}) for row in rows]
+
+
+def write(figure: PaperFigure, folder: Path, made: Iterable[Claim]) -> None:
+    """Record what made the figure's outputs, their fingerprints and claims; last, so that an interrupted run leaves none."""
+    files = {name: fingerprint(folder / name) for name in figure.files()}
+    record = {"key": key(figure), "files": files, "claims": [claim.to_dict() for claim in made]}
+    write_text(folder / FOLDER / f"{figure.name}.json", json.dumps(record, indent=1))
+
+
+def fingerprint(path: Path) -> str | None:
+    """The SHA-256 of a file, or None where there is none."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return None

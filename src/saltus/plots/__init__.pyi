@@ -1,0 +1,70 @@
+from .chart import chart_legend, curves_of, data_is_tree, draw_chart, draw_closed_form, draw_lines
+from .diagram import POINTS
+from .energy_space import draw_space
+from .impact_approach import draw_history, draw_phase
+from .loading_paths import draw_domain, draw_path
+from .motion import draw_motion
+from .peak_ratio import draw_family
+from .phase_portrait import draw_portrait
+from .response import (
+    draw_bands,
+    draw_critical,
+    draw_limits,
+    draw_response,
+    draw_zoom,
+    highest,
+    lowest,
+    pieces,
+    response_legend,
+    runs,
+)
+from .rocking import draw_errors, draw_jump, draw_periods
+from .style import DOUBLE_COLUMN, FAINT, SINGLE_COLUMN, STABLE, UNSTABLE, new_figure, panel_label, style, styled
+from .time_histories import draw_histories
+from .unit_cell import draw_cell, draw_frames, label_deformed, label_heights, label_undeformed
+
+__all__ = [
+    "DOUBLE_COLUMN",
+    "FAINT",
+    "POINTS",
+    "SINGLE_COLUMN",
+    "STABLE",
+    "UNSTABLE",
+    "chart_legend",
+    "curves_of",
+    "data_is_tree",
+    "draw_bands",
+    "draw_cell",
+    "draw_chart",
+    "draw_closed_form",
+    "draw_critical",
+    "draw_domain",
+    "draw_errors",
+    "draw_family",
+    "draw_frames",
+    "draw_histories",
+    "draw_history",
+    "draw_jump",
+    "draw_limits",
+    "draw_lines",
+    "draw_motion",
+    "draw_path",
+    "draw_periods",
+    "draw_phase",
+    "draw_portrait",
+    "draw_response",
+    "draw_space",
+    "draw_zoom",
+    "highest",
+    "label_deformed",
+    "label_heights",
+    "label_undeformed",
+    "lowest",
+    "new_figure",
+    "panel_label",
+    "pieces",
+    "response_legend",
+    "runs",
+    "style",
+    "styled",
+]

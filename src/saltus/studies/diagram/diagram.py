@@ -1,0 +1,148 @@
+"""Response spectra and bifurcation diagrams: every periodic orbit that a search finds, followed along one parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.checks import check_number
+from saltus.errors import ParameterError
+from saltus.orbits import REGION, STEP, check_region, search_orbits
+from saltus.studies.checks import check_diagram
+from saltus.studies.diagram.bands import chaotic_bands
+from saltus.studies.diagram.branch_set import Atlas
+from saltus.studies.diagram.diagram_dataset import diagram_tree
+from saltus.systems import System
+
+if TYPE_CHECKING:
+    import xarray
+
+VALUES = 25  # of the parameter at which is searched
+STARTS = 48  # initial states at each
+BANDS = 121  # values at which chaos is looked for
+SEARCHED, FOLLOWED, CONFIRMED = 0.3, 0.7, 0.9  # shares of the work done after the search, the branches, the bands
+
+
+def response_spectrum(
+    system: System,
+    path: str = "load.frequency",
+    bounds: tuple[float, float] = (0.1, 3.0),
+    **options: Any,
+) -> xarray.DataTree:
+    """All branches of periodic orbits along the forcing frequency that a search finds: `diagram` says how.
+
+    The paper's Figs. 9 and 10. Options are those of `diagram`.
+    """
+    return diagram(system, path, bounds, **options)
+
+
+def bifurcation_diagram(
+    system: System,
+    path: str = "load.horizontal.amplitude",
+    bounds: tuple[float, float] = (0.0, 3.0),
+    **options: Any,
+) -> xarray.DataTree:
+    """All branches of periodic orbits along a load's amplitude that a search finds: `diagram` says how.
+
+    The paper's Figs. 11 to 13. Options are those of `diagram`.
+    """
+    return diagram(system, path, bounds, **options)
+
+
+def diagram(
+    system: System,
+    path: str,
+    bounds: tuple[float, float],
+    *,
+    max_period: int = 6,
+    values: Iterable[float] | None = None,
+    starts: int = STARTS,
+    region: tuple[float, float] = REGION,
+    seed: int = 0,
+    repelling: int = 1,
+    switch: bool = True,
+    step: float = STEP,
+    bands: int = BANDS,
+    progress: Callable[[float, str], object] | None = None,
+) -> xarray.DataTree:
+    """Search, follow, switch and confirm.
+
+    At each of `values` (25 by default) motions from `starts` states settle; every orbit on which they do, and those of up to
+    `repelling` forcing periods that repel, is followed along the parameter unless a branch goes through it already. At every
+    PD and BPC the new branch is followed too, up to `max_period` forcing periods. Families of more than one forcing period are
+    followed beyond the bounds, to where they close or end. Every orbit is confirmed by the event-driven flow over a period, the
+    stable ones over 20.
+
+    Args:
+        system: what moves.
+        path: dotted path of the parameter.
+        bounds: its range.
+        max_period: the longest period, in forcing periods.
+        values, starts, region, seed: where is searched, see `search_orbits`; values within the bounds.
+        repelling: up to which period repelling orbits are searched for.
+        switch: whether branches are followed that are born at special points.
+        step: the longest step along a branch.
+        bands: at how many values, from the first to the last, chaos is looked for (0: nowhere), see `chaotic_bands`.
+        progress: called with the fraction done and what is being done.
+
+    Returns:
+        A DataTree: the search in the attributes and in `search`; `branch_000`, ... (see `branch_dataset.py`, with `defect` after
+        a period and, for stable orbits, `kept` after 20); `attractors`, what simulation settled on; `bands` of chaos with
+        brackets of their edges and the special points there, `exponents` and `strobes` (the stroboscopic points of what was
+        simulated to find them: the brute-force diagram). The attribute `left` counts the special points at which a family is born
+        that was not followed: within the bounds the branch covers less than a fiftieth of the range, or the orbits have less than
+        a hundredth of its largest amplitude, or there were 30 branches already. An orbit that its multipliers call stable, but
+        that does not stay where it is for 20 periods, is not called so; `unconfirmed` counts these on each branch.
+
+    Raises:
+        ParameterError: an argument without meaning.
+    """
+    low, high = check_diagram(
+        system, path, bounds, max_period=max_period, starts=starts, seed=seed, repelling=repelling, bands=bands
+    )
+    check_number("step", step, above=0.0)
+    grid, region = _values((low, high), values), check_region(region)
+    if not (progress is None or callable(progress)):
+        raise ParameterError(f"progress must be a function of the fraction done and of what is being done, got {progress!r}")
+    say = progress or (lambda share, what: None)
+    say(0.0, "searching")
+    found = search_orbits(
+        system.with_({path: 0.5 * (low + high)}),
+        path,
+        grid,
+        longest=max_period,
+        starts=starts,
+        region=region,
+        seed=seed,
+        repelling=repelling,
+        progress=lambda share: say(SEARCHED * share, "searching"),
+    )
+    atlas = Atlas(path, (low, high), max_period, step, switch)
+    atlas.fill(
+        sorted(found.orbits, key=lambda o: (o.periods, not o.stable)),
+        lambda share: say(SEARCHED + (FOLLOWED - SEARCHED) * share, f"following, {len(atlas.branches)} branches"),
+    )
+    say(FOLLOWED, "looking for chaos")
+    chaos = chaotic_bands(system, path, (low, high), count=bands, region=region, seed=seed) if bands else None
+    say(CONFIRMED, "confirming")
+    tree = diagram_tree(system, atlas.branches, found, (low, high), chaos, max_period=max_period, left=atlas.left)
+    say(1.0, "done")
+    return tree
+
+
+def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.ndarray:
+    """Where is searched: given values, all within the bounds, or 25 spread evenly between them."""
+    if values is None:
+        return np.linspace(*bounds, VALUES + 2)[1:-1]
+    try:
+        grid = np.array([float(value) for value in values])
+    except (TypeError, ValueError):
+        grid = np.empty(0)
+    if not grid.size:
+        raise ParameterError(f"values must be numbers at which to search, got {values!r}")
+    outside = grid[~((grid >= bounds[0]) & (grid <= bounds[1]))]
+    if outside.size:
+        raise ParameterError(f"values must lie within the bounds {bounds}, got {outside[0]:g}; widen the bounds or leave it out")
+    return grid

@@ -1,0 +1,116 @@
+"""A diagram as an xarray.DataTree: its branches with their orbits confirmed, and what was searched."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.orbits import Branch, PeriodicOrbit, RestingOrbit, Search, defects
+from saltus.studies.diagram.bands import Bands, band_dataset
+from saltus.systems import System
+
+if TYPE_CHECKING:
+    import xarray
+
+KEPT = 1e-8  # the distance within which
+KEPT_ROUNDS = 20  # periods for which a stable orbit must stay where it is
+INSTANTS = 64
+
+
+def diagram_tree(
+    system: System, branches: list[Branch], found: Search, bounds: tuple[float, float], chaos: Bands | None, **facts: Any
+) -> xarray.DataTree:
+    """The DataTree that `diagram` returns; `facts` are further attributes."""
+    import xarray
+
+    import saltus
+
+    attributes = {
+        "system": system.to_json(),
+        "path": found.path,
+        "coordinate": system.model.coordinates[0],
+        "bounds": list(bounds),
+        "starts": found.starts,
+        "region": list(found.region),
+        "seed": found.seed,
+        "saltus": saltus.__version__,
+        **facts,
+    }
+    nodes = {"/": xarray.Dataset(attrs=attributes)}
+    by_length = sorted(branches, key=lambda b: (b.points[0].orbit.periods, -len(b.points)))
+    nodes |= {f"branch_{i:03d}": confirmed(branch) for i, branch in enumerate(by_length)}
+    bands = {"bands": band_dataset()} if chaos is None else chaos.marked(turning_points(branches)).to_datasets()
+    return xarray.DataTree.from_dict({**nodes, "attractors": _attractors(found), **bands, "search": _search(found)})
+
+
+def turning_points(branches: list[Branch]) -> list[tuple[str, float]]:
+    """The special points at which motions lose their stability or end: kind and parameter."""
+    found = []
+    for branch in branches:
+        places = {id(point): i for i, point in enumerate(branch.points)}
+        for special in branch.special:
+            i = places.get(id(special.point))
+            beside = [] if i is None else [branch.points[j].orbit.stable for j in (i - 1, i + 1) if 0 <= j < len(branch.points)]
+            if any(beside) and not (len(beside) == 2 and all(beside)):
+                found.append((special.kind, special.parameter))
+    return found
+
+
+def confirmed(branch: Branch) -> xarray.Dataset:
+    """A branch's dataset with its orbits' distances from themselves by direct simulation (`kept`: 20 periods, if stable)."""
+    data, orbits = branch.to_xarray(), branch.orbits
+    stable = np.flatnonzero(data["stable"].values)
+    kept = np.full(len(orbits), np.nan)
+    if stable.size:
+        kept[stable] = _distances([orbits[i] for i in stable], KEPT_ROUNDS)
+    lost = ~(kept[stable] < KEPT)
+    data["stable"][stable[lost]] = 0
+    data.attrs["unconfirmed"] = int(lost.sum())
+    data["defect"] = ("point", _distances(orbits, 1), {"long_name": "distance after one period, by the event-driven flow"})
+    data["kept"] = ("point", kept, {"long_name": f"distance after {KEPT_ROUNDS} periods, where stable"})
+    return data
+
+
+def _distances(orbits: list[PeriodicOrbit], rounds: int) -> np.ndarray:
+    """Of each orbit from itself after so many of its periods, by the event-driven flow."""
+    resting = [orbit for orbit in orbits if isinstance(orbit, RestingOrbit)]
+    return np.array([_moved(orbit, rounds) for orbit in resting]) if resting else defects(orbits, rounds)
+
+
+def _moved(orbit: RestingOrbit, rounds: int) -> float:
+    """The largest distance at 64 instants of a period: at its release alone every orbit that rests is the same."""
+    motion = orbit.motion((rounds + 1) * orbit.periods)
+    times = motion.start + orbit.duration * (np.arange(INSTANTS) + 0.5) / INSTANTS
+    now, later = motion.at(times), motion.at(times + rounds * orbit.duration)
+    return float(np.abs(np.asarray(now) - np.asarray(later)).max())
+
+
+def _attractors(found: Search) -> xarray.Dataset:
+    """What motions settled on, a dot for each at each value."""
+    import xarray
+
+    dots = found.settled
+    columns = {
+        "parameter": ("dot", dots.value, {"long_name": found.path}),
+        "amplitude": ("dot", dots.amplitude),
+        "highest": ("dot", dots.highest),
+        "lowest": ("dot", dots.lowest),
+        "periods": ("dot", dots.periods, {"long_name": "forcing periods after which it repeats"}),
+    }
+    return xarray.Dataset(columns)
+
+
+def _search(found: Search) -> xarray.Dataset:
+    """Where was searched, and how many of the motions led to no orbit."""
+    import xarray
+
+    columns = {
+        "unsettled": (
+            "searched",
+            found.unsettled,
+            {"long_name": "motions that did not settle: slow, of a longer period, or chaotic"},
+        ),
+        "at_rest": ("searched", found.at_rest, {"long_name": "motions that came to rest"}),
+    }
+    return xarray.Dataset(columns, coords={"searched": ("searched", found.values, {"long_name": found.path})})

@@ -1,0 +1,54 @@
+from .cell_layout import CellLayout
+from .impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
+from .load import Channel, Load
+from .metainterface import Metainterface
+from .model import Model
+from .parameters import children, is_number, numbers, substitute
+from .registry import IMPACTS, MODELS, register
+from .reversed import reversed_system
+from .rocking_block import RockingBlock
+from .scenarios import Impact, LayerState, Scenario, TableRow, name_impact, other_impulse, table_1
+from .si_units import PhysicalCell
+from .signals import Constant, Harmonic, Record, Signal, Sum
+from .system import System
+from .two_layer import TwoLayer
+from .unit_cell import UnitCell
+from .wall_oscillator import WallOscillator
+
+__all__ = [
+    "IMPACTS",
+    "MODELS",
+    "CellLayout",
+    "Channel",
+    "Constant",
+    "EnergyRestitution",
+    "Harmonic",
+    "Impact",
+    "ImpactLaw",
+    "InelasticImpact",
+    "LayerState",
+    "Load",
+    "Metainterface",
+    "Model",
+    "PhysicalCell",
+    "Record",
+    "RockingBlock",
+    "Scenario",
+    "Signal",
+    "Sum",
+    "System",
+    "TableRow",
+    "TwoLayer",
+    "UnitCell",
+    "VelocityReduction",
+    "WallOscillator",
+    "children",
+    "is_number",
+    "name_impact",
+    "numbers",
+    "other_impulse",
+    "register",
+    "reversed_system",
+    "substitute",
+    "table_1",
+]

@@ -1,0 +1,239 @@
+"""From a system to its structure: the expressions of the motion with symbols for every number, and the numbers beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError, SaltusError, TraceError, near
+from saltus.systems import Record, System
+from saltus.systems import substitute as substitute_numbers
+from saltus.taylor import derivatives as tangent
+from saltus.taylor.graph import POINTWISE, Expr, combine, differentiate, number, ordered, substitute
+
+RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
+
+
+class LoadTime:
+    """The time that a traced model hands to its load channels, and to nothing else.
+
+    The flow counts whole forcing periods apart and keeps a local time within them, so a model may depend on the time
+    only through its load, where that is exact.
+    """
+
+    def __init__(self, trace: Trace) -> None:
+        self._trace = trace
+
+    def phase(self, rate: Any, phase: Any) -> Expr:
+        """rate t + phase, for a harmonic."""
+        return combine("add", combine("mul", rate, Expr("time")), phase)
+
+    def record(self, record: Record, order: int) -> Expr:
+        """The `order`-th derivative of a record at t, times its scale."""
+        row = (record.path, order)  # type: ignore[attr-defined]
+        if row not in self._trace.records:
+            self._trace.records.append(row)
+        return combine("mul", record.scale, Expr("record", (), self._trace.records.index(row)))
+
+    def refuse(self, *_: Any) -> Any:
+        """The answer to every other use."""
+        raise TraceError(
+            "the time may only be handed to a load channel, such as load.horizontal(t); give the model a channel for it"
+        )
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = refuse
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = refuse
+    __float__ = __int__ = __bool__ = __lt__ = __gt__ = __le__ = __ge__ = __eq__ = __ne__ = __array__ = refuse
+    __hash__ = object.__hash__
+
+
+class DeclaredLoad:
+    """The load that a traced model sees: the channels that it names, so that a misspelt one is not read as 0."""
+
+    def __init__(self, load: Any, model: Any) -> None:
+        self._load, self._model = load, model
+
+    def __getattr__(self, name: str) -> Any:
+        channels = self._model.channels
+        if name not in (*channels, "frequency", "period"):
+            raise TraceError(f"{type(self._model).__name__} reads load.{name}, not one of its channels; {near(name, channels)}")
+        return getattr(self._load, name)
+
+
+@dataclass
+class Trace:
+    """The expressions of a system's motion; leaves are the time, the coordinates, the velocities, the side and the parameters.
+
+    `acceleration`, one for each coordinate; `gap` and `gap_rate` (its derivative to the coordinate at contact); `contact`;
+    `contact_acceleration`, the second derivative of the gap at rest at contact, a function of the time alone, and
+    `contact_damping`, minus its derivative to the velocity; `next_side` and `velocity_after`, the reset; `margins` to stop at.
+
+    With `columns` of a tangent (see `tangent.py`) `acceleration` goes on after the model's own `dof` with those of the columns.
+    """
+
+    parameters: list[str] = field(default_factory=list)
+    dof: int = 1  # of the model
+    columns: int = 0
+    paths: tuple[str, ...] = ()  # of the parameters that the last columns are derivatives to
+    records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative
+    sides: int = 0  # of the contact
+    acceleration: list[Expr] = field(default_factory=list)
+    gap: Expr | None = None
+    gap_rate: Expr | None = None
+    contact: Expr | None = None
+    contact_acceleration: Expr | None = None
+    contact_damping: Expr | None = None
+    next_side: Expr | None = None
+    velocity_after: Expr | None = None
+    margins: dict[str, Expr] = field(default_factory=dict)
+
+    def symbol(self, path: str, value: float) -> Expr:
+        """The symbol of the number at a dotted path."""
+        self.parameters.append(path)
+        return Expr("parameter", (), len(self.parameters) - 1)
+
+
+def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None) -> Trace:
+    """Trace the model, the load and the impact law of a system, and the margins that a motion stops at.
+
+    Given dotted paths (maybe none), trace the tangent as well: the derivatives to the state at the start and to those numbers.
+
+    Raises:
+        TraceError: an operation without a Taylor recurrence, a branch on the state, a time used outside the load.
+        ParameterError: a margin that the model does not have; a path to no number.
+    """
+    paths = None if sensitivities is None else tangent.check_paths(system, sensitivities)
+    result = Trace(sides=len(system.model.sides), dof=len(system.model.coordinates))
+    twin = substitute_numbers(system, result.symbol)
+    _name_records(twin.load)
+    object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
+    model, load, t = twin.model, twin.load, LoadTime(result)
+    dof = len(model.coordinates)
+    coordinates = tuple(Expr("coordinate", (), i) for i in range(dof))
+    velocities = tuple(Expr("velocity", (), i) for i in range(dof))
+    side = Expr("side") if model.sides else number(1.0)
+    q, v = (coordinates[0], velocities[0]) if dof == 1 else (coordinates, velocities)
+    accelerations = ask(model, "acceleration", t, q, v, side, load)
+    if dof > 1 and len(accelerations if isinstance(accelerations, (tuple, list)) else [accelerations]) != dof:
+        raise TraceError(f"{type(system.model).__name__}.acceleration must return {dof} values, got {accelerations!r}")
+    result.acceleration = [combine("add", a, 0.0) for a in ((accelerations,) if dof == 1 else accelerations)]
+    if model.sides:
+        _trace_contact(result, twin, t, coordinates, velocities, side)
+    _trace_margins(result, twin, t, q, v, side, stop_at)
+    _check(result, type(system.model).__name__)
+    if paths is not None:
+        tangent.extend(result, paths)
+    return result
+
+
+def ask(model: Any, method: str, *arguments: Any) -> Any:
+    """Call a model's method; a mistake in a user's own code becomes a sentence that names it.
+
+    Raises:
+        TraceError: any other exception than saltus's own, with its type and text (and itself as the cause).
+    """
+    try:
+        return getattr(model, method)(*arguments)
+    except SaltusError:
+        raise
+    except Exception as error:
+        name = f"{type(model).__name__}.{method}"
+        raise TraceError(f"{name} failed while it was traced: {type(error).__name__}: {error}") from error
+
+
+def _name_records(load: Any) -> None:
+    """Tell every record of a symbolic load its path: its samples are looked up when the numbers are known."""
+    for name, signal in load.channels.items():
+        if isinstance(signal, Record):
+            object.__setattr__(signal, "path", f"load.{name}")
+        for i, term in enumerate(getattr(signal, "terms", ())):
+            if isinstance(term, Record):
+                object.__setattr__(term, "path", f"load.{name}.{i}")
+
+
+def _trace_contact(result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v: tuple[Expr, ...], side: Expr) -> None:
+    model, load = twin.model, twin.load
+    if len(q) != 1:
+        raise TraceError("a model with sides must have one coordinate; give it `sides = ()` and stop at margins instead")
+    result.gap = combine("add", ask(model, "gap", q[0], side), 0.0)
+    result.contact = combine("add", model.contact, 0.0)
+    at_contact: dict[Expr, Any] = {q[0]: result.contact, v[0]: 0.0}
+    result.gap_rate = substitute(differentiate(result.gap, q[0]), at_contact)
+    result.contact_acceleration = result.gap_rate * substitute(result.acceleration[0], at_contact)
+    result.contact_damping = -substitute(differentiate(result.acceleration[0], v[0]), at_contact)
+    next_side, after = ask(model, "reset", t, v[0], side, load, twin.impact)
+    result.next_side, result.velocity_after = combine("add", next_side, 0.0), combine("add", after, 0.0)
+
+
+def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]) -> None:
+    if not stop_at:
+        return
+    dof = len(twin.model.coordinates)
+    a = tuple(Expr("acceleration", (), i) for i in range(dof))
+    margins = ask(twin.model, "margins", t, q, v, a[0] if dof == 1 else a, side, twin.load)
+    for name in stop_at:
+        if name not in margins:
+            raise ParameterError(f"{type(twin.model).__name__} has no margin {name!r} to stop at; {near(name, margins)}")
+        result.margins[name] = combine("add", margins[name], 0.0)
+
+
+def _check(result: Trace, model: str) -> None:
+    """Refuse comparisons in what is expanded in series, and a gap that depends on more than the coordinate."""
+    expanded = [*result.acceleration, *result.margins.values()]
+    if result.gap is not None:
+        expanded += [result.gap]
+    for node in ordered(expanded):
+        if node.op in POINTWISE:
+            raise TraceError(f"{model} uses {node.op} in an acceleration, a gap or a margin; only an impact law may compare")
+    if result.gap is not None:
+        for node in ordered([result.gap]):
+            if node.op in ("time", "record", "velocity"):
+                raise TraceError(f"{model}.gap may depend on the coordinate, the side and the parameters only")
+    _check_abs(result, expanded)
+
+
+def _check_abs(result: Trace, expanded: list[Expr]) -> None:
+    """Refuse abs of a coordinate, traced as side * coordinate, where that is not its meaning."""
+    side, coordinates = Expr("side"), [Expr("coordinate", (), i) for i in range(len(result.acceleration))]
+    sized = {side * q for q in coordinates}
+    if result.gap not in sized | {q * side for q in coordinates} and any(node in sized for node in ordered(expanded)):
+        raise TraceError("abs of the coordinate can be traced only where the gap is side * coordinate; write it with the gap")
+
+
+def record_table(system: System, rows: list[tuple[str, int]]) -> tuple[np.ndarray, np.ndarray]:
+    """The records that a trace reads, given by path and order of the derivative, on their common breakpoints.
+
+    Returns:
+        breakpoints (m,) and coefficients (rows, m + 1, RECORD_WIDTH): piece i of a row holds between the breakpoints i - 1 and
+        i, in ascending powers of the time since breakpoint i - 1 (the first piece: since breakpoint 0). Scales are left out.
+    """
+    if not rows:
+        return np.empty(0), np.empty((0, 1, RECORD_WIDTH))
+    records = [(system.get(path), order) for path, order in rows]
+    breaks = np.unique(np.concatenate([record.time for record, _ in records]))
+    table = np.zeros((len(records), breaks.size + 1, RECORD_WIDTH))
+    for row, (record, order) in zip(table, records, strict=True):
+        _fill(row, breaks, record, order)
+    return breaks, table
+
+
+def _fill(row: np.ndarray, breaks: np.ndarray, record: Record, order: int) -> None:
+    from scipy.special import factorial
+
+    polynomial = record.polynomials[order] if order < 3 else record.polynomials[2].derivative(order - 2)
+    first, last = record.time[0], record.time[-1]
+    inside = (breaks >= first) & (breaks < last)
+    anchors = breaks[inside]
+    for power in range(polynomial.c.shape[0]):
+        row[1:][inside, power] = polynomial(anchors, nu=power) / factorial(power)
+    if record.quantity == "force" or order >= 2:
+        return
+    for after in (False, True):  # the ground goes on with the velocity it has
+        edge = last if after else first
+        where = np.append(False, breaks >= last) if after else np.append(True, breaks < first)
+        anchor = np.append(breaks[0], breaks)[where]
+        velocity = record.polynomials[1](edge)
+        row[where, 0] = velocity if order == 1 else record.polynomials[0](edge) + velocity * (anchor - edge)
+        row[where, 1] = 0.0 if order == 1 else velocity

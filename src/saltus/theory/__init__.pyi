@@ -1,0 +1,96 @@
+from .bouncing import Peaks, peaks, reciprocal, unloaded_half_periods, unloaded_peak_ratio, unloaded_period
+from .divergence import Divergence, divergence, linear_equilibria
+from .energy import potential_energy, potential_slope, total_energy
+from .equilibria import Equilibrium, Stability, equilibria, undeformed_stability
+from .high_frequency import high_frequency_onset
+from .layer import Layer, layers, open_layer
+from .pendulum import pendulum_acceleration
+from .piecewise_linear import LinearMotion, linear_motion
+from .quasi_static import (
+    critical_horizontal,
+    equivalent_angle,
+    fold_curve,
+    fold_horizontal,
+    is_monostable,
+    paper_monostable,
+    static_angle,
+    subcritical_vertical,
+    unloaded_fold,
+)
+from .restitution import Contact, energy_factor, energy_jump, inelastic_contact, velocity_factor
+from .rocking import (
+    housner_restitution,
+    rocking_energy_decreases,
+    rocking_energy_jump,
+    rocking_period,
+    short_rocking_period,
+    slender_rocking_period,
+)
+from .small_vibrations import (
+    Vibration,
+    decayed_amplitude,
+    decayed_period,
+    final_time,
+    linear_period,
+    short_period,
+    upright_period,
+    vibrations,
+)
+from .wall_orbits import WallOrbit, WallOrbits, wall_orbits
+
+__all__ = [
+    "Contact",
+    "Divergence",
+    "Equilibrium",
+    "Layer",
+    "LinearMotion",
+    "Peaks",
+    "Stability",
+    "Vibration",
+    "WallOrbit",
+    "WallOrbits",
+    "critical_horizontal",
+    "decayed_amplitude",
+    "decayed_period",
+    "divergence",
+    "energy_factor",
+    "energy_jump",
+    "equilibria",
+    "equivalent_angle",
+    "final_time",
+    "fold_curve",
+    "fold_horizontal",
+    "high_frequency_onset",
+    "housner_restitution",
+    "inelastic_contact",
+    "is_monostable",
+    "layers",
+    "linear_equilibria",
+    "linear_motion",
+    "linear_period",
+    "open_layer",
+    "paper_monostable",
+    "peaks",
+    "pendulum_acceleration",
+    "potential_energy",
+    "potential_slope",
+    "reciprocal",
+    "rocking_energy_decreases",
+    "rocking_energy_jump",
+    "rocking_period",
+    "short_period",
+    "short_rocking_period",
+    "slender_rocking_period",
+    "static_angle",
+    "subcritical_vertical",
+    "total_energy",
+    "undeformed_stability",
+    "unloaded_fold",
+    "unloaded_half_periods",
+    "unloaded_peak_ratio",
+    "unloaded_period",
+    "upright_period",
+    "velocity_factor",
+    "vibrations",
+    "wall_orbits",
+]
