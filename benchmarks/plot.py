@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from saltus.plots.style import DOUBLE_COLUMN, FAINT, new_figure, panel_label, style
+from saltus.plots.conventions import DOUBLE_COLUMN, FAINT, new_figure, panel_label, style
 
 # Okabe and Ito's colours, near ones for one package; and a marker for each code, for greyscale and the colour-blind
 LOOKS = {

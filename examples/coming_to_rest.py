@@ -18,7 +18,7 @@ motion = saltus.simulate(system, theta=start, duration=20.0)
 period = theory.linear_period(start, beta0=beta0, vertical=vertical)
 expected = theory.final_time(period=period, e=e)
 
-print(f"{len(motion.crossings)} impacts followed one by one, at rest from tau = {motion.rest_time:.12f}")
+print(f"{len(motion.impacts)} impacts followed one by one, at rest from tau = {motion.rest_time:.12f}")
 print(f"the paper's closed form for small amplitudes: {expected:.12f}")
 assert motion.stop is saltus.Stop.REST
 assert abs(motion.rest_time / expected - 1) < 0.01

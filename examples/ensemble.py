@@ -23,7 +23,7 @@ chart = saltus.simulate_many(
     velocity=0.0,
     parameters={"load.horizontal.amplitude": H, "load.vertical": V},
     periods=100,
-    sample="crossings",
+    sample="impact_count",
     until=("rest", "settled"),
 ).assign_coords(H=H, V=V)
 
@@ -32,9 +32,9 @@ for code, count in zip(*np.unique(chart.stop, return_counts=True), strict=True):
     print(f"{count:5d} of {chart.stop.size} ended as {names[code]}")
 cycles = np.unique(chart.cycle.values[chart.cycle.values > 0])
 print(f"motions that repeat themselves do so every {', '.join(map(str, cycles))} forcing periods")
-print(f"impacts in the last forcing period: at most {int(chart.period_crossings.max())}")
+print(f"impacts in the last forcing period: at most {int(chart.period_impact_count.max())}")
 
-border = H.where(chart.crossings > 0).min("H")  # the least force that lifts it off, for each V
+border = H.where(chart.impact_count > 0).min("H")  # the least force that lifts it off, for each V
 excess = border - theory.critical_horizontal(np.deg2rad(80), chart.V)
 assert float(excess.min()) >= 0.0
 assert float(excess.max()) <= float(H[1] - H[0])

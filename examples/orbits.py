@@ -10,12 +10,12 @@ system = saltus.System(
 )
 orbit = saltus.find_orbit(system, theta=0.3)
 print(orbit)
-print(f"impacts at {orbit.crossings} with speeds {orbit.speeds}; multipliers {orbit.multipliers}")
+print(f"impacts at {orbit.impact_times} with speeds {orbit.speeds}; multipliers {orbit.multipliers}")
 print(f"after 100 periods of direct simulation theta = {orbit.motion(100).theta:.1e} at the impact that it started with")
 
 branch = saltus.continue_orbit(orbit, "load.frequency", (0.25, 3.0))
 for point in branch.special:
-    impacts = point.orbit.signature.crossings
+    impacts = point.orbit.signature.impact_count
     print(f"{point.kind:12} Omega = {point.parameter:.12f} to {point.evidence.bracket:.0e}, {impacts} impacts")
 for motion in branch.at(0.88):
     print(f"at Omega = 0.88: {motion}")
@@ -23,7 +23,7 @@ for motion in branch.at(0.88):
 # Where the orbit touches the contact between its two impacts, four more appear: a pair and its mirror image.
 grazing = max((point for point in branch.special if point.kind == "GR"), key=lambda point: point.parameter)
 assert abs(grazing.parameter - 0.284630020) < 1e-9
-assert {motion.signature.crossings for motion in branch.orbits} >= {2, 6}
+assert {motion.signature.impact_count for motion in branch.orbits} >= {2, 6}
 
 # The folds between which three orbits coexist meet in a cusp: under smaller loads there is one orbit only.
 fold = next(point for point in branch.special if point.kind == "LP" and point.parameter > 0.5)

@@ -13,7 +13,7 @@ motion = saltus.simulate(system, theta=0.3, periods=20)
 theta, velocity = motion.at(np.linspace(0.0, motion.time, 1000))
 
 print(motion)
-print(f"{len(motion.crossings)} impacts, the fastest at {np.abs(motion.crossings.velocity_before).max():.4f}")
+print(f"{len(motion.impacts)} impacts, the fastest at {np.abs(motion.impacts.velocity_before).max():.4f}")
 print(f"limits of the mechanism: {motion.validity}")
 
 slower = system.with_({"load.frequency": 0.9})  # any number of a system, by its path

@@ -19,14 +19,14 @@ for name in sorted(spectrum.children):
     if name.startswith("branch"):
         branch = spectrum[name].to_dataset()
         low, high = float(branch.parameter.min()), float(branch.parameter.max())
-        print(f"{name}: period {int(branch.periods[0])}, Omega {low:.4f} to {high:.4f}, ends {branch.attrs['ends']}")
+        print(f"{name}: period {int(branch.period[0])}, Omega {low:.4f} to {high:.4f}, ends {branch.attrs['ends']}")
         for kind, place in zip(branch.kind.values, branch.special_parameter.values, strict=True):
             print(f"  {kind:16} {place:.9f}")
         stable, worst = int(branch.stable.sum()), float(branch.kept.max())
         print(f"  {stable} of {branch.sizes['point']} orbits are stable, and after 20 periods off by at most {worst:.0e}")
 dots = spectrum["attractors"]
 print(
-    f"simulation settled at Omega = {dots.parameter.values} on periods {dots.periods.values}, amplitudes {dots.amplitude.values}"
+    f"simulation settled at Omega = {dots.parameter.values} on periods {dots.period.values}, amplitudes {dots.amplitude.values}"
 )
 
 with tempfile.TemporaryDirectory() as folder:  # a file keeps the orbits themselves

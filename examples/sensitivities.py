@@ -14,7 +14,7 @@ system = saltus.System(
     impact=saltus.VelocityReduction(e),
 )
 result = saltus.sensitivities(system, theta=0.3, periods=5, parameters=("load.frequency", "impact.e"))
-impacts = len(result.motion.crossings)
+impacts = len(result.motion.impacts)
 expected = e ** (2 * impacts) * math.exp(-C * result.motion.time)
 print(f"d(theta, theta')/d(theta, theta') after {impacts} impacts:\n{result.state}")
 print(f"its determinant is {result.determinant:.15g}, the law says {expected:.15g}")

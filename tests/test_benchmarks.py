@@ -83,7 +83,7 @@ def test_the_reference_ends_are_those_of_saltus() -> None:
     starts, known = reference.states(reference.MOTIONS), reference.exact()
     motions = [saltus.simulate(system, theta=x, velocity=v, periods=reference.PERIODS) for x, v in zip(*starts, strict=True)]
     assert reference.errors([m.theta for m in motions], [m.velocity for m in motions]).max() < 1e-12
-    assert [len(m.crossings) for m in motions] == known["impacts"].tolist()
+    assert [len(m.impacts) for m in motions] == known["impacts"].tolist()
 
 
 # --- AUTO-07p

@@ -13,19 +13,22 @@ from saltus import flow
 
 SOURCE = Path(saltus.__file__).parent
 
-# A room may import the rooms in its list, itself, and saltus.errors; `plots` knows datasets only.
+# A room may import the front doors of the rooms in its list, and what every room shares; `plots` knows datasets only.
+SHARED = {"errors", "checks", "files", "_front_door"}
 MAY_IMPORT = {
     "systems": set(),
     "theory": {"systems"},
-    "flow": {"systems"},
-    "orbits": {"systems", "flow"},
-    "attractors": {"systems", "flow", "orbits"},
+    "taylor": {"systems"},
+    "bounds": {"systems", "taylor"},
+    "flow": {"systems", "taylor", "bounds"},
+    "orbits": {"systems", "taylor", "flow"},
+    "attractors": {"systems", "taylor", "flow", "orbits"},
     "sweep": set(),
     "studies": {"systems", "theory", "flow", "orbits", "attractors", "sweep"},
     "plots": set(),
     "config": {"systems", "flow"},
-    "paper": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots", "files"},
-    "cli": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots", "config", "paper", "files"},
+    "paper": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots"},
+    "cli": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots", "config", "paper"},
 }
 HEAVY = (
     *("scipy", "numba", "xarray", "matplotlib", "pydantic", "h5netcdf", "zarr", "distributed"),
@@ -41,7 +44,7 @@ def imported_rooms(path: Path) -> set[str]:
             node.body = []
     names = [n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)]
     names += [a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names]
-    return {name.split(".")[1] for name in names if name.startswith("saltus.")} - {"errors"}
+    return {name.split(".")[1] for name in names if name.startswith("saltus.")} - SHARED
 
 
 @pytest.mark.parametrize("room", MAY_IMPORT)

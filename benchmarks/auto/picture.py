@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from auto.case import KNOWN
-from saltus.plots.style import DOUBLE_COLUMN, FAINT, INK, new_figure, panel_label, style
+from saltus.plots.conventions import DOUBLE_COLUMN, FAINT, INK, new_figure, panel_label, style
 
 COLORS = ("#E69F00", "#56B4E9", "#009E73", "#D55E00")  # Okabe and Ito
 MARKERS = ("v", "s", "D", "^")

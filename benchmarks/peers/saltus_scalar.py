@@ -71,7 +71,7 @@ def zeno(enough: int) -> dict[str, Any]:
     what = saltus.System(model=model, load=saltus.Load(vertical=VERTICAL), impact=saltus.VelocityReduction(ZENO_FACTOR))
     motion = saltus.simulate(what, theta=0.3, duration=ZENO_HORIZON)
     rest = [event.time for event in motion.events if event.kind == saltus.EventKind.REST]
-    impacts = len(motion.crossings)
+    impacts = len(motion.impacts)
     return zeno_answer(time=motion.time, theta=motion.theta, velocity=motion.velocity, impacts=impacts, last=rest[-1])
 
 

@@ -105,7 +105,7 @@ def test_with_unequal_layers_and_losses_they_add_up_to_the_mean_divergence():
     assert found.sum_defect < 1e-8
     assert found.divergence < -0.11
     motion = saltus.simulate(system, theta=0.5, duration=40.0)
-    crossings = motion.crossings
+    crossings = motion.impacts
     bounds = np.concatenate([[0.0], crossings.time, [40.0]])
     sides = np.append(crossings.side, motion.side)
     lower, upper = (np.diff(bounds)[sides == s].sum() for s in (1, -1))
@@ -143,12 +143,12 @@ def test_the_contraction_of_an_impact_that_depends_on_the_ground_is_that_of_its_
     law, model, load = system.impact, system.model, system.load
     expected = -0.1 * 8.0
     for t, s, v, after in zip(
-        *(getattr(motion.crossings, n) for n in ("time", "side", "velocity_before", "velocity_after")), strict=True
+        *(getattr(motion.impacts, n) for n in ("time", "side", "velocity_before", "velocity_after")), strict=True
     ):
         step = 1e-5
         ends = [float(law.velocity_after(model, t, v + d, s, -s, load)) for d in (-step, step)]
         expected += math.log((ends[1] - ends[0]) / (2 * step) * after / v)
-    assert len(motion.crossings) > 1
+    assert len(motion.impacts) > 1
     assert Contraction(system).along(motion) == pytest.approx(expected, abs=1e-7)
 
 

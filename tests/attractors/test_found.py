@@ -69,8 +69,8 @@ def test_mirror_images_are_two_attractors_even_where_no_start_leads_to_one() -> 
 
 def test_a_symmetric_cycle_is_its_own_mirror_image() -> None:
     found = find_attractors(loaded(1.0, 2.4), starts=48)
-    assert [(member.label, member.periods, member.mirror) for member in found] == [(1, 1, 1), (2, 3, 2), (3, 3, 3)]
-    assert all(len(member.strobes) == member.periods for member in found)
+    assert [(member.label, member.period, member.mirror) for member in found] == [(1, 1, 1), (2, 3, 2), (3, 3, 3)]
+    assert all(len(member.strobes) == member.period for member in found)
 
 
 def test_labels_do_not_depend_on_the_sample() -> None:
@@ -175,7 +175,7 @@ def test_chaos_and_a_periodic_motion_coexist() -> None:
     [
         (lambda: find_attractors(loaded(), region=(1.0, 0.0)), "half widths"),
         (lambda: find_attractors(loaded(), starts=0), "starts"),
-        (lambda: find_attractors(loaded(), longest=40), "longest"),
+        (lambda: find_attractors(loaded(), max_period=40), "max_period"),
         (lambda: find_attractors(loaded(), also=[[1.0, np.inf]]), "also"),
         (lambda: find_attractors(loaded(), known=[3]), "known must be"),
         (lambda: find_attractors("loaded"), "System"),

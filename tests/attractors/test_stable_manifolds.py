@@ -21,7 +21,7 @@ from saltus.theory import equilibria, wall_orbits
 @pytest.fixture(scope="module")
 def saddle() -> saltus.PeriodicOrbit:
     """Of the three orbits between the folds at H = 0.5 the one that repels."""
-    found = saltus.search_orbits(loaded(W=0.88), "load.frequency", [0.88], longest=1, starts=32)
+    found = saltus.search_orbits(loaded(W=0.88), "load.frequency", [0.88], max_period=1, starts=32)
     return next(orbit for orbit in found.orbits if not orbit.stable)
 
 
@@ -33,8 +33,8 @@ def curve(saddle: saltus.PeriodicOrbit) -> Manifold:
 @pytest.fixture(scope="module")
 def longer() -> Manifold:
     """Of a saddle of period 3."""
-    found = saltus.search_orbits(loaded(1.0, 2.4), "load.frequency", [2.4], longest=3, starts=32)
-    orbit = next(orbit for orbit in found.orbits if orbit.periods == 3 and not orbit.stable)
+    found = saltus.search_orbits(loaded(1.0, 2.4), "load.frequency", [2.4], max_period=3, starts=32)
+    orbit = next(orbit for orbit in found.orbits if orbit.period == 3 and not orbit.stable)
     return stable_manifold(orbit, window=((-2.0, 2.0), (-2.0, 2.0)), periods=24, step=0.02)
 
 
@@ -64,7 +64,7 @@ def edge_of(labels: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("which", ["curve", "longer", "turning"])
 def test_forward_it_shrinks_onto_its_first_segment_to_1e_8(which: str, request: pytest.FixtureRequest) -> None:
     found: Manifold = request.getfixturevalue(which)
-    system, q = found.orbit.system, found.orbit.periods
+    system, q = found.orbit.system, found.orbit.period
     rng, tried = np.random.default_rng(0), 0
     for branch in found.curves:
         inside = np.flatnonzero(np.isfinite(branch.states).all(axis=1) & (np.abs(branch.states).max(axis=1) < 3.0))
@@ -160,7 +160,7 @@ def test_the_unstable_manifold_leads_to_both_attractors(saddle: saltus.PeriodicO
         math.exp(-0.1 * 2.0 * math.pi / 0.88), rel=1e-9
     )  # the determinant of the map
     ends = sorted(float(branch.states[-1, 0]) for branch in found.curves)
-    attracting = saltus.search_orbits(loaded(W=0.88), "load.frequency", [0.88], longest=1, starts=16, repelling=0).orbits
+    attracting = saltus.search_orbits(loaded(W=0.88), "load.frequency", [0.88], max_period=1, starts=16, repelling=0).orbits
     assert ends == pytest.approx(sorted(orbit.state[0] for orbit in attracting), abs=1e-5)
 
 
@@ -177,13 +177,13 @@ def test_only_saddles_have_manifolds(saddle: saltus.PeriodicOrbit) -> None:
 def test_backward_motions_come_from_where_forward_ones_began(system: saltus.System) -> None:
     name = system.model.coordinates[0]
     motion = saltus.simulate(system, **{name: 0.3}, velocity=0.25, time=0.4, duration=17.0, tol=1e-14)
-    assert len(motion.crossings) >= 2
+    assert len(motion.impacts) >= 2
     back = saltus.simulate(
         reversed_system(system), **{name: getattr(motion, name)}, velocity=-motion.velocity, time=-17.4, duration=17.0, tol=1e-14
     )
     assert getattr(back, name) == pytest.approx(0.3, abs=1e-10)
     assert back.velocity == pytest.approx(-0.25, abs=1e-10)
-    assert len(back.crossings) == len(motion.crossings)
+    assert len(back.impacts) == len(motion.impacts)
 
 
 def test_a_reversed_load_is_the_load_at_minus_the_time() -> None:
@@ -216,9 +216,9 @@ def test_without_damping_a_separatrix_has_the_energy_of_its_saddle() -> None:
     for branch in separatrices(system):
         top = min(energy.items(), key=lambda item: abs(item[0] - branch.saddle))[1]
         assert branch.ends == "saddle"
-        for velocity in branch.crossings[:, 1]:
+        for velocity in branch.impacts[:, 1]:
             assert 0.5 * velocity**2 == pytest.approx(top - rest, abs=1e-9)
-    assert sum(len(branch.crossings) for branch in separatrices(system)) == 2
+    assert sum(len(branch.impacts) for branch in separatrices(system)) == 2
 
 
 def test_separatrices_cross_the_contact_where_an_independent_integration_does() -> None:
@@ -232,9 +232,9 @@ def test_separatrices_cross_the_contact_where_an_independent_integration_does() 
             speeds = theirs.velocity[theirs.theta == 0.0][::2]
             away = math.copysign(1.0, point.theta) * (1.0 if outward else -1.0)
             (mine,) = (b for b in ours if b.saddle == pytest.approx(point.theta) and (b.theta[1] > b.saddle) == (away > 0))
-            count = min(len(speeds), len(mine.crossings))
+            count = min(len(speeds), len(mine.impacts))
             assert count >= 2
-            assert mine.crossings[:count, 1] == pytest.approx(speeds[:count], abs=1e-7)
+            assert mine.impacts[:count, 1] == pytest.approx(speeds[:count], abs=1e-7)
 
 
 def test_separatrices_part_the_basins_of_a_constant_load() -> None:

@@ -265,7 +265,7 @@ def test_progress_goes_from_nothing_to_all():
     [
         ({"periods": 10}, "periods must"),
         ({"periods": 300.5}, "whole number"),
-        ({"longest": 3}, "longest must"),
+        ({"max_period": 3}, "max_period must"),
         ({"transient": -1}, "transient must"),
         ({"theta": "far"}, "theta must"),
         ({"velocity": math.inf}, "velocity must"),

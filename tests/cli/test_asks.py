@@ -14,8 +14,7 @@ from saltus.cli.run_command import check
 from saltus.config import load_study
 from saltus.config.questions import ASKS, read_grid, read_pairs, read_values
 from saltus.errors import ParameterError
-from saltus.studies import basin_sweep, bordered_chart, stability_chart
-from saltus.studies import portrait as phase_portrait
+from saltus.studies import basin_sweep, bordered_chart, phase_portrait, stability_chart
 from saltus.studies.diagram.diagram import diagram
 
 FUNCTIONS = {

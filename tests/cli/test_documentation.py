@@ -87,7 +87,7 @@ def test_the_variables_and_the_stops_of_an_ensemble_are_all_there():
         velocity=[0.0, 0.1],
         time=[0.0, 1.0],
         periods=2,
-        sample=("state", "extrema", "crossings", "speed"),
+        sample=("state", "extrema", "impact_count", "speed"),
         until=("rest", "settled"),
         sensitivities=(),
     )

@@ -19,7 +19,7 @@ def test_impacts_are_put_in_at_the_contact_with_both_velocities():
     time, position, velocity = arcs(motion.to_xarray(np.linspace(0, 10, 400)), "x")
     assert (np.diff(time) >= 0).all()
     gaps = np.flatnonzero(np.isnan(velocity))
-    assert len(gaps) == len(motion.crossings) > 0
+    assert len(gaps) == len(motion.impacts) > 0
     # free fall from x = -1 reaches the wall with v^2 = 1 - 0.5^2, at x = -cos t
     assert time[gaps[0]] == pytest.approx(2 * math.pi / 3, abs=1e-12)
     assert velocity[gaps[0] - 1] == pytest.approx(math.sqrt(0.75), abs=1e-12)

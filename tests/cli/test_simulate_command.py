@@ -45,7 +45,7 @@ def test_the_files_hold_the_motion(saltus, study, tmp_path):
         # the project's 40-digit reference after 20 periods
         np.testing.assert_allclose(motion.theta[-1], -0.235680595299311781821932031456, rtol=0, atol=2e-12)
         np.testing.assert_allclose(motion.velocity[-1], -1.02103882791726021543767997137, rtol=0, atol=2e-12)
-        assert motion.sizes["crossing"] == 39
+        assert motion.sizes["impact"] == 39
         assert motion.theta.attrs["units"] == "rad"
         assert System.from_json(motion.attrs["system"]) == load_study(path).system
         assert motion.attrs["study"] == "short.toml"

@@ -463,12 +463,12 @@ def amplification(cases, ensemble, tol, rng):
     back to the contact with the speed that it had (among 10^5 cases: six impacts at 0.00165 by `energy_restitution`, batch 16,
     row 128). So where impacts are few the inverse speeds are added up, an impact's being at most that of its period's slowest.
     """
-    other = nudged(cases, rng).in_lanes(tol=tol, sample=("speed", "crossings"), last="all")
+    other = nudged(cases, rng).in_lanes(tol=tol, sample=("speed", "impact_count"), last="all")
     state = end_state(ensemble, cases.system)
     moved = np.abs(end_state(other, cases.system) - state).max(axis=1) / np.maximum(1.0, np.abs(state).max(axis=1))
-    same = (other.stop.values == ensemble.stop.values) & (other.crossings.values == ensemble.crossings.values)
+    same = (other.stop.values == ensemble.stop.values) & (other.impact_count.values == ensemble.impact_count.values)
     calm = same & (ensemble.grazings.values == 0) & (other.grazings.values == 0)
     slowest = np.maximum(other.least_speed.fillna(np.inf), 1e-300)  # a period that a limit ends is not kept
-    added = (other.period_crossings.fillna(0.0) / slowest).sum("period").values
-    slow = np.where(other.crossings.values <= 10, 1e-1 * added, 1.0)
+    added = (other.period_impact_count.fillna(0.0) / slowest).sum("period").values
+    slow = np.where(other.impact_count.values <= 10, 1e-1 * added, 1.0)
     return np.where(calm, np.maximum(np.maximum(moved / NUDGE, slow), 1.0), math.inf)

@@ -66,7 +66,7 @@ def test_just_above_the_barrier_a_motion_leaves_and_just_below_it_does_not():
     assert np.abs(simulate(system, theta=0.0, velocity=1.01 * barrier, duration=60.0).at(times)[0]).max() > 1.1 * turning
     below = simulate(system, theta=0.0, velocity=speed, duration=60.0)
     assert np.abs(below.at(times)[0]).max() < turning
-    assert np.abs(below.crossings.velocity_after).max() <= speed
+    assert np.abs(below.impacts.velocity_after).max() <= speed
 
 
 def test_a_rocking_block_is_captured_below_the_speed_that_overturns_it():
@@ -121,7 +121,7 @@ def test_motions_that_lose_speed_at_impacts_come_to_rest_from_below_the_threshol
         start = {"theta": 0.0, "velocity": float(rng.choice([-1, 1]) * speed), "time": float(rng.uniform(0, 40))}
         motion = simulate(system, duration=60.0 + 40.0 * speed / (1 - system.impact.e), tol=1e-9, dense=False, **start)
         assert motion.rest_time is not None, system
-        assert all(e.kind in (EventKind.CROSSING, EventKind.REST) for e in motion.events), system
+        assert all(e.kind in (EventKind.IMPACT, EventKind.REST) for e in motion.events), system
 
 
 def action(system, crossings):
@@ -144,8 +144,8 @@ def test_without_loss_at_impacts_the_action_of_captured_motions_falls_from_perio
         motion = simulate(
             system, theta=0.0, velocity=float(speeds[i]), time=start, duration=periods * length, tol=1e-10, dense=False
         )
-        time, J = motion.crossings.time, action(system, motion.crossings)
-        assert all(e.kind in (EventKind.CROSSING, EventKind.CHATTER) for e in motion.events)
+        time, J = motion.impacts.time, action(system, motion.impacts)
+        assert all(e.kind in (EventKind.IMPACT, EventKind.CHATTER) for e in motion.events)
         if len(time) < 30 or EventKind.CHATTER in [e.kind for e in motion.events]:
             continue
         means = [np.log(J[(time >= start + k * length) & (time < start + (k + 1) * length)]).mean() for k in range(periods)]
@@ -159,7 +159,7 @@ def leaves(system, speed, phases=12, duration=80.0):
     for time in np.linspace(0, system.load.period, phases, endpoint=False):
         for side in (1, -1):
             start = {"theta": 0.0, "velocity": side * speed, "time": float(time)}
-            crossings = simulate(system, duration=duration, tol=1e-8, dense=False, **start).crossings
+            crossings = simulate(system, duration=duration, tol=1e-8, dense=False, **start).impacts
             if len(crossings) == 0 or np.abs(crossings.velocity_after[-10:]).max() >= speed:
                 return True
     return False
@@ -237,7 +237,7 @@ def test_a_ground_that_shakes_a_block_and_a_driven_wall_are_captured():
         assert simulate(block, theta=0.0, velocity=speed, time=float(time), duration=30.0).rest_time is not None
     speed = float(capture_speed(wall))
     assert speed > 5e-4
-    crossings = simulate(wall, x=-0.5, velocity=-speed, duration=100.0, dense=False).crossings
+    crossings = simulate(wall, x=-0.5, velocity=-speed, duration=100.0, dense=False).impacts
     last = np.abs(crossings.velocity_after[crossings.time > 100 - wall.load.period])
     assert last.max() < 0.7 * speed
 

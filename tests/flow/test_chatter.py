@@ -63,10 +63,10 @@ CONSERVATIVE = {"C": 0.0, "V": -0.5, "H": 0.06, "W": 0.2}
 def worst_relative_error(numbers, v0, duration, lower_factor=1.0, impact=None):
     """Of the law against the impacts that the kernel resolves, all those that leave the upper side."""
     motion = simulate(driven(**numbers, impact=impact), theta=0.0, velocity=-v0, duration=duration, tol=1e-15)
-    upper = motion.crossings.side < 0
+    upper = motion.impacts.side < 0
     assert motion.phase_known
     assert upper.sum() > 100
-    pairs = list(zip(motion.crossings.time[upper], motion.crossings.velocity_before[upper], strict=True))[::10]
+    pairs = list(zip(motion.impacts.time[upper], motion.impacts.velocity_before[upper], strict=True))[::10]
     return max(abs(v / law(numbers, v0, t, lower_factor) - 1) for t, v in pairs)
 
 
@@ -153,7 +153,7 @@ def test_on_a_wall_the_action_is_the_cube_of_the_speed_over_the_pull(C):
     assert averaged_speed(wall, -7e-6, 11.0, contact=0.7) == pytest.approx(expected(7e-6, 11.0), rel=1e-11)
     errors = []
     for v0 in (2e-3, 1e-3):
-        crossings = simulate(wall, x=0.7, velocity=-v0, duration=8.0, tol=1e-15).crossings
+        crossings = simulate(wall, x=0.7, velocity=-v0, duration=8.0, tol=1e-15).impacts
         errors.append(np.abs(crossings.velocity_before / expected(v0, crossings.time) - 1).max())
         assert len(crossings) > 1000
     assert errors[0] < 1e-2
@@ -169,11 +169,11 @@ def test_chatter_does_not_begin_where_the_contact_hardly_holds_and_ends_where_it
     below = simulate(system, theta=0.0, velocity=9.9e-6, duration=5.0)
     assert resolved.phase_known
     assert below.phase_known
-    speeds = [np.abs(m.crossings.velocity_after[-10:]).max() for m in (below, resolved)]
+    speeds = [np.abs(m.impacts.velocity_after[-10:]).max() for m in (below, resolved)]
     assert speeds[0] == pytest.approx(speeds[1] * 9.9 / 10.1, rel=0.2)
     growing = driven(C=0.0, V=-0.5, H=0.98 * loose, W=0.05, phase=math.pi / 2)
     motion = simulate(growing, theta=0.0, velocity=9.9e-6, duration=30.0)
-    assert [e.kind for e in motion.events][:2] == [EventKind.CHATTER, EventKind.CROSSING]
+    assert [e.kind for e in motion.events][:2] == [EventKind.CHATTER, EventKind.IMPACT]
     assert not motion.phase_known
     assert motion.chatter_speed is None
-    assert 2e-5 < abs(motion.crossings.velocity_before[0]) < 4e-5  # noticed at the end of a step
+    assert 2e-5 < abs(motion.impacts.velocity_before[0]) < 4e-5  # noticed at the end of a step

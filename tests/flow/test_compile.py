@@ -22,7 +22,7 @@ from saltus.systems import Load, System, WallOscillator
 print("ready", flush=True)
 sys.stdin.readline()
 motion = simulate(System(model=WallOscillator(damping=0.1), load=Load(force=-0.125)), x=0.5, duration=20.0)
-print(json.dumps([motion.x, motion.velocity, len(motion.crossings)]))
+print(json.dumps([motion.x, motion.velocity, len(motion.impacts)]))
 """
 
 

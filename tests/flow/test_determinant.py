@@ -28,7 +28,7 @@ def jacobian(system, state):
             for sign in (1, -1):
                 motion, value = end(system, state + sign * n * STEP * direction)
                 column += sign * weight * value / STEP
-                counts.add(len(motion.crossings))
+                counts.add(len(motion.impacts))
         columns.append(column)
     return np.array(columns).T, len(counts) == 1
 
@@ -50,11 +50,11 @@ def random_case(rng):
 
 def predicted(numbers, motion):
     """From the crossing times and the sides between them."""
-    bounds = np.concatenate([[0.0], motion.crossings.time, [DURATION]])
-    sides = np.append(motion.crossings.side, motion.side)
+    bounds = np.concatenate([[0.0], motion.impacts.time, [DURATION]])
+    sides = np.append(motion.impacts.side, motion.side)
     spent = {s: np.diff(bounds)[sides == s].sum() for s in (1, -1)}
     exponent = numbers["C"] * (numbers["c"] * spent[1] / (1 + numbers["m"]) + spent[-1])
-    return numbers["e"] ** (2 * len(motion.crossings)) * math.exp(-exponent)
+    return numbers["e"] ** (2 * len(motion.impacts)) * math.exp(-exponent)
 
 
 def test_the_determinant_of_the_flow_is_the_product_of_its_impacts_and_of_its_damping():
@@ -63,8 +63,8 @@ def test_the_determinant_of_the_flow_is_the_product_of_its_impacts_and_of_its_da
         numbers, state = random_case(rng)
         system = driven(**numbers)
         motion, _ = end(system, state)
-        speeds = np.abs(motion.crossings.velocity_before)
-        if len(motion.crossings) < 1 or speeds.min() < 0.15:  # near a grazing the flow has no Taylor series of 8 STEP
+        speeds = np.abs(motion.impacts.velocity_before)
+        if len(motion.impacts) < 1 or speeds.min() < 0.15:  # near a grazing the flow has no Taylor series of 8 STEP
             continue
         matrix, smooth = jacobian(system, state)
         if not smooth or np.abs(matrix).max() > 20:
@@ -72,7 +72,7 @@ def test_the_determinant_of_the_flow_is_the_product_of_its_impacts_and_of_its_da
         # rounding of the end states, 1e-14 or so, over STEP and times the other entries
         assert np.linalg.det(matrix) == pytest.approx(predicted(numbers, motion), abs=1e-10 * (1 + np.abs(matrix).max() ** 2))
         used += 1
-        kinds.add((numbers["e"] < 1, len(motion.crossings)))
+        kinds.add((numbers["e"] < 1, len(motion.impacts)))
     assert used >= 30
     assert len(kinds) >= 6
 

@@ -60,7 +60,7 @@ def test_numbers_alone_give_a_dataset_without_dimensions():
 @pytest.mark.parametrize("shape", [(0,), (0, 3), (2, 0)])
 @pytest.mark.parametrize("options", [{}, {"until": ("rest", "settled"), "sensitivities": ("load.frequency",), "last": "all"}])
 def test_no_trajectories_are_an_ensemble_too(shape, options):
-    everything = ("state", "extrema", "crossings", "speed")
+    everything = ("state", "extrema", "impact_count", "speed")
     fractions = []
     ensemble = run(theta=np.zeros(shape), sample=everything, progress=fractions.append, **options)
     assert ensemble.theta.shape == shape
@@ -172,7 +172,7 @@ def test_a_coordinate_does_not_say_other_parameters_than_there_were():
 
 def test_a_result_can_be_written_and_read(tmp_path):
     theta = xarray.DataArray(ANGLES, dims="start", coords={"start": np.arange(5)})
-    ensemble = run(theta=theta, sample=("state", "extrema", "crossings", "speed"), last="all", periods=3, sensitivities=())
+    ensemble = run(theta=theta, sample=("state", "extrema", "impact_count", "speed"), last="all", periods=3, sensitivities=())
     ensemble.to_netcdf(tmp_path / "ensemble.nc", engine="h5netcdf")
     with xarray.open_dataset(tmp_path / "ensemble.nc", engine="h5netcdf") as read:
         np.testing.assert_array_equal(read.theta, ensemble.theta)

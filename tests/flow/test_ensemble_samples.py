@@ -10,7 +10,7 @@ from lane_cases import FAMILIES, Cases, Duffing, stop_names
 import saltus
 from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
 
-KINDS = ("state", "extrema", "crossings", "speed")
+KINDS = ("state", "extrema", "impact_count", "speed")
 PERIODS = 5.0
 
 
@@ -62,14 +62,14 @@ def test_samples_are_those_of_the_dense_output(family):
         calm, cut = calm + 1, cut + (motion.stop == "limit")
         assert np.isnan(here[f"sampled_{name}"].values[: -(len(edges) - 1)]).all()
         check_records(samples, motion, edges, name, 2e-11 * size)
-        assert samples.period_crossings.sum() == here.crossings
+        assert samples.period_impact_count.sum() == here.impact_count
     assert calm >= 12
     assert cut >= (5 if family == "rocking" else 0)
 
 
 def check_records(samples, motion, edges, name, close):
     """Extrema, impacts and the least speed between the edges, which the last ones end."""
-    times, speeds = motion.crossings.time, np.abs(motion.crossings.velocity_before)
+    times, speeds = motion.impacts.time, np.abs(motion.impacts.velocity_before)
     near_an_edge = np.abs(times[:, None] - edges[None, :-1]).min(initial=1.0) < 1e-9
     for leg, (begin, end) in enumerate(itertools.pairwise(edges)):
         top, bottom = extrema(motion, begin, end)
@@ -77,7 +77,7 @@ def check_records(samples, motion, edges, name, close):
         assert float(samples[f"smallest_{name}"][leg]) == pytest.approx(bottom, abs=close)
         inside = (times > begin) & (times <= end)
         if not near_an_edge:
-            assert int(samples.period_crossings[leg]) == inside.sum()
+            assert int(samples.period_impact_count[leg]) == inside.sum()
             assert float(samples.least_speed[leg]) == pytest.approx(speeds[inside].min(initial=np.inf), rel=1e-8, abs=1e-11)
 
 
@@ -99,7 +99,7 @@ def test_the_period_in_which_a_motion_is_captured_is_kept():
     assert captured.sizes["trajectory"] >= 8
     np.testing.assert_array_equal(captured.sampled_theta[:, -1], captured.theta)
     np.testing.assert_array_equal(captured.sampled_velocity[:, -1], captured.velocity)
-    np.testing.assert_array_equal(captured.period_crossings.sum("period"), captured.crossings)
+    np.testing.assert_array_equal(captured.period_impact_count.sum("period"), captured.impact_count)
     np.testing.assert_array_equal(captured.sampled_theta.notnull().sum("period"), np.ceil(captured.periods))
     assert (captured.periods % 1 > 0).any()
 
@@ -111,7 +111,14 @@ def test_the_last_periods_are_the_tail_of_all_of_them():
     for last in (1, 2, 6, 7, 50):
         tail = cases.in_lanes(sample=KINDS, last=last)
         assert tail.sizes["period"] == min(last, 7)
-        for name in ("sampled_theta", "sampled_velocity", "largest_theta", "smallest_theta", "least_speed", "period_crossings"):
+        for name in (
+            "sampled_theta",
+            "sampled_velocity",
+            "largest_theta",
+            "smallest_theta",
+            "least_speed",
+            "period_impact_count",
+        ):
             np.testing.assert_array_equal(tail[name], everything[name].values[:, -last:])
     ended = stop_names(everything) == "horizon"
     np.testing.assert_array_equal(everything.sampled_theta[ended, -1], everything.theta[ended])
@@ -164,7 +171,7 @@ def test_a_resting_system_has_extrema_zero_and_no_speed():
     assert not here.largest_theta.any()
     assert not here.smallest_theta.any()
     assert np.isinf(here.least_speed).all()
-    assert not here.period_crossings.any()
+    assert not here.period_impact_count.any()
     assert str(stop_names(here)) == "rest"
 
 
@@ -274,4 +281,4 @@ def test_zero_time_keeps_the_state():
         ensemble = saltus.simulate_many(system, theta=np.array([0.3, 0.0, -0.1]), velocity=np.array([0.1, 0.0, 0.0]), **span)
         np.testing.assert_array_equal(ensemble.theta, [0.3, 0.0, -0.1])
         np.testing.assert_array_equal(ensemble.velocity, [0.1, 0.0, 0.0])
-        assert not ensemble.crossings.any()
+        assert not ensemble.impact_count.any()

@@ -15,7 +15,7 @@ DURATION = 6.0
 
 
 def count(theta, system=SYSTEM, velocity=0.0):
-    return len(simulate(system, theta=theta, velocity=velocity, duration=DURATION).crossings)
+    return len(simulate(system, theta=theta, velocity=velocity, duration=DURATION).impacts)
 
 
 def find_grazing(low, high, system=SYSTEM):
@@ -43,13 +43,13 @@ def grazing():
 
 def test_bisection_reaches_a_touch_between_neighbouring_doubles(grazing):
     few, many = sorted(
-        (simulate(SYSTEM, theta=a, velocity=0.0, duration=DURATION) for a in grazing), key=lambda m: len(m.crossings)
+        (simulate(SYSTEM, theta=a, velocity=0.0, duration=DURATION) for a in grazing), key=lambda m: len(m.impacts)
     )
-    assert len(many.crossings) - len(few.crossings) == 2
-    fresh = [i for i, v in enumerate(many.crossings.velocity_before) if abs(v) < 1e-6]
+    assert len(many.impacts) - len(few.impacts) == 2
+    fresh = [i for i, v in enumerate(many.impacts.velocity_before) if abs(v) < 1e-6]
     assert len(fresh) == 2
     assert fresh[1] == fresh[0] + 1
-    assert np.diff(many.crossings.time[fresh])[0] < 1e-6  # at most the square root of the working precision, or so
+    assert np.diff(many.impacts.time[fresh])[0] < 1e-6  # at most the square root of the working precision, or so
     assert few.theta == pytest.approx(many.theta, abs=1e-6)
     assert few.velocity == pytest.approx(many.velocity, abs=1e-6)
 
@@ -87,7 +87,7 @@ def wall(distance):
 
 def test_an_exact_touch_of_the_wall_is_reported_at_its_time_and_changes_nothing():
     motion = simulate(wall(1.0), x=-1.0, velocity=0.0, duration=5.0, tol=1e-15)
-    near = [e for e in motion.events if e.kind in (EventKind.GRAZING, EventKind.CROSSING)]
+    near = [e for e in motion.events if e.kind in (EventKind.GRAZING, EventKind.IMPACT)]
     assert near
     for event in near:
         assert event.time == pytest.approx(math.pi, abs=1e-7)
@@ -99,14 +99,14 @@ def test_an_exact_touch_of_the_wall_is_reported_at_its_time_and_changes_nothing(
 def test_just_through_the_touch_the_impact_speed_is_the_root_of_twice_the_depth(depth):
     motion = simulate(wall(1.0 - depth), x=-1.0, velocity=0.0, duration=4.0, tol=1e-15)
     speed = math.sqrt(2 * depth - depth**2)  # sin t where -cos t = 1 - depth
-    assert motion.crossings.velocity_before[0] == pytest.approx(speed, rel=1e-9 + 1e-15 / depth)
-    assert motion.crossings.time[0] == pytest.approx(math.pi - math.asin(speed), abs=1e-15 / speed + 1e-14)
+    assert motion.impacts.velocity_before[0] == pytest.approx(speed, rel=1e-9 + 1e-15 / depth)
+    assert motion.impacts.time[0] == pytest.approx(math.pi - math.asin(speed), abs=1e-15 / speed + 1e-14)
 
 
 @pytest.mark.parametrize("depth", [1e-3, 1e-6, 1e-9, 1e-12, 1e-14])
 def test_just_short_of_the_touch_there_is_no_impact(depth):
     motion = simulate(wall(1.0 + depth), x=-1.0, velocity=0.0, duration=5.0, tol=1e-15)
-    assert len(motion.crossings) == 0
+    assert len(motion.impacts) == 0
     assert motion.x == pytest.approx(-math.cos(5.0), abs=1e-13)
 
 

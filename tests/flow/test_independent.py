@@ -74,8 +74,8 @@ def passes_near_a_grazing(motion):
     position, velocity, side = motion.dense.states(times)
     gap, rate = side * position[0], side * velocity[0]
     turns = (rate[:-1] * rate[1:] <= 0) & (side[:-1] == side[1:])
-    flights = np.diff(motion.crossings.time)
-    slow = np.abs(motion.crossings.velocity_after[:-1]) * flights / 4 < NEAR_GRAZING  # a parabola's height
+    flights = np.diff(motion.impacts.time)
+    slow = np.abs(motion.impacts.velocity_after[:-1]) * flights / 4 < NEAR_GRAZING  # a parabola's height
     return bool((np.minimum(gap[:-1], gap[1:])[turns] < NEAR_GRAZING).any() or slow.any() or (side == 0).any())
 
 
@@ -100,9 +100,9 @@ def test_100_random_motions_agree_with_heyoka_to_1e_9(integrator, record_propert
             sensitive += 1
         else:
             state, times = by_heyoka(integrator, numbers, theta, velocity, duration)
-            assert len(times) == len(motion.crossings)
+            assert len(times) == len(motion.impacts)
             assert np.abs(state - [motion.theta, motion.velocity]).max() < 1e-9
-            np.testing.assert_allclose(motion.crossings.time, times, rtol=0, atol=1e-9)
+            np.testing.assert_allclose(motion.impacts.time, times, rtol=0, atol=1e-9)
             worst = max(worst, np.abs(state - [motion.theta, motion.velocity]).max())
             compared, impacts = compared + 1, impacts + len(times)
     said = (

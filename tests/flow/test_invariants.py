@@ -45,30 +45,30 @@ FREE = [
 def test_energy_is_constant_over_1000_periods(V, k, theta):
     system = free(V=V, k=k)
     short = simulate(system, theta=theta, velocity=0.0, duration=100.0)
-    times = short.crossings.time
+    times = short.impacts.time
     period = times[2] - times[0] if times.size else 2 * math.pi
     motion = simulate(system, theta=theta, velocity=0.0, duration=1000 * period, tol=1e-15)
     values = energy(system, *sampled(motion, 20000))
     before = energy(system, theta, 0.0, math.copysign(1, theta))
     unloaded = abs(before + V * math.sin(BETA80))  # above the undeformed state
     np.testing.assert_allclose(values, before, rtol=0, atol=1e-12 * max(abs(before), unloaded))
-    assert len(motion.crossings) == (pytest.approx(2000, abs=1) if times.size else 0)
+    assert len(motion.impacts) == (pytest.approx(2000, abs=1) if times.size else 0)
 
 
 def test_an_energy_conserving_impact_keeps_it_between_unequal_masses_too():
     system = free(m=0.8, k=1.2, impact=EnergyRestitution(1.0))
     motion = simulate(system, theta=0.4, velocity=0.0, duration=3000.0, tol=1e-15)
-    assert len(motion.crossings) > 500
+    assert len(motion.impacts) > 500
     np.testing.assert_allclose(energy(system, *sampled(motion, 5000)), energy(system, 0.4, 0.0, 1), rtol=1e-12)
-    factors = motion.crossings.velocity_after / motion.crossings.velocity_before
-    np.testing.assert_allclose(factors, np.where(motion.crossings.side > 0, math.sqrt(1.8), 1 / math.sqrt(1.8)), rtol=1e-15)
+    factors = motion.impacts.velocity_after / motion.impacts.velocity_before
+    np.testing.assert_allclose(factors, np.where(motion.impacts.side > 0, math.sqrt(1.8), 1 / math.sqrt(1.8)), rtol=1e-15)
 
 
 def test_a_continuous_velocity_between_unequal_masses_changes_the_energy_at_each_crossing_and_only_there():
     m = 0.7
     system = free(m=m, k=1.2)
     motion = simulate(system, theta=0.4, velocity=0.0, duration=500.0, tol=1e-15)
-    c = motion.crossings
+    c = motion.impacts
     np.testing.assert_array_equal(c.velocity_after, c.velocity_before)
     before, after = energy(system, 0.0, c.velocity_before, c.side), energy(system, 0.0, c.velocity_after, -c.side)
     np.testing.assert_allclose(after - before, -c.side * m * c.velocity_before**2 / 2, rtol=1e-12)  # errata 7: lost to the upper
@@ -103,10 +103,10 @@ def test_the_mirrored_system_moves_as_the_mirror_image_bit_for_bit(e, theta, vel
     system = System(model=Metainterface(beta0=1.3, damping=0.1), load=GENERAL, impact=VelocityReduction(e))
     motion = simulate(system, theta=theta, velocity=velocity, periods=30)
     image = simulate(system.mirrored(), theta=-theta, velocity=-velocity, periods=30)
-    assert len(motion.crossings) > 10
+    assert len(motion.impacts) > 10
     assert (image.theta, image.velocity, image.side) == (-motion.theta, -motion.velocity, -motion.side)
-    np.testing.assert_array_equal(image.crossings.time, motion.crossings.time)
-    np.testing.assert_array_equal(image.crossings.velocity_before, -motion.crossings.velocity_before)
+    np.testing.assert_array_equal(image.impacts.time, motion.impacts.time)
+    np.testing.assert_array_equal(image.impacts.velocity_before, -motion.impacts.velocity_before)
 
 
 def test_under_a_symmetric_load_the_mirror_image_is_the_motion_half_a_period_later():
@@ -136,8 +136,8 @@ def test_a_horizontal_force_and_a_ground_motion_of_one_amplitude_are_one_load(m)
 
     first, second = loaded(H, 0.0), loaded(0.0, H / W**2)
     one, two = (simulate(s, theta=0.4, velocity=0.0, periods=6, tol=1e-15) for s in (first, second))
-    assert len(one.crossings) == len(two.crossings) > 5
-    np.testing.assert_allclose(one.crossings.time, two.crossings.time, atol=1e-12)
+    assert len(one.impacts) == len(two.impacts) > 5
+    np.testing.assert_allclose(one.impacts.time, two.impacts.time, atol=1e-12)
     times = np.linspace(0.0, one.time, 500)
     np.testing.assert_allclose(one.at(times)[0], two.at(times)[0], atol=1e-12)
     assert abs(simulate(loaded(0.0, -H / W**2), theta=0.4, velocity=0.0, periods=6).theta - one.theta) > 1e-2  # the paper's sign
@@ -151,7 +151,7 @@ def test_a_conservative_motion_run_backwards_returns_to_its_start(H, theta, velo
     back = simulate(reversed_load, theta=there.theta, velocity=-there.velocity, duration=T, tol=1e-15)
     assert back.theta == pytest.approx(theta, abs=1e-12)
     assert back.velocity == pytest.approx(-velocity, abs=1e-12)
-    np.testing.assert_allclose(T - back.crossings.time[::-1], there.crossings.time, atol=1e-12)
+    np.testing.assert_allclose(T - back.impacts.time[::-1], there.impacts.time, atol=1e-12)
 
 
 def test_a_motion_is_the_same_whether_computed_at_once_or_in_pieces():
@@ -162,10 +162,10 @@ def test_a_motion_is_the_same_whether_computed_at_once_or_in_pieces():
         if end <= time:
             continue
         piece = simulate(system, theta=theta, velocity=velocity, time=time, duration=end - time, tol=1e-15)
-        time, theta, velocity, crossings = piece.time, piece.theta, piece.velocity, crossings + len(piece.crossings)
+        time, theta, velocity, crossings = piece.time, piece.theta, piece.velocity, crossings + len(piece.impacts)
     assert theta == pytest.approx(whole.theta, abs=1e-12)
     assert velocity == pytest.approx(whole.velocity, abs=1e-12)
-    assert crossings == len(whole.crossings)
+    assert crossings == len(whole.impacts)
 
 
 def test_the_steps_of_the_dense_output_join():

@@ -27,13 +27,13 @@ TOLERANCES = (1e-14, 1e-15, 1e-14, 1e-12, 1e-9)  # batch by batch, in turn
 
 def counted_in_lanes(ensemble):
     held = ensemble.chatter_speed.values > 0
-    return [*zip(stop_names(ensemble), ensemble.crossings.values, ensemble.side.values, held, strict=True)]
+    return [*zip(stop_names(ensemble), ensemble.impact_count.values, ensemble.side.values, held, strict=True)]
 
 
 def counted(motion):
     if isinstance(motion, str):
         return motion
-    return motion.stop.value, len(motion.crossings), motion.side, motion.chatter_speed is not None
+    return motion.stop.value, len(motion.impacts), motion.side, motion.chatter_speed is not None
 
 
 def elapsed(cases):
@@ -62,7 +62,7 @@ def compare(cases, tol, rng):
             here, there = state[i], motion_state(motion)
             error = np.abs(here - there).max() / max(1.0, np.abs(there).max())
             clock = abs(float(ensemble.time[i]) - motion.time) / max(1.0, abs(motion.time))
-            allowed = each * (1.0 if magnified[i] <= CALM else magnified[i]) + len(motion.crossings) * rounding[i]
+            allowed = each * (1.0 if magnified[i] <= CALM else magnified[i]) + len(motion.impacts) * rounding[i]
             if not max(error, clock) <= allowed:
                 wrong.append((i, error, clock, magnified[i]))
     return wrong, calm, doubtful
@@ -97,14 +97,14 @@ def test_lanes_agree_with_themselves_at_another_tolerance(family):
     magnified = amplification(cases, one, 1e-14, rng)
     state, again = end_state(one, cases.system), end_state(other, cases.system)
     error = np.abs(state - again).max(axis=1) / np.maximum(1.0, np.abs(again).max(axis=1))
-    allowed = 5e-12 * magnified + one.crossings.values * 8 * np.spacing(1.0) * elapsed(cases)
+    allowed = 5e-12 * magnified + one.impacts.values * 8 * np.spacing(1.0) * elapsed(cases)
     ended = np.isin(stop_names(one), ["horizon", "rest", "limit"])  # not at a singularity
     calm = ended & np.isfinite(magnified) & (other.grazings.values == 0)
     # an accumulation of impacts is cut at a speed that follows the tolerance
     lossless = cases.columns.get("impact.e", np.zeros(len(cases))) == 1.0
-    counts = lossless & (one.crossings.values != other.crossings.values)
+    counts = lossless & (one.impacts.values != other.impact_count.values)
     wrong = np.flatnonzero(calm & (counts | ~(error <= allowed)))
-    assert not wrong.size, [(i, error[i], magnified[i], one.crossings.values[i], other.crossings.values[i]) for i in wrong[:5]]
+    assert not wrong.size, [(i, error[i], magnified[i], one.impacts.values[i], other.impact_count.values[i]) for i in wrong[:5]]
     assert calm.mean() > 0.75
 
 
@@ -116,7 +116,7 @@ def test_no_flight_of_thousands_of_slow_ones_is_wrong():
         FAMILIES["paper"](rng, 1).one(0)[0].with_({"impact.e": 1.0, "load.horizontal.amplitude": 0.05, "load.vertical": -0.5})
     )
     ends = [saltus.simulate_many(system, theta=0.0, velocity=speed, time=begin, duration=0.3, tol=tol) for tol in (1e-14, 1e-15)]
-    assert int(ends[0].crossings.max()) > 50
-    np.testing.assert_array_equal(ends[0].crossings, ends[1].crossings)
+    assert int(ends[0].impact_count.max()) > 50
+    np.testing.assert_array_equal(ends[0].impact_count, ends[1].impact_count)
     np.testing.assert_allclose(ends[0].velocity, ends[1].velocity, rtol=0, atol=1e-12)
     np.testing.assert_allclose(ends[0].theta, ends[1].theta, rtol=0, atol=1e-12)

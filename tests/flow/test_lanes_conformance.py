@@ -101,7 +101,7 @@ def test_lanes_are_the_scalar_kernel(ready):
     stops = stop_names(ensemble)
     for i, state in enumerate(end_state(ensemble, system)):
         motion = saltus.simulate(system, **one(states, velocity, i), periods=1.4, tol=1e-14, dense=False)
-        assert (stops[i], int(ensemble.crossings[i]), int(ensemble.side[i])) == (motion.stop, len(motion.crossings), motion.side)
+        assert (stops[i], int(ensemble.impact_count[i]), int(ensemble.side[i])) == (motion.stop, len(motion.impacts), motion.side)
         np.testing.assert_allclose(state, motion_state(motion), rtol=0, atol=3e-12)
 
 
@@ -145,7 +145,7 @@ def test_every_impact_law_runs_in_lanes_where_the_model_takes_it(model, impact):
         pytest.skip("some of its impacts have no solution; the random cases compare them")
     ensemble = saltus.simulate_many(system, **states, velocity=velocity, periods=1.0, tol=1e-14)
     for i, motion in enumerate(expected):
-        assert int(ensemble.crossings[i]) == len(motion.crossings)
+        assert int(ensemble.impact_count[i]) == len(motion.impacts)
         np.testing.assert_allclose(end_state(ensemble, system)[i], motion_state(motion), rtol=0, atol=3e-12)
 
 

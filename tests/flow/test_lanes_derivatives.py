@@ -39,7 +39,7 @@ def test_derivatives_in_lanes_are_those_of_the_scalar_kernel(family):
         expected, found = np.hstack([result.state, result.parameters]), ensemble.derivative.values[i]
         if result.motion.stop == "limit" or result.grazings.size:
             continue
-        speeds = np.abs(result.motion.crossings.velocity_before)
+        speeds = np.abs(result.motion.impacts.velocity_before)
         if speeds.size and result.motion.side != 0 and speeds.min() < 1e-3:
             continue  # near a grazing a derivative of the order 1/v magnifies the rounding
         undefined += bool(result.undefined)
@@ -48,7 +48,7 @@ def test_derivatives_in_lanes_are_those_of_the_scalar_kernel(family):
         # second derivatives magnify the rounding of states by as much again
         error = np.nanmax(np.abs(found - expected) / scale, initial=0.0)
         if not same or error > 1e-9 * max(1.0, np.nanmax(np.abs(result.state), initial=0.0) / 100):
-            wrong.append((i, error, int(ensemble.crossings[i]), found, expected))
+            wrong.append((i, error, int(ensemble.impact_count[i]), found, expected))
         compared += 1
     assert not wrong, wrong[:2]
     assert compared >= 20
@@ -92,11 +92,11 @@ def test_the_determinant_obeys_its_law(family):
                     continue
                 c, m = cases.columns["model.dissipation_ratio"][i], cases.columns["model.mass_ratio"][i]
                 exponent = damping * (c * spent[1] / (1 + m) + spent[-1])
-            expected = factor[i] ** (2.0 * int(ensemble.crossings[i])) * np.exp(-exponent)
+            expected = factor[i] ** (2.0 * int(ensemble.impact_count[i])) * np.exp(-exponent)
         used += 1
-        kinds.add((stops[i], min(int(ensemble.crossings[i]), 3)))
+        kinds.add((stops[i], min(int(ensemble.impact_count[i]), 3)))
         if abs(found[i] - expected) > 1e-10 * (1 + size[i] ** 2):
-            wrong.append((i, found[i], expected, size[i], stops[i], int(ensemble.crossings[i])))
+            wrong.append((i, found[i], expected, size[i], stops[i], int(ensemble.impact_count[i])))
     assert not wrong, f"{len(wrong)} of {used}: {wrong[:4]}"
     assert used >= 0.4 * len(cases)
     assert len(kinds) >= (1 if family == "duffing" else 4)
@@ -115,6 +115,6 @@ def test_after_rest_there_is_no_derivative_to_the_start_left():
     ensemble = Cases(cases.system, cases.columns, cases.state, cases.velocity, cases.time, {"periods": 6.0}).in_lanes(
         sensitivities=()
     )
-    resting = (stop_names(ensemble) == "rest") & (cases.columns["impact.e"] < 1) & (ensemble.crossings.values > 0)
+    resting = (stop_names(ensemble) == "rest") & (cases.columns["impact.e"] < 1) & (ensemble.impact_count.values > 0)
     assert resting.sum() >= 5
     assert not ensemble.derivative.values[resting].any()

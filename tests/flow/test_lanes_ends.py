@@ -24,10 +24,10 @@ def test_an_accumulation_that_ends_beside_a_forcing_period_has_the_scalar_kernel
     for periods in (1, 2, 3):
         arguments = {"theta": 0.3, "time": begin, "periods": periods}
         alone, lane = saltus.simulate(turned, **arguments), saltus.simulate_many(turned, **arguments)
-        assert int(lane.crossings) == len(alone.crossings)
+        assert int(lane.impact_count) == len(alone.impacts)
         assert str(stop_names(lane)) == alone.stop.value
         if periods > 1:
-            assert len(alone.crossings) == len(motion.crossings)
+            assert len(alone.impacts) == len(motion.impacts)
 
 
 def test_impacts_too_slow_to_be_followed_are_captured_at_once():
@@ -78,5 +78,5 @@ def test_a_long_ordinary_motion_has_as_many_impacts_as_it_needs(frequency):
     system = System(model=WallOscillator(stiffness=0.0, damping=0.0, wall=0.0), load=Load(frequency=frequency, force=1.0))
     ends = saltus.simulate_many(system, x=0.0, velocity=-speed, duration=2 * speed * (count + 0.5), tol=1e-9)
     assert str(stop_names(ends)) == "horizon"
-    assert int(ends.crossings) == count
+    assert int(ends.impact_count) == count
     assert float(ends.x) == pytest.approx(-(speed**2) / 2, abs=1e-8)

@@ -12,7 +12,7 @@ from lane_cases import FAMILIES, end_state
 import saltus.flow.ensemble.threads as lanes_run
 from saltus.taylor.vectors import WIDTH
 
-OPTIONS = {"sample": ("state", "extrema", "crossings", "speed"), "last": 3, "tol": 1e-12}
+OPTIONS = {"sample": ("state", "extrema", "impact_count", "speed"), "last": 3, "tol": 1e-12}
 MANY = 2600  # more than two chunks
 
 
@@ -87,7 +87,7 @@ from saltus.taylor.vectors import WIDTH
 cases = FAMILIES["paper"](np.random.default_rng(8), 400)
 ensemble = cases.in_lanes(tol=1e-14, sample=("state", "extrema"))
 state, extrema = end_state(ensemble, cases.system), np.stack([ensemble.largest_theta, ensemble.smallest_theta])
-np.savez(sys.argv[1], width=WIDTH, state=state, extrema=extrema, stop=stop_names(ensemble), crossings=ensemble.crossings)
+np.savez(sys.argv[1], width=WIDTH, state=state, extrema=extrema, stop=stop_names(ensemble), crossings=ensemble.impact_count)
 """
 
 
@@ -110,7 +110,7 @@ def test_every_width_of_register_gives_the_same_bits(tmp_path):
     assert [int(r["width"]) for r in results.values()] == list(widths)
     one = results[widths[0]]
     for width, other in results.items():
-        for name in ("stop", "crossings"):
+        for name in ("stop", "impact_count"):
             np.testing.assert_array_equal(one[name], other[name])
         for name in ("state", "extrema"):
             equal = (one[name] == other[name]).mean()

@@ -34,13 +34,13 @@ def test_each_period_has_what_the_scalar_motion_has_in_it(system, time, periods)
         motion = saltus.simulate(system, theta=theta, time=time, periods=periods, tol=1e-14)
         bounds = motion.start + system.load.period * np.arange(math.ceil(periods) + 1)
         bounds[-1] = motion.time
-        ours, (x, v), crossings = ends.isel(trajectory=i), motion.at(bounds[1:]), motion.crossings
+        ours, (x, v), crossings = ends.isel(trajectory=i), motion.at(bounds[1:]), motion.impacts
         np.testing.assert_allclose([ours.sampled_theta, ours.sampled_velocity], [x, v], rtol=0, atol=1e-12)
         spans = list(itertools.pairwise(bounds))
         largest, smallest = np.transpose([extrema(motion, *span) for span in spans])
         np.testing.assert_allclose([ours.largest_theta, ours.smallest_theta], [largest, smallest], rtol=0, atol=1e-12)
         inside = [(crossings.time > a) & (crossings.time <= b) for a, b in spans]
-        np.testing.assert_array_equal(ours.period_crossings, [chosen.sum() for chosen in inside])
+        np.testing.assert_array_equal(ours.period_impact_count, [chosen.sum() for chosen in inside])
         speeds = [np.abs(crossings.velocity_before[chosen]).min(initial=np.inf) for chosen in inside]
         np.testing.assert_allclose(ours.least_speed, speeds, rtol=0, atol=1e-11)
         assert float(ours.time) == pytest.approx(motion.time, abs=1e-13)
@@ -57,7 +57,7 @@ def test_what_has_settled_ends_at_the_end_of_its_period():
     other = saltus.simulate_many(system, periods=float(ends.periods), **options)
     assert float(ends.theta) == pytest.approx(float(other.theta), abs=1e-13)
     np.testing.assert_allclose(ends.derivative, other.derivative, rtol=0, atol=1e-10)
-    assert int(ends.crossings) == int(other.crossings)
+    assert int(ends.impact_count) == int(other.impact_count)
 
 
 def test_turning_points_before_a_part_of_a_step_do_not_count():

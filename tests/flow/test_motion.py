@@ -34,11 +34,11 @@ def test_end_state_is_that_of_the_dense_output(motion):
     assert motion.position == motion.theta
     assert motion.time == pytest.approx(3 * 2 * math.pi, abs=1e-14)
     assert (motion.stop, motion.limit, motion.periods, motion.side) == (Stop.HORIZON, None, 3, int(np.sign(motion.theta)))
-    assert f"crossings={len(motion.crossings)}" in repr(motion)
+    assert f"impacts={len(motion.impacts)}" in repr(motion)
 
 
 def test_velocity_at_an_impact_is_the_one_after_it(motion):
-    crossings = motion.crossings
+    crossings = motion.impacts
     theta, velocity = motion.at(crossings.time)
     assert theta == pytest.approx(np.zeros(len(crossings)), abs=1e-15)
     assert velocity == pytest.approx(crossings.velocity_after, abs=1e-15)
@@ -48,11 +48,11 @@ def test_velocity_at_an_impact_is_the_one_after_it(motion):
 
 def test_motion_that_ends_at_an_impact_ends_after_it():
     wall = WALL.with_({"model.wall": 1.0, "load.force.amplitude": 0.9, "impact.e": 0.8})
-    impact = simulate(wall, x=0.0, periods=2).crossings
+    impact = simulate(wall, x=0.0, periods=2).impacts
     ends = impact.time[0] + np.arange(8) * np.spacing(impact.time[0])  # the impact is in by one of these: rounding says which
-    kept = next(m for m in (simulate(wall, x=0.0, duration=float(end)) for end in ends) if len(m.crossings) == 1)
+    kept = next(m for m in (simulate(wall, x=0.0, duration=float(end)) for end in ends) if len(m.impacts) == 1)
     motion = simulate(wall, x=0.0, duration=kept.time, samples=[0.0, kept.time])
-    assert len(motion.crossings) == 1
+    assert len(motion.impacts) == 1
     assert kept.at(kept.time) == (kept.x, kept.velocity)
     assert kept.x == pytest.approx(1.0, abs=1e-14)
     assert (motion.samples.velocity[0, -1], kept.velocity) == pytest.approx([impact.velocity_after[0]] * 2, abs=1e-13)
@@ -69,7 +69,7 @@ def test_states_take_the_shape_of_the_times(motion):
 
 def test_dense_output_satisfies_the_equation(motion):
     times = np.linspace(0.01, motion.time - 0.01, 400)
-    times = times[np.abs(times[:, None] - motion.crossings.time).min(axis=1) > 1e-3]
+    times = times[np.abs(times[:, None] - motion.impacts.time).min(axis=1) > 1e-3]
     h = 1e-3
     theta, velocity = motion.at(times)
     left, right = motion.at(times - h / 2)[1], motion.at(times + h / 2)[1]
@@ -86,7 +86,7 @@ def test_times_outside_the_motion_are_refused(motion, time):
 def test_motion_that_was_not_kept_says_so():
     kept, thrown = (simulate(SYSTEM, theta=0.3, periods=3, dense=dense) for dense in (True, False))
     assert (thrown.theta, thrown.velocity) == (kept.theta, kept.velocity)
-    assert np.array_equal(thrown.crossings.time, kept.crossings.time)
+    assert np.array_equal(thrown.impacts.time, kept.impacts.time)
     for use in (lambda: thrown.at(1.0), lambda: thrown.to_xarray()):
         with pytest.raises(ParameterError, match="only its end, its events and its `samples` are known"):
             use()
@@ -95,7 +95,7 @@ def test_motion_that_was_not_kept_says_so():
 
 
 def test_samples_are_the_states_of_the_whole_motion(motion):
-    times = np.concatenate([[0.0], motion.crossings.time[:2], np.linspace(3.0, motion.time, 50), [motion.time + 1.0]])
+    times = np.concatenate([[0.0], motion.impacts.time[:2], np.linspace(3.0, motion.time, 50), [motion.time + 1.0]])
     sampled = simulate(SYSTEM, theta=0.3, periods=3, samples=np.sort(times)).samples
     inside = np.sort(times)[:-1]
     assert sampled.time == pytest.approx(inside, abs=0)
@@ -115,7 +115,7 @@ def test_motion_of_no_length_is_its_start():
     motion = simulate(SYSTEM, theta=0.3, velocity=-0.2, duration=0.0, time=1.5)
     assert (motion.time, motion.theta, motion.velocity, motion.side) == (1.5, 0.3, -0.2, 1)
     assert motion.at(1.5) == (0.3, -0.2)
-    assert len(motion.events) == len(motion.crossings) == 0
+    assert len(motion.events) == len(motion.impacts) == 0
     assert motion.validity.respected
 
 
@@ -143,7 +143,7 @@ def test_motion_can_be_copied_and_pickled(motion):
 
 
 def test_impacts_alternate_between_the_sides_and_lose_the_same_share(motion):
-    crossings = motion.crossings
+    crossings = motion.impacts
     assert len(crossings) == crossings.time.size == crossings.velocity_after.size > 3
     assert (np.diff(crossings.time) > 0).all()
     assert crossings.side.dtype == np.int8
@@ -157,12 +157,12 @@ def test_events_come_in_order_of_time():
     motion = simulate(system, theta=0.3, periods=3)
     kinds = [event.kind for event in motion.events]
     times = np.array([event.time for event in motion.events])
-    assert {EventKind.CROSSING, EventKind.REST, EventKind.RELEASE} <= set(kinds)
+    assert {EventKind.IMPACT, EventKind.REST, EventKind.RELEASE} <= set(kinds)
     assert (np.diff(times) >= 0).all()
     assert 0 <= times[0] <= times[-1] <= motion.time
     for here, following in zip(motion.events, motion.events[1:], strict=False):
         assert (following.kind is EventKind.RELEASE) == (here.kind is EventKind.REST)
-    assert [e.time for e in motion.events if e.kind is EventKind.CROSSING] == motion.crossings.time.tolist()
+    assert [e.time for e in motion.events if e.kind is EventKind.IMPACT] == motion.impacts.time.tolist()
 
 
 # --- margins -------------------------------------------------------------------------------------------------------------
@@ -207,10 +207,7 @@ def test_share_of_the_wrong_reaction_is_that_of_fine_samples(large):
         assert motion.validity.share["reaction"] == pytest.approx(wrong.mean(), abs=2e-5)
         first = int(np.argmax(wrong))
         assert motion.validity.first["reaction"] == pytest.approx(times[first], abs=times[1])
-        if (
-            value[first - 1] > 0
-            and not ((motion.crossings.time > times[first - 1]) & (motion.crossings.time < times[first])).any()
-        ):
+        if value[first - 1] > 0 and not ((motion.impacts.time > times[first - 1]) & (motion.impacts.time < times[first])).any():
             exact = brentq(lambda t, m=motion, s=system: float(reaction(t, *m.at(t), s)), times[first - 1], times[first])
             assert motion.validity.first["reaction"] == pytest.approx(exact, abs=1e-11)
 
@@ -276,7 +273,7 @@ def test_dataset_repeats_the_motion(motion):
     again = simulate(System.from_json(data.attrs["system"]), theta=0.3, periods=3, tol=data.attrs["tol"])
     assert (again.theta, again.velocity, again.time) == (motion.theta, motion.velocity, data.attrs["end_time"])
     assert data.theta.values[-1] == pytest.approx(motion.theta, abs=1e-14)
-    assert data.sizes == {"time": 601, "crossing": len(motion.crossings)}
+    assert data.sizes == {"time": 601, "impact": len(motion.impacts)}
     assert np.stack([data.theta, data.velocity]) == pytest.approx(np.stack(motion.at(data.time.values)), abs=0)
     assert set(np.unique(data.side)) == {-1, 1}
     assert data.theta.attrs["units"] == "rad"

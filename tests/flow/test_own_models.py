@@ -59,10 +59,10 @@ def test_free_motion_of_the_bilinear_oscillator_is_two_half_waves():
         motion = simulate(system, x=0.5, duration=5 * period)
         first = 0.5 * math.pi / math.sqrt(right)
         rights = first + period * np.arange(5)
-        assert motion.crossings.time[::2] == pytest.approx(rights, abs=1e-11)
-        assert motion.crossings.time[1::2] == pytest.approx(rights + math.pi / math.sqrt(left), abs=1e-11)
+        assert motion.impacts.time[::2] == pytest.approx(rights, abs=1e-11)
+        assert motion.impacts.time[1::2] == pytest.approx(rights + math.pi / math.sqrt(left), abs=1e-11)
         speeds = 0.5 * math.sqrt(right) * e ** np.arange(10)
-        assert np.abs(motion.crossings.velocity_before) == pytest.approx(speeds, rel=1e-12)
+        assert np.abs(motion.impacts.velocity_before) == pytest.approx(speeds, rel=1e-12)
         assert motion.x == pytest.approx(0.5 * e**10, abs=1e-11)
 
 

@@ -72,7 +72,7 @@ def _compiled():
 
 def check(motion):
     """What every motion must keep. Returns the number of its impacts."""
-    dense, crossings = motion.dense, motion.crossings
+    dense, crossings = motion.dense, motion.impacts
     assert np.isfinite([motion.theta, motion.velocity]).all()
     size = max(1.0, np.abs(dense.series[:, 0, 0]).max())
     assert (dense.side[:, None] * evaluate_steps(dense)).min() >= -1e-13 * size, "penetration"
@@ -116,11 +116,11 @@ def test_10000_random_motions_never_penetrate_and_obey_the_law_at_every_root(chu
             refused += 1
             continue
         impacts += check(motion)
-        np.testing.assert_array_equal(motion.crossings.velocity_after, chosen.impact.e * motion.crossings.velocity_before)
+        np.testing.assert_array_equal(motion.impacts.velocity_after, chosen.impact.e * motion.impacts.velocity_before)
         kinds |= {e.kind for e in motion.events}
     assert refused < 0.08 * CHUNK, f"{refused} of {CHUNK} refused as not unique"
     assert impacts > 2 * CHUNK
-    assert kinds >= {EventKind.CROSSING, EventKind.REST, EventKind.RELEASE}
+    assert kinds >= {EventKind.IMPACT, EventKind.REST, EventKind.RELEASE}
 
 
 def test_random_motions_with_an_energy_restitution_keep_its_energy_at_every_impact():
@@ -132,7 +132,7 @@ def test_random_motions_with_an_energy_restitution_keep_its_energy_at_every_impa
         if motion is None:
             continue
         impacts += check(motion)
-        c, lower = motion.crossings, 1 + chosen.model.mass_ratio * (1 + motion.crossings.side) / 2
+        c, lower = motion.impacts, 1 + chosen.model.mass_ratio * (1 + motion.impacts.side) / 2
         upper = 1 + chosen.model.mass_ratio * (1 - c.side) / 2
         np.testing.assert_allclose(upper * c.velocity_after**2, chosen.impact.r * lower * c.velocity_before**2, rtol=1e-13)
     assert impacts > 1000

@@ -127,8 +127,8 @@ def test_impacts_under_a_force_record_agree_with_scipy():
         contact=0.3,
     )
     motion = simulate(system, x=0.2, velocity=0.5, duration=12.0)
-    assert len(motion.crossings) == len(impacts) >= 4
-    assert motion.crossings.time == pytest.approx(impacts, abs=1e-9)
+    assert len(motion.impacts) == len(impacts) >= 4
+    assert motion.impacts.time == pytest.approx(impacts, abs=1e-9)
     assert (motion.x, motion.velocity) == pytest.approx((x, v), abs=1e-9)
 
 
@@ -173,8 +173,8 @@ def test_metainterface_on_recorded_ground_agrees_with_scipy(quantity, start):
         reset=lambda side, v: (-side, 0.9 * v),
     )
     motion = simulate(system, theta=0.2, velocity=0.4, time=start, duration=12.0)
-    assert len(motion.crossings) == len(impacts) >= 3
-    assert motion.crossings.time == pytest.approx(impacts, abs=1e-9)
+    assert len(motion.impacts) == len(impacts) >= 3
+    assert motion.impacts.time == pytest.approx(impacts, abs=1e-9)
     assert (motion.theta, motion.velocity, motion.side) == pytest.approx((x, v, side), abs=1e-9)
 
 
@@ -192,7 +192,7 @@ def test_block_under_a_finely_sampled_sine_moves_as_under_the_harmonic():
         t = np.linspace(0.0, 2 * 2 * math.pi / 3.0, count + 1)
         sampled = block(Record(t, -0.03 * 9.0 * np.sin(3.0 * t), "acceleration"), 0.0)
         motion = simulate(sampled, theta=0.05, periods=2)
-        assert len(motion.crossings) == len(smooth.crossings) > 0
+        assert len(motion.impacts) == len(smooth.impacts) > 0
         errors.append(abs(motion.theta - smooth.theta) + abs(motion.velocity - smooth.velocity))
     assert errors[0] < 1e-3
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)

@@ -219,8 +219,8 @@ def test_the_wall_holds_what_presses_on_it_until_the_force_falls_to_k_d():
 
 def test_a_perfectly_plastic_impact_rests_at_once_where_it_is_held_and_goes_on_where_it_is_not():
     stuck = simulate(driven(e=0.0), theta=0.3, velocity=0.0, duration=10.0)
-    assert len(stuck.crossings) == 1
-    assert stuck.rest_time == stuck.crossings.time[0]
+    assert len(stuck.impacts) == 1
+    assert stuck.rest_time == stuck.impacts.time[0]
     pushed = simulate(driven(e=0.0, mean=-0.5), theta=0.3, velocity=0.0, duration=3.0)
-    first = pushed.crossings.time[0]
+    first = pushed.impacts.time[0]
     assert pushed.at(first + 1e-3)[0] == pytest.approx(-(0.5 * SIN - 0.5 * COS) * 1e-6 / 2, rel=1e-3)

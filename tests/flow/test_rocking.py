@@ -32,7 +32,7 @@ def test_free_rocking_without_loss_has_the_period_of_the_quadrature_and_of_the_c
     motion = simulate(block(alpha), theta=theta0, velocity=0.0, duration=30.0, tol=1e-15)
     with mp.workdps(30):
         quarter = float(quarter_period(alpha, theta0))
-    np.testing.assert_allclose(motion.crossings.time, quarter * (1 + 2 * np.arange(len(motion.crossings))), atol=1e-11)
+    np.testing.assert_allclose(motion.impacts.time, quarter * (1 + 2 * np.arange(len(motion.impacts))), atol=1e-11)
     assert 4 * quarter == pytest.approx(rocking_period(theta0, alpha=alpha), rel=1e-12)
 
 
@@ -40,7 +40,7 @@ def test_the_period_of_small_rocking_tends_to_its_short_form():
     errors = []
     for theta0 in (0.02, 0.01, 0.005):
         motion = simulate(block(0.4), theta=theta0, velocity=0.0, duration=5.0, tol=1e-15)
-        errors.append(abs(short_rocking_period(theta0, alpha=0.4) / (4 * motion.crossings.time[0]) - 1))
+        errors.append(abs(short_rocking_period(theta0, alpha=0.4) / (4 * motion.impacts.time[0]) - 1))
     assert errors[0] < 0.05
     assert errors[1] < 0.7 * errors[0]
     assert errors[2] < 0.7 * errors[1]
@@ -50,15 +50,15 @@ def test_the_period_of_small_rocking_tends_to_its_short_form():
 def test_each_inelastic_impact_has_the_factor_of_housner_and_rest_follows(alpha):
     factor = 1 - 1.5 * math.sin(alpha) ** 2  # conservation of angular momentum about the new corner
     motion = simulate(block(alpha, impact=InelasticImpact()), theta=0.7 * alpha, velocity=0.0, duration=400.0)
-    np.testing.assert_allclose(motion.crossings.velocity_after, max(factor, 0.0) * motion.crossings.velocity_before, rtol=1e-14)
+    np.testing.assert_allclose(motion.impacts.velocity_after, max(factor, 0.0) * motion.impacts.velocity_before, rtol=1e-14)
     assert motion.stop is Stop.REST
     with mp.workdps(30):
         # theta_n of the n-th swing from v^2 / 2 = cos(alpha - theta_n) - cos(alpha), v falling by the factor at each impact
         speed = mp.sqrt(2 * (mp.cos(alpha - mp.mpf(0.7) * alpha) - mp.cos(mp.mpf(alpha))))
         time = quarter_period(alpha, 0.7 * alpha)
-        for n in range(min(5, len(motion.crossings))):
-            assert abs(motion.crossings.velocity_before[n]) == pytest.approx(float(speed), rel=1e-12)
-            assert motion.crossings.time[n] == pytest.approx(float(time), rel=1e-12)
+        for n in range(min(5, len(motion.impacts))):
+            assert abs(motion.impacts.velocity_before[n]) == pytest.approx(float(speed), rel=1e-12)
+            assert motion.impacts.time[n] == pytest.approx(float(time), rel=1e-12)
             speed *= factor
             time += 2 * quarter_period(alpha, alpha - mp.acos(mp.cos(mp.mpf(alpha)) + speed**2 / 2))
 
@@ -83,7 +83,7 @@ def test_the_separatrix_between_rocking_and_overturning_is_where_the_energy_reac
         simulate(block(alpha), theta=0.0, velocity=critical * f, duration=60.0, tol=1e-15) for f in (1 - 1e-9, 1 + 1e-9)
     )
     assert below.limit is None
-    assert len(below.crossings) >= 1
+    assert len(below.impacts) >= 1
     assert above.limit == "overturned"
 
 
@@ -110,8 +110,8 @@ def test_a_ground_that_moves_both_ways_is_met_by_scipy_restarted_at_each_impact(
         if arc.t_events[0].size:
             times.append(time)
             side, state = -side, (0.0, factor * state[1])
-    assert len(times) == len(motion.crossings) >= 3
-    np.testing.assert_allclose(motion.crossings.time, times, atol=1e-9)
+    assert len(times) == len(motion.impacts) >= 3
+    np.testing.assert_allclose(motion.impacts.time, times, atol=1e-9)
     assert motion.theta == pytest.approx(state[0], abs=1e-9)
     assert motion.velocity == pytest.approx(state[1], abs=1e-9)
 

@@ -28,8 +28,8 @@ DURATION = 6.0
 
 def side_times(motion):
     """The time spent on each side, from the impacts alone."""
-    bounds = np.concatenate([[0.0], motion.crossings.time, [motion.time]])
-    sides = np.append(motion.crossings.side, motion.side)
+    bounds = np.concatenate([[0.0], motion.impacts.time, [motion.time]])
+    sides = np.append(motion.impacts.side, motion.side)
     return {s: np.diff(bounds)[sides == s].sum() for s in (1, -1)}
 
 
@@ -66,7 +66,7 @@ def damping_integral(system, motion):
 
 def law(system, motion):
     """The determinant, from the impacts and the times spent on each side."""
-    impacts = motion.crossings
+    impacts = motion.impacts
     rows = zip(impacts.time, impacts.side, impacts.velocity_before, impacts.velocity_after, strict=True)
     factors = [impact_slope(system, t, int(s), before, after) * abs(after / before) for t, s, before, after in rows]
     return math.prod(factors) * math.exp(-damping_integral(system, motion))
@@ -130,11 +130,11 @@ def test_the_determinant_is_the_product_of_the_saltations_and_of_the_damping(nam
             refused += 1
             continue
         motion = result.motion
-        if any(event.kind != "crossing" for event in motion.events):  # rest, or the block overturned: its tests are elsewhere
+        if any(event.kind != "impact" for event in motion.events):  # rest, or the block overturned: its tests are elsewhere
             continue
         assert result.undefined is None
         assert result.determinant == pytest.approx(law(system, motion), rel=0, abs=1e-10), (system, start, speed)
-        used, with_impacts = used + 1, with_impacts + (len(motion.crossings) > 0)
+        used, with_impacts = used + 1, with_impacts + (len(motion.impacts) > 0)
     assert used > 0.6 * count, used
     assert with_impacts > 0.5 * count, with_impacts
     assert refused < 0.05 * count

@@ -112,7 +112,7 @@ def test_all_derivatives_are_those_of_a_30_digit_motion(numbers, start, impacts,
     )
     assert result.parameter_paths == tuple(PATHS.values())
     assert result.undefined is None
-    assert len(result.motion.crossings) >= impacts
+    assert len(result.motion.impacts) >= impacts
     if start[0]:
         check(result, np.array(columns).T)
     else:  # at contact the reference has no motions on the other side: without the first column
@@ -166,7 +166,7 @@ def test_the_wall_s_place_and_law_and_the_oscillator_s_numbers():
     )
     start, duration = (-0.5, 0.3), 15.0
     result = saltus.sensitivities(system, x=start[0], velocity=start[1], duration=duration, parameters=paths)
-    guesses = result.motion.crossings.time
+    guesses = result.motion.impacts.time
     assert len(guesses) >= 4
     with mp.workdps(30):
         columns = [
@@ -238,7 +238,7 @@ def test_the_motion_is_that_of_simulate_to_the_last_bit():
     plain = saltus.simulate(system, theta=0.3, velocity=0.1, periods=20)
     motion = saltus.sensitivities(system, theta=0.3, velocity=0.1, periods=20, parameters=("load.frequency",)).motion
     assert (motion.theta, motion.velocity) == (plain.theta, plain.velocity)
-    np.testing.assert_array_equal(motion.crossings.time, plain.crossings.time)
+    np.testing.assert_array_equal(motion.impacts.time, plain.impacts.time)
     times = np.linspace(0.0, motion.time, 100)
     np.testing.assert_array_equal(motion.at(times)[0], plain.at(times)[0])
 

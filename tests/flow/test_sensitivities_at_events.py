@@ -141,7 +141,7 @@ def test_records_of_the_ground_in_an_energy_law_and_in_a_release():
     model = Metainterface(beta0=BETA80, damping=0.1, mass_ratio=0.3)
     system = System(model=model, load=Load(ground_horizontal=ground, vertical=-0.5), impact=EnergyRestitution(0.8))
     result = saltus.sensitivities(system, theta=0.6, velocity=0.1, duration=9.0, parameters=GROUND_PATHS, tol=1e-14)
-    assert len(result.motion.crossings) >= 2
+    assert len(result.motion.impacts) >= 2
 
     def values(system=system, theta=0.6):
         motion = saltus.simulate(system, theta=theta, velocity=0.1, duration=9.0, tol=1e-15)
@@ -250,7 +250,7 @@ def test_chatter_takes_the_derivative_and_says_so():
     assert np.isnan(result.state).all()
     assert np.isnan(result.parameters).all()
     assert math.isnan(result.determinant)
-    last = len(result.motion.crossings) - 1
+    last = len(result.motion.impacts) - 1
     assert np.isfinite(result.event_times[: last + 1]).all()  # of the impacts before
     assert np.isnan(result.event_times[last + 1]).all()
 
@@ -279,12 +279,12 @@ def test_a_grazing_is_reported_and_leaves_no_nan(wall):
     load = Load(frequency=1.0, force=Harmonic(amplitude=1.0, phase=math.pi / 2))
     system = System(model=WallOscillator(stiffness=0.0, wall=wall), load=load, impact=VelocityReduction(0.8))
     result = saltus.sensitivities(system, x=-1.0, duration=5.0, parameters=("model.wall",), tol=1e-15)
-    touches = [*result.grazings, *result.motion.crossings.time]
+    touches = [*result.grazings, *result.motion.impacts.time]
     for touch in touches:
         assert touch == pytest.approx(math.pi, abs=1e-6)
     assert len(touches) > 0 or wall > 1.0
     assert result.undefined is not None or np.isfinite(result.state).all()
-    if not len(result.motion.crossings):
+    if not len(result.motion.impacts):
         np.testing.assert_allclose(result.state, [[1.0, 5.0], [0.0, 1.0]], rtol=1e-13)
         np.testing.assert_array_equal(result.parameters, 0.0)
 

@@ -57,7 +57,7 @@ def test_hyperbolic_tangent_is_the_paper_s_q():
 def test_smoothed_motion_converges_to_the_exact_one_with_the_square_of_the_width():
     # Over a crossing at speed v the odd part of sgn - q cancels, and the rest lasts 1/(B v) with a force of order 1/B.
     exact = simulate(EXACT, theta=0.3, duration=7.0)
-    assert len(exact.crossings) >= 1
+    assert len(exact.impacts) >= 1
     sharpness = np.array([50.0, 200.0, 1000.0, 5000.0])
     errors = []
     for b in sharpness:
@@ -71,7 +71,7 @@ def test_smoothed_motion_converges_to_the_exact_one_with_the_square_of_the_width
 
 def test_smoothed_motion_has_no_impacts_and_no_sides():
     motion = run(200.0)
-    assert len(motion.crossings) == 0
+    assert len(motion.impacts) == 0
     assert list(motion.events) == []
     assert SMOOTH.model.sides == ()
 

@@ -61,8 +61,8 @@ def test_the_steady_impacts_have_the_speed_and_the_phase_of_the_closed_form():
     motion = simulate(oscillator(A=0.2, w=1.0), x=0.0, velocity=0.0, periods=300, tol=1e-14)
     ((speed, phase),) = one_impact_orbits(A=0.2, w=1.0)
     assert speed == pytest.approx(0.2986128521, abs=1e-10)
-    assert motion.crossings.velocity_before[-1] == pytest.approx(speed, abs=1e-12)
-    assert motion.crossings.time[-1] % (2 * math.pi) == pytest.approx(phase, abs=1e-10)
+    assert motion.impacts.velocity_before[-1] == pytest.approx(speed, abs=1e-12)
+    assert motion.impacts.time[-1] % (2 * math.pi) == pytest.approx(phase, abs=1e-10)
 
 
 STEADY = [
@@ -84,16 +84,16 @@ def test_a_start_on_a_closed_form_orbit_returns_after_each_period(numbers):
         w, d, e = numbers["w"], numbers.get("d", 1.0), numbers.get("e", 0.8)
         start = phase / w
         motion = simulate(oscillator(**numbers), x=d, velocity=-e * speed, time=start, duration=2.5 * 2 * math.pi / w, tol=1e-15)
-        assert len(motion.crossings) == 2
-        np.testing.assert_allclose(motion.crossings.velocity_before, speed, atol=2e-12)
-        np.testing.assert_allclose(motion.crossings.time - start, np.array([1, 2]) * 2 * math.pi / w, atol=2e-12)
+        assert len(motion.impacts) == 2
+        np.testing.assert_allclose(motion.impacts.velocity_before, speed, atol=2e-12)
+        np.testing.assert_allclose(motion.impacts.time - start, np.array([1, 2]) * 2 * math.pi / w, atol=2e-12)
 
 
 def test_a_start_into_the_wall_begins_with_its_impact():
     motion = simulate(oscillator(A=0.2, w=1.0), x=1.0, velocity=0.7, duration=0.1)
-    assert motion.crossings.time[0] == 0.0
-    assert motion.crossings.velocity_before[0] == 0.7
-    assert motion.crossings.velocity_after[0] == -0.8 * 0.7
+    assert motion.impacts.time[0] == 0.0
+    assert motion.impacts.velocity_before[0] == 0.7
+    assert motion.impacts.velocity_after[0] == -0.8 * 0.7
 
 
 def test_before_any_impact_the_motion_is_that_of_the_linear_oscillator():
@@ -104,5 +104,5 @@ def test_before_any_impact_the_motion_is_that_of_the_linear_oscillator():
     B = (-0.3 - w * P * math.sin(lag) + c / 2 * D) / n
     t = np.linspace(0, 40, 333)
     exact = P * np.cos(w * t - lag) + np.exp(-c * t / 2) * (D * np.cos(n * t) + B * np.sin(n * t))
-    assert len(motion.crossings) == 0
+    assert len(motion.impacts) == 0
     np.testing.assert_allclose(motion.at(t)[0], exact, atol=2e-14)

@@ -45,8 +45,8 @@ def test_an_energy_restitution_on_unequal_masses_accumulates_where_30_digit_impa
         limit = limit_of_impacts(chosen, chosen[-1][1])
     motion = simulate(driven(m=m, k=1.2, c=0.8, impact=EnergyRestitution(r)), theta=0.3, velocity=0.0, duration=50.0)
     assert motion.rest_time == pytest.approx(float(limit), abs=1e-12, rel=0)
-    before, after = motion.crossings.velocity_before, motion.crossings.velocity_after
-    np.testing.assert_allclose(after / before, np.where(motion.crossings.side > 0, *factors), rtol=1e-14)
+    before, after = motion.impacts.velocity_before, motion.impacts.velocity_after
+    np.testing.assert_allclose(after / before, np.where(motion.impacts.side > 0, *factors), rtol=1e-14)
 
 
 @pytest.mark.parametrize("e", [0.0, 0.2, 0.8, 0.97])
@@ -59,18 +59,18 @@ def test_a_ball_that_bounces_on_the_wall_rests_when_its_geometric_series_ends(e,
     motion = simulate(ball, x=wall - drop, velocity=0.0, duration=2 * end)
     assert motion.rest_time == pytest.approx(end, rel=2e-14)
     assert motion.x == wall
-    speeds = force * fall * e ** np.arange(len(motion.crossings))
-    np.testing.assert_allclose(motion.crossings.velocity_before, speeds, rtol=1e-12)
+    speeds = force * fall * e ** np.arange(len(motion.impacts))
+    np.testing.assert_allclose(motion.impacts.velocity_before, speeds, rtol=1e-12)
 
 
 def test_the_limit_is_the_end_of_the_impacts_and_of_the_dense_output():
     motion = simulate(driven(e=0.8), theta=0.3, velocity=0.0, duration=30.0)
     assert [e.kind for e in motion.events].count(EventKind.REST) == 1
-    assert motion.events[-1].time > motion.crossings.time[-1]
+    assert motion.events[-1].time > motion.impacts.time[-1]
     theta, velocity = motion.at(np.linspace(motion.rest_time, 30.0, 50))
     assert not theta.any()
     assert not velocity.any()
-    theta, velocity = motion.at(np.linspace(motion.crossings.time[-1], motion.rest_time, 50))
+    theta, velocity = motion.at(np.linspace(motion.impacts.time[-1], motion.rest_time, 50))
     assert np.abs(theta).max() < 1e-12
     assert np.abs(velocity).max() < 1e-6
 
@@ -78,14 +78,14 @@ def test_the_limit_is_the_end_of_the_impacts_and_of_the_dense_output():
 def test_a_motion_that_ends_within_the_last_bounces_is_not_yet_at_rest():
     motion = simulate(driven(e=0.8), theta=0.3, velocity=0.0, duration=ZENO - 0.05)
     assert (motion.stop, motion.rest_time) == (Stop.HORIZON, None)
-    assert len(motion.crossings) > 10
+    assert len(motion.impacts) > 10
 
 
 def test_every_impact_of_an_accumulation_loses_the_same_factor():
     motion = simulate(driven(e=0.8), theta=0.3, velocity=0.0, duration=30.0, tol=1e-15)
-    np.testing.assert_array_equal(motion.crossings.velocity_after, 0.8 * motion.crossings.velocity_before)
-    small = np.abs(motion.crossings.velocity_before) < 1e-6
-    ratios = np.diff(motion.crossings.time)[small[1:]][1:] / np.diff(motion.crossings.time)[small[1:]][:-1]
+    np.testing.assert_array_equal(motion.impacts.velocity_after, 0.8 * motion.impacts.velocity_before)
+    small = np.abs(motion.impacts.velocity_before) < 1e-6
+    ratios = np.diff(motion.impacts.time)[small[1:]][1:] / np.diff(motion.impacts.time)[small[1:]][:-1]
     np.testing.assert_allclose(ratios, 0.8, rtol=1e-4)  # time differences of 1e-6 near 17.8
 
 

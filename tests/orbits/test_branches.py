@@ -62,7 +62,7 @@ def test_grazing_at_which_the_smoothed_problem_stops():
     (graze,) = (s for s in branch("Hhat 0.5").special if s.kind == "GR" and abs(s.parameter - 0.2846) < 1e-4)
     assert graze.parameter == pytest.approx(0.284630020, abs=5e-10)
     assert graze.amplitude == pytest.approx(1.05950014, abs=5e-9)
-    counts = [o.signature.crossings for o in branch("Hhat 0.5").orbits if 0.2840 < o.frequency < 0.2860]
+    counts = [o.signature.impact_count for o in branch("Hhat 0.5").orbits if 0.2840 < o.frequency < 0.2860]
     assert set(counts) == {2, 6}
     assert parameter(branch("Hhat 0.5"), "LP", 0.28465) == pytest.approx(0.28467, abs=2e-5)  # the fold just above it
 
@@ -93,7 +93,7 @@ def test_detached_loop_closes():
     assert loop.closed
     assert loop.points[0] is loop.points[-1]
     assert len(kinds(loop, "LP")) == 2
-    assert all(o.periods == 3 for o in loop.orbits)
+    assert all(o.period == 3 for o in loop.orbits)
 
 
 # --- every point of every branch -----------------------------------------------------------------------------------------
@@ -105,9 +105,9 @@ def test_no_point_is_anything_but_a_motion(name):
     for orbit in branch(name).orbits:
         assert orbit.slowest > -1e-9
         assert orbit.clearance > -1e-9
-        times = np.append(orbit.crossings, orbit.crossings[:1] + orbit.duration)
+        times = np.append(orbit.impact_times, orbit.impact_times[:1] + orbit.duration)
         assert (np.diff(times) > -1e-9).all()
-        assert orbit.residual < 4e-12 * orbit.periods
+        assert orbit.residual < 4e-12 * orbit.period
         assert orbit.admissible
 
 
@@ -126,10 +126,10 @@ def test_stable_points_stay_under_simulation_for_twenty_periods(name):
     points = [o for o in branch(name).orbits if o.stable and min(abs(o.slowest), abs(o.clearance)) > 1e-6]
     for orbit in points[:: max(1, len(points) // 12)]:
         begin = orbit.start()
-        motion = simulate(orbit.system, **begin, periods=20 * orbit.periods, tol=1e-13, dense=False)
+        motion = simulate(orbit.system, **begin, periods=20 * orbit.period, tol=1e-13, dense=False)
         first = orbit.system.model.coordinates[0]
         position = abs(float(motion.position) - begin[first])
-        speeds = [abs(begin["velocity"]), orbit.speeds[0]] if orbit.signature.crossings else [abs(begin["velocity"])]
+        speeds = [abs(begin["velocity"]), orbit.speeds[0]] if orbit.signature.impact_count else [abs(begin["velocity"])]
         assert position < 1e-8
         assert min(abs(abs(motion.velocity) - v) for v in speeds) < 1e-8
 
@@ -144,7 +144,7 @@ def test_multipliers_on_branches_obey_the_determinant_law(name):
         if name in ("impact oscillator", "a user's model"):
             rate = model.damping * orbit.duration
         else:
-            ends = np.append(orbit.crossings, orbit.crossings[:1] + orbit.duration)
+            ends = np.append(orbit.impact_times, orbit.impact_times[:1] + orbit.duration)
             for side, duration in zip(-orbit.sides, np.diff(ends), strict=True):
                 spent[int(side)] += duration
             if not len(orbit.sides):

@@ -13,7 +13,7 @@ from saltus.orbits.conditions import Singular
 from saltus.orbits.path import Curve
 from saltus.orbits.problem import Problem
 from saltus.orbits.special_curve import LocusPoint
-from saltus.theory.wall_orbits import wall_orbits
+from saltus.theory.impact_oscillator import wall_orbits
 
 FREQUENCY, AMPLITUDE, VERTICAL, FORCE = "load.frequency", "load.horizontal.amplitude", "load.vertical", "load.force.amplitude"
 FREE = math.sqrt(1.0 - 0.1**2 / 4)  # frequency of the free oscillator below
@@ -166,8 +166,8 @@ def test_every_point_of_a_grazing_curve_touches() -> None:
         assert orbit.admissible
         assert abs(orbit.slowest) < 1e-14
         assert np.ptp(point.solution.unknowns[::2][touching]) < 1e-12
-        motion, when = orbit.motion(), orbit.crossings[touching[0]]
-        theta, velocity = motion.at(when if when > orbit.crossings[0] else when + 0.5 * orbit.duration)
+        motion, when = orbit.motion(), orbit.impact_times[touching[0]]
+        theta, velocity = motion.at(when if when > orbit.impact_times[0] else when + 0.5 * orbit.duration)
         assert abs(theta) < 1e-10
         assert abs(velocity) < 1e-6
 

@@ -64,7 +64,7 @@ def test_at_the_fold_the_motion_is_the_parabola_and_below_it_there_is_none(frequ
     height = -VERTICAL * math.cos(BETA) * math.pi**2 / (8 * frequency**2)
     assert point.orbit.amplitude == pytest.approx(height, rel=3 / frequency**2)
     assert point.orbit.symmetric
-    assert point.orbit.signature.crossings == 2
+    assert point.orbit.signature.impact_count == 2
     assert np.abs(point.orbit.multipliers - 1).min() < 1e-6
     assert branch.parameters.min() > point.parameter * (1 - 1e-9)
     assert branch.stable.any()

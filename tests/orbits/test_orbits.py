@@ -30,8 +30,8 @@ def phase_zero(orbit):
 
 
 def test_kind_of_each_orbit(name, orbit):
-    assert orbit.signature.crossings == IMPACTS.get(name, 2)
-    assert orbit.periods == PERIODS.get(name, 1)
+    assert orbit.signature.impact_count == IMPACTS.get(name, 2)
+    assert orbit.period == PERIODS.get(name, 1)
     assert orbit.symmetric == (name in HALVES)
     assert orbit.stable
     assert orbit.admissible
@@ -45,14 +45,14 @@ def test_it_comes_back(orbit):
 def test_it_does_not_come_back_earlier(orbit):
     start = phase_zero(orbit)
     begin = np.append([start[c] for c in orbit.system.model.coordinates], np.atleast_1d(start["velocity"]))
-    for q in range(1, orbit.periods):
+    for q in range(1, orbit.period):
         motion = simulate(orbit.system, **start, periods=q, tol=1e-13)
         assert np.abs(np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity)) - begin).max() > 0.05
 
 
 def test_multipliers_are_those_of_the_flow(orbit):
     """Over one period from a point of it, with the saltation of every impact: an independent way to the same numbers."""
-    found = sensitivities(orbit.system, **phase_zero(orbit), periods=orbit.periods, tol=1e-14)
+    found = sensitivities(orbit.system, **phase_zero(orbit), periods=orbit.period, tol=1e-14)
     of_the_flow = np.linalg.eigvals(found.state).astype(complex)
     distances = np.abs(orbit.multipliers[:, None] - of_the_flow[None, :])
     assert distances.min(axis=0).max() < 1e-8
@@ -66,7 +66,7 @@ def test_product_of_multipliers_is_the_determinant_law(name):
     """e^2 for each impact, exp(-C [c T_lower / (1 + m) + T_upper]) for the time spent on each side."""
     orbit = orbit_of(name)
     model, e = orbit.system.model, orbit.system.impact.e
-    ends = np.append(orbit.crossings, orbit.crossings[:1] + orbit.duration)
+    ends = np.append(orbit.impact_times, orbit.impact_times[:1] + orbit.duration)
     spent = {1: 0.0, -1: 0.0}
     if len(orbit.sides):
         for side, duration in zip(-orbit.sides, np.diff(ends), strict=True):  # an impact leads to the other side
@@ -88,12 +88,12 @@ def test_product_of_multipliers_of_the_wall_oscillator(name):
 
 
 def test_impacts_and_extrema_are_those_of_the_motion(orbit):
-    motion = simulate(orbit.system, **orbit.start(), periods=orbit.periods, tol=1e-14)
-    shift = orbit.crossings[:1]  # the motion starts with the first impact, and ends with it
-    impacts = [(t, v) for t, v in zip(motion.crossings.time, motion.crossings.velocity_before, strict=True)
+    motion = simulate(orbit.system, **orbit.start(), periods=orbit.period, tol=1e-14)
+    shift = orbit.impact_times[:1]  # the motion starts with the first impact, and ends with it
+    impacts = [(t, v) for t, v in zip(motion.impacts.time, motion.impacts.velocity_before, strict=True)
                if 1e-6 < t - shift[0] < orbit.duration - 1e-6] if len(shift) else []  # fmt: skip
-    assert len(impacts) == max(0, len(orbit.crossings) - 1)
-    for (time, velocity), expected, speed in zip(impacts, orbit.crossings[1:], orbit.speeds[1:], strict=True):
+    assert len(impacts) == max(0, len(orbit.impact_times) - 1)
+    for (time, velocity), expected, speed in zip(impacts, orbit.impact_times[1:], orbit.speeds[1:], strict=True):
         assert time == pytest.approx(expected, abs=1e-10)
         assert abs(velocity) == pytest.approx(speed, abs=1e-10)
     begin = shift[0] if len(shift) else 0.0
@@ -109,7 +109,7 @@ def test_a_disturbance_decays_as_the_multipliers_say(orbit):
     begin = np.append([start[c] for c in orbit.system.model.coordinates], np.atleast_1d(start["velocity"]))
     first = orbit.system.model.coordinates[0]
     size = abs(orbit.multipliers[0])
-    periods = orbit.periods * max(3, math.ceil(math.log(1e-4) / math.log(max(size, 1e-3))))
+    periods = orbit.period * max(3, math.ceil(math.log(1e-4) / math.log(max(size, 1e-3))))
     motion = simulate(orbit.system, **(start | {first: start[first] + 1e-6}), periods=periods, tol=1e-14, dense=False)
     end = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity))
     assert np.abs(end - begin).max() < 1e-7
@@ -119,7 +119,7 @@ def test_margins_are_the_least_along_the_motion():
     orbit = orbit_of("symmetric")
     model, load = orbit.system.model, orbit.system.load
     motion = orbit.motion()
-    times = np.linspace(orbit.crossings[0], orbit.crossings[0] + orbit.duration, 40_001)[1:-1]
+    times = np.linspace(orbit.impact_times[0], orbit.impact_times[0] + orbit.duration, 40_001)[1:-1]
     theta, velocity = motion.at(times)
     side = np.sign(theta)
     acceleration = np.array([model.acceleration(*args, load) for args in zip(times, theta, velocity, side, strict=True)])
@@ -132,7 +132,7 @@ def test_the_wall_oscillators_orbit_is_the_one_of_the_closed_form():
     orbit = orbit_of("wall, one impact")
     model, load, e = orbit.system.model, orbit.system.load, orbit.system.impact.e
     c, k, W, A = model.damping, model.stiffness, load.frequency, 0.5
-    t, v = orbit.crossings[0], orbit.speeds[0]
+    t, v = orbit.impact_times[0], orbit.speeds[0]
     response = A / complex(k - W * W, c * W)
 
     def steady(time):
@@ -174,6 +174,6 @@ def test_walls_at_other_places_only_shift_what_moves():
     paths = ("load.frequency", "load.force.amplitude", "model.wall")
     first, second = find_orbit(one, parameters=paths, x=0.2), find_orbit(other, parameters=paths, x=1.4)
     assert np.abs(first.speeds - second.speeds).max() < 1e-12
-    assert np.abs(first.crossings - second.crossings).max() < 1e-12
+    assert np.abs(first.impact_times - second.impact_times).max() < 1e-12
     assert first.highest + 1.2 == pytest.approx(second.highest, abs=1e-12)
     assert first.lowest + 1.2 == pytest.approx(second.lowest, abs=1e-12)

@@ -149,9 +149,9 @@ def test_kind_of_each_orbit(name):
     _, _, periods, rests, symmetric = CASES[name]
     orbit = orbit_of(name)
     assert isinstance(orbit, RestingOrbit)
-    assert (orbit.periods, len(orbit.releases), orbit.symmetric) == (periods, rests, symmetric)
+    assert (orbit.period, len(orbit.releases), orbit.symmetric) == (periods, rests, symmetric)
     assert len(orbit.rests) == rests
-    assert len(orbit.crossings) == len(orbit.speeds) == len(orbit.sides) == orbit.signature.crossings
+    assert len(orbit.impact_times) == len(orbit.speeds) == len(orbit.sides) == orbit.signature.impact_count
     assert 0.0 < orbit.rest_share < 1.0
     assert orbit.admissible
     assert not orbit.grazes
@@ -174,13 +174,13 @@ def test_motions_from_anywhere_become_it_and_stay_for_ever(name):
     period = orbit.system.load.period
     times = orbit.start()["time"] + orbit.duration * (np.arange(64) + 0.5) / 64.0
     expected, distances = np.stack(orbit.motion().at(times)), []
-    for turn in range(orbit.periods):  # an orbit of q forcing periods may begin in any of them
-        shift = (72 * orbit.periods + turn) * period
+    for turn in range(orbit.period):  # an orbit of q forcing periods may begin in any of them
+        shift = (72 * orbit.period + turn) * period
         settled = simulate(system, **away, duration=shift + 2.0 * orbit.duration, samples=shift + times).samples
         found = np.stack([settled.position[0], settled.velocity[0]])
         distances.append(np.abs(found - expected).max())
     assert min(distances) < 1e-11
-    for periods in (orbit.periods, 200 * orbit.periods):
+    for periods in (orbit.period, 200 * orbit.period):
         later = simulate(system, **at_phase_zero(orbit), periods=periods, tol=1e-13, dense=False)
         assert (later.position, later.velocity) == pytest.approx(orbit.state, abs=1e-13)
 
@@ -188,19 +188,19 @@ def test_motions_from_anywhere_become_it_and_stay_for_ever(name):
 def test_it_does_not_come_back_earlier(name):
     orbit = orbit_of(name)
     times = orbit.start()["time"] + orbit.duration * (np.arange(64) + 0.5) / 64.0
-    motion = orbit.motion(2 * orbit.periods)
+    motion = orbit.motion(2 * orbit.period)
     period = orbit.system.load.period
-    for q in range(1, orbit.periods):
+    for q in range(1, orbit.period):
         assert np.abs(motion.at(times + q * period)[0] - motion.at(times)[0]).max() > 1e-3
 
 
 def test_the_derivative_of_the_flow_over_its_period_is_0(name):
     """The saltation of every impact, of rest and of release, from a state in flight: multipliers 0, exactly."""
     orbit = orbit_of(name)
-    flying = orbit.releases[0] + 0.5 * (orbit.crossings[0] - orbit.releases[0])
+    flying = orbit.releases[0] + 0.5 * (orbit.impact_times[0] - orbit.releases[0])
     position, velocity = orbit.motion().at(flying)
     found = sensitivities(
-        orbit.system, **{orbit.system.model.coordinates[0]: position}, velocity=velocity, time=flying, periods=orbit.periods
+        orbit.system, **{orbit.system.model.coordinates[0]: position}, velocity=velocity, time=flying, periods=orbit.period
     )
     assert found.undefined is None
     assert np.abs(found.state).max() == 0.0
@@ -209,7 +209,7 @@ def test_the_derivative_of_the_flow_over_its_period_is_0(name):
 
 def test_it_is_released_where_the_load_alone_says(name):
     orbit = orbit_of(name)
-    motion = orbit.motion(3 * orbit.periods, tol=1e-14)
+    motion = orbit.motion(3 * orbit.period, tol=1e-14)
     events = [e for e in motion.events.of(EventKind.RELEASE) if e.time > motion.start + 1e-6]
     period, known = orbit.system.load.period, {(r.side, r.time) for r in load_releases(orbit.system)}
     assert len(events) >= 2 * len(orbit.releases)
@@ -227,15 +227,15 @@ def test_a_symmetric_one_is_its_own_mirror_image_half_a_period_later(name):
     assert np.abs(np.asarray(motion.at(times + half)) + np.asarray(motion.at(times))).max() < 1e-13
     assert orbit.releases[1] - orbit.releases[0] == pytest.approx(half, rel=1e-14)
     assert orbit.lowest == -orbit.highest
-    second = (motion.crossings.time > orbit.releases[1]) & (motion.crossings.time < orbit.rests[1] + 1e-9)
-    mirrored = orbit.crossings[len(orbit.crossings) // 2 :]
-    assert motion.crossings.time[second][:3] == pytest.approx(mirrored[:3], rel=1e-13)
+    second = (motion.impacts.time > orbit.releases[1]) & (motion.impacts.time < orbit.rests[1] + 1e-9)
+    mirrored = orbit.impact_times[len(orbit.impact_times) // 2 :]
+    assert motion.impacts.time[second][:3] == pytest.approx(mirrored[:3], rel=1e-13)
 
 
 def test_without_bounce_it_rests_from_the_first_impact_under_pressure():
     """At e = 0 the motion starts anew from its impacts as well."""
     orbit = orbit_of("no bounce")
-    assert orbit.rests == pytest.approx(orbit.crossings, rel=1e-14)
+    assert orbit.rests == pytest.approx(orbit.impact_times, rel=1e-14)
     share = sum(n - r for r, n in zip(orbit.rests, [*orbit.releases[1:], orbit.releases[0] + orbit.duration], strict=True))
     assert orbit.rest_share == pytest.approx(share / orbit.duration)
 
@@ -315,7 +315,7 @@ def test_rest_vanishes_where_impacts_no_longer_die_away():
     after = find_orbit(forced(H=point.parameter + 1e-5, W=0.2, e=0.3), theta=0.3)
     assert isinstance(before, RestingOrbit)
     assert not isinstance(after, RestingOrbit)
-    assert after.signature.crossings >= 12
+    assert after.signature.impact_count >= 12
     assert len(simulate(after.system, **after.start(), periods=5).events.of(EventKind.REST)) == 0
     assert after.amplitude == pytest.approx(point.amplitude, abs=1e-4)
     assert np.abs(after.multipliers).max() < 1e-3

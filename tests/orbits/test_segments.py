@@ -19,7 +19,7 @@ def at_impacts(name):
     system, paths = CASES[name]
     x, v = STARTS[name]
     motion = simulate(system, **{system.model.coordinates[0]: x}, velocity=v, periods=6, tol=1e-14)
-    impacts = motion.crossings
+    impacts = motion.impacts
     assert len(impacts) >= 4
     count = min(8, len(impacts) // 2 * 2)
     sides = tuple(int(s) for s in impacts.side[:count])

@@ -56,7 +56,7 @@ def own(name):
     return [
         p
         for p in branch.points
-        if (p.orbit.signature.crossings, p.orbit.periods) == (1, family.period) and p.orbit.slowest > 1e-6
+        if (p.orbit.signature.impact_count, p.orbit.period) == (1, family.period) and p.orbit.slowest > 1e-6
     ]
 
 
@@ -65,7 +65,7 @@ def test_newton_finds_the_closed_form(name):
     _, known, orbit, _ = branch_of(name)
     assert orbit.speeds == pytest.approx([known.speed], abs=1e-11)
     forcing_period = 2 * math.pi / orbit.frequency
-    assert math.remainder(orbit.crossings[0] - known.impact_time, forcing_period) == pytest.approx(0, abs=1e-11)
+    assert math.remainder(orbit.impact_times[0] - known.impact_time, forcing_period) == pytest.approx(0, abs=1e-11)
     assert np.poly(orbit.multipliers) == pytest.approx(np.poly(known.multipliers), abs=1e-10)
     assert orbit.stable == known.stable
     assert orbit.defect < 1e-11
@@ -76,7 +76,7 @@ def test_every_special_point_of_one_impact_is_there_to_1e10_and_no_other(name):
     family, _, _, branch = branch_of(name)
     reference = expected(family)
     assert set(reference) == CASES[name][2]
-    found = [s for s in branch.special if s.orbit.signature.crossings == 1]
+    found = [s for s in branch.special if s.orbit.signature.impact_count == 1]
     assert sorted(s.kind for s in found) == sorted(reference)
     for special in found:
         assert special.parameter == pytest.approx(reference[special.kind], rel=1e-10, abs=1e-10)
@@ -103,7 +103,7 @@ def test_both_orbits_between_the_fold_and_the_grazing_are_found(name):
         amplitude, count = 0.5 * (branch.parameters.max() + family.grazing_amplitude), 1
     else:
         amplitude, count = 0.5 * (family.amplitude(family.fold_speed) + family.grazing_amplitude), 2
-    orbits = [o for o in branch.at(amplitude) if o.signature.crossings == 1]
+    orbits = [o for o in branch.at(amplitude) if o.signature.impact_count == 1]
     assert sorted(float(o.speeds[0]) for o in orbits) == pytest.approx(family.speeds(amplitude), abs=1e-11)
     assert len(orbits) == count
 
@@ -115,7 +115,7 @@ def test_every_point_is_a_motion_of_the_system(name):
     for point in branch.points:
         orbit = point.orbit
         assert orbit.admissible
-        times = np.append(orbit.crossings, orbit.crossings[:1] + orbit.duration)
+        times = np.append(orbit.impact_times, orbit.impact_times[:1] + orbit.duration)
         assert (np.diff(times) > 0).all()
         if min(orbit.slowest, orbit.clearance) > 1e-6:  # a touch closer than that has, to rounding, an impact or none
             assert orbit.defect < 1e-8 * (1 + np.abs(orbit.multipliers).max())
@@ -128,7 +128,7 @@ def test_below_the_grazing_the_orbit_is_the_steady_response(name):
     With two periods an impact it could go on as well with the orbit of one impact a period, which begins at the same grazing.
     """
     family, _, _, branch = branch_of(name)
-    free = [p for p in branch.points if p.orbit.signature.crossings == 0]
+    free = [p for p in branch.points if p.orbit.signature.impact_count == 0]
     assert len(free) > 3
     decay = math.exp(-family.damping * family.duration / 2)
     for point in free:

@@ -2,7 +2,7 @@
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from saltus.plots.style import style
+from saltus.plots.conventions import style
 
 
 def check_provenance(name, data):

@@ -15,8 +15,8 @@ def branch(parameter, amplitude, stable, *, special=(), origin="start", ends=("b
         "lowest": ("point", -0.5 * amplitude),
         "stable": ("point", np.asarray(stable, np.int8)),
         "symmetric": ("point", np.zeros(n, np.int8)),
-        "periods": ("point", np.full(n, periods)),
-        "crossings": ("point", np.broadcast_to(crossings, n).copy()),
+        "period": ("point", np.full(n, periods)),
+        "impact_count": ("point", np.broadcast_to(crossings, n).copy()),
     }
     if special:
         kinds, places, sizes = zip(*special, strict=True)

@@ -91,5 +91,5 @@ def test_between_its_folds_the_loop_attracts_what_starts_near_it(island):
     orbit = motions.orbit_at(branch, index, float(branch["parameter"][index]))
     start = orbit.start()
     disturbed = {**start, "velocity": start["velocity"] * (1 + 1e-3)}
-    late = simulate(orbit.system, **disturbed, periods=600).crossings.velocity_before[-6:]
+    late = simulate(orbit.system, **disturbed, periods=600).impacts.velocity_before[-6:]
     assert np.abs(late) == pytest.approx(np.full(6, orbit.speeds[0]), abs=1e-8)

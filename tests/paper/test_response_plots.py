@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from spectrum_cases import branch, diagram, folded, loop
 
-from saltus.plots import response, style
+from saltus.plots import conventions as style
+from saltus.plots import response
 
 
 def lines(ax, line):

@@ -8,7 +8,7 @@ from saltus.paper import PaperFigure, reproduce
 from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import check
 from saltus.paper.provenance import dataset, tree
-from saltus.plots.style import new_figure
+from saltus.plots.conventions import new_figure
 
 calls = []
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 import matplotlib as mpl
 import numpy as np
 
-from saltus.plots import style
+from saltus.plots import conventions as style
 
 
 def lightness(colour):

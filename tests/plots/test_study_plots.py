@@ -9,10 +9,10 @@ import xarray
 from matplotlib.colors import same_color
 
 from saltus.plots.attractors import draw_attractors
+from saltus.plots.conventions import LIMIT, STABLE, UNSTABLE
 from saltus.plots.diagram import draw_diagram
 from saltus.plots.plane import draw_plane
-from saltus.plots.style import LIMIT, STABLE, UNSTABLE
-from saltus.studies import portrait as phase_portrait
+from saltus.studies import phase_portrait
 from saltus.systems import Load, Metainterface, System
 
 
@@ -104,7 +104,7 @@ def diagram(amplitudes=(0.5, 1.0), beta0=1.4, path="load.frequency", kind="Metai
             "parameter": ("point", np.linspace(0.5, 1.0, n)),
             "amplitude": ("point", np.array(amplitudes)),
             "stable": ("point", np.ones(n, dtype=bool)),
-            "crossings": ("point", np.full(n, 2)),
+            "impact_count": ("point", np.full(n, 2)),
         }
     )
     empty = np.empty(0)
@@ -173,7 +173,7 @@ def found(load="periodic", undecided=0.25):
     """Two attractors, a cycle of two periods and rest, and four starts, one of them undecided."""
     columns = {
         "attractor_kind": ("attractor", ["rest", "periodic"]),
-        "attractor_periods": ("attractor", [0, 2]),
+        "attractor_period": ("attractor", [0, 2]),
         "fraction": ("attractor", [0.25, 0.5]),
         "fraction_error": ("attractor", [0.217, 0.25]),
         "strobe_theta": (("attractor", "strobe"), [[0.0, np.nan], [0.5, -0.5]]),

@@ -43,7 +43,7 @@ def at(curve, vertical):
 
 
 def of(kind, crossings, curves):
-    found = [c for c in curves if c.attrs["kind"] == kind and c.attrs["crossings"] == crossings and c.attrs["periods"] == 1]
+    found = [c for c in curves if c.attrs["kind"] == kind and c.attrs["impact_count"] == crossings and c.attrs["period"] == 1]
     assert found
     return found[0]
 
@@ -223,7 +223,7 @@ def test_a_curve_explains_only_what_ends_on_it():
     assert known.any()
     assert not known.all()
     other = onset.copy()
-    other.attrs = {**onset.attrs, "periods": 5}
+    other.attrs = {**onset.attrs, "period": 5}
     assert not explained(cells, ends, [other]).any()
     far = onset.assign(amplitude=onset["amplitude"] * 10)
     assert not explained(cells, ends, [far]).any()

@@ -49,14 +49,14 @@ def test_every_motion_is_a_stable_orbit_to_newtons_method(W):
         for amplitude, period, theta, velocity in motions(here.isel(vertical=0, horizontal=i)):
             orbit = find_orbit(system, theta=theta, velocity=velocity, period=int(period), settle=0)
             assert orbit.stable
-            assert orbit.periods == period
+            assert orbit.period == period
             assert orbit.amplitude == pytest.approx(amplitude, rel=1e-6)
 
 
 @pytest.mark.parametrize(("W", "horizontal"), [(1.0, 0.07), (1.0, 0.2), (4.0, 0.2), (4.0, 0.07)])
 def test_a_cell_has_what_a_search_from_other_states_finds(W, horizontal):
     here = row(W).sel(horizontal=horizontal, vertical=-0.5)
-    found = search_orbits(forced(H=horizontal, W=W), V, [-0.5], longest=6, starts=60, region=(2.0, 2.0), seed=7, repelling=0)
+    found = search_orbits(forced(H=horizontal, W=W), V, [-0.5], max_period=6, starts=60, region=(2.0, 2.0), seed=7, repelling=0)
     known = sorted(orbit.amplitude for orbit in found.orbits if orbit.stable and orbit.amplitude >= charts.LEAST)
     assert known
     own = [amplitude for amplitude, *_ in motions(here)]
@@ -73,7 +73,7 @@ def test_without_a_horizontal_load_motions_are_the_deformed_equilibria():
         known = [e.theta for e in equilibria(still) if e.stable and e.theta > 0]
         assert here["count"].values[i, 0] == len(known)  # and not twice as many: mirror images count once
         np.testing.assert_allclose(here["motion_amplitude"].values[i, 0, : len(known)], known, rtol=1e-7)
-        assert (here["motion_crossings"].values[i] == 0).all()
+        assert (here["motion_impact_count"].values[i] == 0).all()
 
 
 def test_motions_are_followed_from_cell_to_cell_where_nothing_else_leads_to_them():
@@ -194,7 +194,7 @@ def test_starts_fill_the_region_and_what_is_close_to_the_contact():
         ({"vertical": "many"}, "vertical must be rising"),
         ({"paths": (H, H)}, "two parameters"),
         ({"paths": (H, "load.vertikal")}, "vertikal"),
-        ({"longest": 17}, "at most 16"),
+        ({"max_period": 17}, "at most 16"),
         ({"starts": 0}, "starts"),
         ({"least": 0.0}, "least"),
         ({"tol": 1e-3}, "tol"),

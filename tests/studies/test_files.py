@@ -20,7 +20,7 @@ FACTS = (
     "clearance",
     "stable",
     "symmetric",
-    "periods",
+    "period",
     "admissible",
     "grazes",
 )
@@ -61,7 +61,7 @@ def test_a_tree_comes_back_from_netcdf_as_it_was(spectrum, tmp_path):
 @pytest.mark.parametrize("make", [through_a_grazing, from_none_to_one_impact])
 def test_orbits_come_back_bit_for_bit(make, tmp_path):
     branch = make()
-    crossings = {orbit.signature.crossings for orbit in branch.orbits}
+    crossings = {orbit.signature.impact_count for orbit in branch.orbits}
     assert len(crossings) > 1
     back = orbits_of(reloaded(branch.to_xarray(), tmp_path))
     assert len(back) == len(branch.orbits)
@@ -71,7 +71,7 @@ def test_orbits_come_back_bit_for_bit(make, tmp_path):
         assert {name: getattr(orbit, name) for name in FACTS} == {name: getattr(other, name) for name in FACTS}
         assert np.array_equal(orbit.solution.unknowns, other.solution.unknowns)
         assert np.array_equal(orbit.multipliers, other.multipliers, equal_nan=True)
-        assert np.array_equal(orbit.crossings, other.crossings)
+        assert np.array_equal(orbit.impact_times, other.impacts)
         assert orbit.start() == other.start()
 
 
@@ -106,7 +106,7 @@ def test_what_is_no_branch_is_refused(spectrum):
 
 def test_orbits_that_repel_are_kept_too(tmp_path):
     """Unstable orbits cannot be simulated into; their unknowns are all there is."""
-    found = search_orbits(forced(H=1.0), FREQUENCY, [2.4], longest=3, starts=16, repelling=3)
+    found = search_orbits(forced(H=1.0), FREQUENCY, [2.4], max_period=3, starts=16, repelling=3)
     repelling = next(orbit for orbit in found.orbits if not orbit.stable)
     branch = saltus.continue_orbit(repelling, FREQUENCY, (2.39, 2.41))
     back = orbits_of(reloaded(branch.to_xarray(), tmp_path))

@@ -45,7 +45,7 @@ def test_two_harmonics_break_the_symmetry_and_a_bubble_is_one_branch(value):
     """
     both = loaded(horizontal=Harmonic(amplitude=1.0), vertical=Harmonic(mean=-0.5, amplitude=0.25, phase=math.pi / 2))
     branches = branches_of(response_spectrum(both, FREQUENCY, (0.85, 1.3), max_period=2, values=[value], starts=8))
-    single, bubble = sorted(branches, key=lambda branch: int(branch["periods"][1]))
+    single, bubble = sorted(branches, key=lambda branch: int(branch["period"][1]))
     assert not single["symmetric"].any()
     doublings = np.sort(single["special_parameter"].values[single["kind"].values == "PD"])
     assert len(doublings) == 2

@@ -9,7 +9,7 @@ import pytest
 from saltus.attractors.manifolds.equilibria import equilibria
 from saltus.errors import ParameterError
 from saltus.paper.figures.manifolds import manifold
-from saltus.studies import portrait as phase_portrait
+from saltus.studies import phase_portrait
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,

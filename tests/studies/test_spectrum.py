@@ -49,11 +49,11 @@ def orbits_at(branch, value):
 
 
 def test_a_main_branch_and_the_detached_loop_of_period_3(branches):
-    assert [int(branch["periods"][0]) for branch in branches] == [1, 3]
+    assert [int(branch["period"][0]) for branch in branches] == [1, 3]
     main, loop = branches
     assert list(main.attrs["ends"]) == ["bound 2", "bound 2.6"]
     assert loop.attrs["closed"] == 1
-    assert np.unique(loop["crossings"]).tolist() == [2, 6]
+    assert np.unique(loop["impact_count"]).tolist() == [2, 6]
 
 
 def test_the_loop_has_the_folds_and_the_grazing_of_independent_codes(branches):
@@ -108,7 +108,7 @@ def test_the_multipliers_obey_the_law_of_the_determinant(branches):
     """exp(-C q T): the damping of both layers is C, and no impact takes energy."""
     for branch in branches:
         values = branch["multiplier_real"].values + 1j * branch["multiplier_imag"].values
-        law = np.exp(-0.1 * branch["periods"] * 2 * np.pi / branch["parameter"]).values
+        law = np.exp(-0.1 * branch["period"] * 2 * np.pi / branch["parameter"]).values
         moderate = largest_multiplier(branch) < 100.0  # beside a grazing rounding takes digits of the smaller one
         assert moderate.sum() > 0.9 * moderate.size
         assert values.prod(axis=1)[moderate] == pytest.approx(law[moderate], rel=1e-8)
@@ -117,9 +117,9 @@ def test_the_multipliers_obey_the_law_of_the_determinant(branches):
 def test_every_dot_of_the_simulation_lies_on_a_stable_branch(spectrum, branches):
     dots = spectrum["attractors"]
     assert dots.sizes["dot"] >= 5
-    assert set(dots["periods"].values.tolist()) == {1, 3}
-    for value, amplitude, periods in zip(dots["parameter"].values, dots["amplitude"].values, dots["periods"].values, strict=True):
-        orbits = [orbit for branch in branches for orbit in orbits_at(branch, value) if orbit.stable and orbit.periods == periods]
+    assert set(dots["period"].values.tolist()) == {1, 3}
+    for value, amplitude, periods in zip(dots["parameter"].values, dots["amplitude"].values, dots["period"].values, strict=True):
+        orbits = [orbit for branch in branches for orbit in orbits_at(branch, value) if orbit.stable and orbit.period == periods]
         assert min(abs(orbit.amplitude - amplitude) for orbit in orbits) < 1e-6
 
 

@@ -72,9 +72,9 @@ def test_piecewise_linear_solution_is_the_exact_flow_impact_by_impact(theta0, k,
     closed = linear_motion(System(model=Metainterface(**parameters), load=load, impact=law), theta0, 10)
     system = System(model=LinearMetainterface(**parameters), load=load, impact=law)
     flow = simulate(system, theta=theta0, velocity=0.0, duration=closed.impact_times[-1] * (1 + 1e-6), tol=1e-15)
-    np.testing.assert_allclose(flow.crossings.time[:10], closed.impact_times, rtol=1e-13, atol=1e-13)
-    np.testing.assert_allclose(flow.crossings.velocity_before[:10], closed.velocity_before, rtol=1e-11)
-    np.testing.assert_allclose(flow.crossings.velocity_after[:10], closed.velocity_after, rtol=1e-11)
+    np.testing.assert_allclose(flow.impacts.time[:10], closed.impact_times, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(flow.impacts.velocity_before[:10], closed.velocity_before, rtol=1e-11)
+    np.testing.assert_allclose(flow.impacts.velocity_after[:10], closed.velocity_after, rtol=1e-11)
 
 
 @pytest.mark.parametrize("theta0", [0.15, -0.15])
@@ -87,7 +87,7 @@ def test_peaks_and_period_of_conservative_motion(theta0, k, m, law):
     system = System(model=Metainterface(beta0=BETA, stiffness_ratio=k, mass_ratio=m), load=Load(vertical=-0.5), impact=law)
     found = peaks(system, theta0)
     motion = simulate(system, theta=theta0, velocity=0.0, duration=10.2 * found.period, tol=1e-14)
-    times = motion.crossings.time
+    times = motion.impacts.time
     np.testing.assert_allclose(times[2:] - times[:-2], found.period, rtol=1e-12)
     theta, velocity = motion.at(np.array([(times[0] + times[1]) / 2, found.period, 10 * found.period]))
     np.testing.assert_allclose(np.sort(theta[:2]), [found.theta_min, found.theta_max], rtol=1e-12)
@@ -97,7 +97,7 @@ def test_peaks_and_period_of_conservative_motion(theta0, k, m, law):
 
 def test_erratum_07_energy_along_the_flow():
     system = System(model=Metainterface(beta0=BETA, mass_ratio=0.8), load=Load(vertical=-0.5))
-    crossings = simulate(system, theta=0.2, velocity=0.0, duration=30.0, tol=1e-14).crossings
+    crossings = simulate(system, theta=0.2, velocity=0.0, duration=30.0, tol=1e-14).impacts
     before = total_energy(system, np.zeros(len(crossings)), crossings.velocity_before, crossings.side)
     after = total_energy(system, np.zeros(len(crossings)), crossings.velocity_after, -crossings.side)
     np.testing.assert_allclose(after - before, -crossings.side * 0.8 * crossings.velocity_before**2 / 2, rtol=1e-13)
@@ -125,7 +125,7 @@ def test_small_vibrations_end_at_the_final_time():
         period = linear_period(theta0, beta0=BETA, vertical=-0.5)
         motion = simulate(system, theta=theta0, velocity=0.0, duration=3 * period, tol=1e-14)
         errors.append(motion.rest_time / final_time(period=period, e=0.8) - 1)
-        assert motion.crossings.time[1] == pytest.approx((1 + 2 * 0.8) / 4 * period, rel=10 * theta0)  # errata 8
+        assert motion.impacts.time[1] == pytest.approx((1 + 2 * 0.8) / 4 * period, rel=10 * theta0)  # errata 8
     assert np.abs(errors[1:]) == pytest.approx(np.abs(errors[:-1]) / 10, rel=0.1)
     first_cycle = decayed_period(1, period=1.0, e=0.8)
     assert first_cycle == pytest.approx(1.8**2 / 4)
@@ -135,14 +135,14 @@ def test_rocking_period_of_the_block():
     system = System(model=RockingBlock(alpha=0.3))
     for theta0 in (1e-4, 0.1, 0.29):
         period = rocking_period(theta0, alpha=0.3)
-        times = simulate(system, theta=theta0, velocity=0.0, duration=4.1 * period, tol=1e-14).crossings.time
+        times = simulate(system, theta=theta0, velocity=0.0, duration=4.1 * period, tol=1e-14).impacts.time
         np.testing.assert_allclose(times[2:] - times[:-2], period, rtol=1e-11)
         assert times[0] == pytest.approx(period / 4, rel=1e-11)
 
 
 def test_erratum_25_factors_along_the_flow():
     system = System(model=Metainterface(beta0=1.3, mass_ratio=0.5), load=Load(vertical=-0.5), impact=InelasticImpact())
-    crossings = simulate(system, theta=0.2, velocity=0.0, duration=8.0, tol=1e-12).crossings
+    crossings = simulate(system, theta=0.2, velocity=0.0, duration=8.0, tol=1e-12).impacts
     assert len(crossings) > 3
     for before, after, side in zip(crossings.velocity_before, crossings.velocity_after, crossings.side, strict=True):
         assert after / before == pytest.approx(inelastic_contact(1.3, 0.5, side).factor, rel=1e-13)
@@ -174,7 +174,7 @@ def test_upright_cell_moves_as_the_pendulum():
     smooth = solve_ivp(
         lambda t, y: [y[1], pendulum_acceleration(system, t, *y)], (0, 25), [0.2, 0.0], method="DOP853", rtol=1e-12, atol=1e-13
     )
-    assert len(motion.crossings) > 2
+    assert len(motion.impacts) > 2
     assert (motion.theta, motion.velocity) == pytest.approx(tuple(smooth.y[:, -1]), abs=1e-9)
 
 

@@ -106,7 +106,7 @@ def test_an_orbit_is_admissible_exactly_when_the_exact_flow_has_its_one_impact(c
         return
     motion = flown(system, orbit, start)
     returned = math.hypot(motion.x - x, motion.velocity - velocity) < 1e-10 * (1 + np.abs(orbit.multipliers).max())
-    assert (returned and len(motion.crossings) == 1) == orbit.admissible
+    assert (returned and len(motion.impacts) == 1) == orbit.admissible
 
 
 @pytest.mark.parametrize(("system", "period"), [*FOLDING, DOUBLING[0]])
@@ -119,8 +119,8 @@ def test_the_exact_flow_returns_and_has_the_impact_and_the_multipliers(system, p
         derived = flown(system, orbit, start, tangent=True)
         motion, (x, velocity) = derived.motion, orbit.state(start)
         assert (motion.x, motion.velocity) == pytest.approx((x, velocity), abs=1e-11)
-        assert motion.crossings.velocity_before == pytest.approx([speed], abs=1e-11)
-        away = (motion.crossings.time - orbit.impact_time) % (2 * math.pi / family.frequency)
+        assert motion.impacts.velocity_before == pytest.approx([speed], abs=1e-11)
+        away = (motion.impacts.time - orbit.impact_time) % (2 * math.pi / family.frequency)
         assert min(away[0], 2 * math.pi / family.frequency - away[0]) < 1e-11
         assert np.poly(derived.state) == pytest.approx(np.poly(orbit.multipliers), rel=1e-10, abs=1e-10)
         assert derived.determinant == pytest.approx(family.determinant, rel=1e-10)
@@ -167,7 +167,7 @@ def test_beyond_the_doubling_the_flow_settles_on_two_impacts_that_alternate(inde
         assert orbit.stable != alternates
         x, velocity = orbit.state(0.0)
         motion = saltus.simulate(loaded(system, orbit), x=float(x) - 1e-5, velocity=float(velocity), periods=3000, dense=False)
-        speeds = motion.crossings.velocity_before[-4:] / orbit.speed
+        speeds = motion.impacts.velocity_before[-4:] / orbit.speed
         assert speeds[:2] == pytest.approx(speeds[2:], abs=1e-8)
         assert (abs(speeds[1] - speeds[0]) > 0.01) == alternates
         assert (speeds == pytest.approx([1.0] * 4, abs=1e-8)) != alternates
@@ -195,7 +195,7 @@ def test_another_grazing_ends_the_admissible_orbits():
     for speed, room in zip(speeds, clear, strict=True):
         orbit = family.orbit(speed)
         motion = flown(oscillator(frequency=0.7, wall=0.5, e=0.6), orbit, orbit.impact_time + 1e-3)
-        first = motion.crossings.time[0] - orbit.impact_time
+        first = motion.impacts.time[0] - orbit.impact_time
         assert (first == pytest.approx(family.duration, abs=1e-9)) == (room > 0)
         assert room > 0 or first < 0.9 * family.duration
 

@@ -42,7 +42,7 @@ def attractors_along(
     *,
     region: tuple[float, float] = REGION,
     starts: int = 128,
-    longest: int = 16,
+    max_period: int = 16,
     seed: int = 0,
     known: Any = (),
     threshold: float = THRESHOLD,
@@ -62,7 +62,7 @@ def attractors_along(
         system: what moves.
         path: dotted path of the parameter.
         values: of the parameter, increasing or decreasing: identities are kept from each to the next.
-        region, starts, longest, seed, tol: as for `attractors`.
+        region, starts, max_period, seed, tol: as for `attractors`.
         known: branches along the same parameter, whose stable orbits count at every value.
         threshold: the largest relative distance of one and the same attractor at neighbouring values.
         progress: called with the fraction done.
@@ -85,7 +85,7 @@ def attractors_along(
             system.with_({path: float(value)}),
             region=region,
             starts=starts,
-            longest=longest,
+            max_period=max_period,
             seed=seed,
             known=known,
             also=np.concatenate(seeds) if seeds else (),
@@ -127,7 +127,7 @@ def _apart(old: Attractor, new: Attractor, led: bool) -> float:
     if "rest" in (old.kind, new.kind):
         return 0.0 if old.kind == new.kind else np.inf
     distance = set_distance(old.target, new.target)
-    if old.periods != new.periods:
+    if old.period != new.period:
         return distance / OTHER_PERIOD
     return distance / LED if led else distance
 
@@ -192,7 +192,7 @@ def _dataset(
         "amplitude": (unit, f"max abs({coordinate_name})", lambda m: m.amplitude),
         f"largest_{coordinate_name}": (unit, f"the largest {coordinate_name}", lambda m: m.highest),
         f"smallest_{coordinate_name}": (unit, f"the smallest {coordinate_name}", lambda m: m.lowest),
-        "period": ("1", "forcing periods after which it repeats, 0 where it does not", lambda m: float(m.periods)),
+        "period": ("1", "forcing periods after which it repeats, 0 where it does not", lambda m: float(m.period)),
     }
     tables = {name: np.full(shape, np.nan) for name in columns}
     kinds = np.full(shape, "", dtype="<U16")

@@ -99,9 +99,9 @@ class Attractor:
         return self.target.strobes
 
     @property
-    def periods(self) -> int:
+    def period(self) -> int:
         """Forcing periods after which it repeats; 0 for rest and for what does not repeat."""
-        return 0 if self.orbit is None else self.orbit.periods
+        return 0 if self.orbit is None else self.orbit.period
 
     @property
     def amplitude(self) -> float:
@@ -122,7 +122,7 @@ class Attractor:
         return math.sqrt(self.fraction * (1.0 - self.fraction) / self.of) if self.of else math.nan
 
     def __repr__(self) -> str:
-        what = f"period {self.periods}" if self.orbit is not None else self.kind
+        what = f"period {self.period}" if self.orbit is not None else self.kind
         share = f", {100 * self.fraction:.3g} +- {100 * self.error:.2g} % of the starts" if self.of else ""
         return f"Attractor({self.label}: {what}, amplitude={self.amplitude:.9g}{share})"
 

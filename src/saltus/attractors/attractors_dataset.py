@@ -79,7 +79,7 @@ def attractor_table(members: tuple[Attractor, ...], system: System) -> dict[str,
     strobed = ("attractor", "strobe")
     return {
         "attractor_kind": column((m.kind for m in members), "1", "rest, periodic, quasi-periodic or chaotic", dtype=str),
-        "attractor_periods": column((m.periods for m in members), "1", "forcing periods, 0 where it has none", dtype=int),
+        "attractor_period": column((m.period for m in members), "1", "forcing periods, 0 where it has none", dtype=int),
         "fraction": column((m.fraction for m in members), "1", "share of the initial states that end there", dtype=float),
         "fraction_error": column((m.error for m in members), "1", "binomial standard error of the share", dtype=float),
         f"largest_{name}": column((m.highest for m in members), unit, f"the largest {name}", dtype=float),

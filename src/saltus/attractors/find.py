@@ -26,7 +26,7 @@ def find_attractors(
     *,
     region: tuple[float, float] = REGION,
     starts: int = 256,
-    longest: int = 16,
+    max_period: int = 16,
     seed: int = 0,
     known: Iterable[PeriodicOrbit | Branch] | PeriodicOrbit | Branch = (),
     also: Any = (),
@@ -45,7 +45,7 @@ def find_attractors(
         region: half widths, of the coordinate and of its velocity, of the rectangle around the contact (or 0) that is covered
             evenly by initial states.
         starts: how many.
-        longest: the longest period of a cycle, at most 16.
+        max_period: the longest period of a cycle, at most 16.
         seed: shifts the states.
         known: stable orbits, or branches of which those at the system's parameter are taken, that count as attractors too.
         also: further initial states (n, 2), which do not count in the shares.
@@ -57,8 +57,8 @@ def find_attractors(
     """
     clock, further = clocked(system), check_states(also)
     check_whole("starts", starts, 1)
-    check_whole("longest", longest, 1)
-    check_number("longest", longest, at_most=16)
+    check_whole("max_period", max_period, 1)
+    check_number("max_period", max_period, at_most=16)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     widths = check_region(region)
     given = _known(system, known)
@@ -69,7 +69,7 @@ def find_attractors(
     collection = Collection(clock)
     for orbit in given:
         collection.add_orbit(orbit)
-    places = _places(collection, np.concatenate([states, further]), longest, tol, say)
+    places = _places(collection, np.concatenate([states, further]), max_period, tol, say)
     collection.add_images()
     label_of = order(collection)
     counts = np.bincount(places[:starts][places[:starts] >= 0], minlength=len(collection.targets))
@@ -79,22 +79,24 @@ def find_attractors(
     return Attractors(system, members, states, ends[:starts], ends[starts:], widths, seed, tol, tuple(collection.reasons))
 
 
-def _places(collection: Collection, states: np.ndarray, longest: int, tol: float, say: Callable[[float], object]) -> np.ndarray:
+def _places(
+    collection: Collection, states: np.ndarray, max_period: int, tol: float, say: Callable[[float], object]
+) -> np.ndarray:
     """The place in the collection of the attractor on which each motion ends; below 0 where that is undecided."""
     ends = settle(collection.system, states, FIRST, kept=KEPT, tol=tol, progress=lambda done: say(0.3 * done))
-    places = collection.take(_up_to(ends, longest))
+    places = collection.take(_up_to(ends, max_period))
     left = np.flatnonzero(places == OPEN)
     if not left.size:
         return places
     last = ends.strobes[left, -1]
     ends = settle(collection.system, last, SECOND, kept=KEPT, tol=tol, progress=lambda done: say(0.3 + 0.4 * done))
-    later = collection.take(_up_to(ends, longest))
+    later = collection.take(_up_to(ends, max_period))
     collection.belonging(ends, later)
     for turn in range(MOST_VERDICTS):
         waiting = np.flatnonzero(later == OPEN)
         if not waiting.size:
             break
-        later[waiting[0]] = collection.judge(ends, int(waiting[0]), longest)
+        later[waiting[0]] = collection.judge(ends, int(waiting[0]), max_period)
         collection.belonging(ends, later)
         say(0.7 + 0.3 * turn / MOST_VERDICTS)
     if (later == OPEN).any():
@@ -103,9 +105,9 @@ def _places(collection: Collection, states: np.ndarray, longest: int, tol: float
     return places
 
 
-def _up_to(ends: Ends, longest: int) -> Ends:
-    """The same, with cycles longer than `longest` counted as motions that do not settle."""
-    cycle = np.where(ends.cycle <= longest, ends.cycle, 0)
+def _up_to(ends: Ends, max_period: int) -> Ends:
+    """The same, with cycles longer than `max_period` counted as motions that do not settle."""
+    cycle = np.where(ends.cycle <= max_period, ends.cycle, 0)
     return Ends(ends.rest, cycle, ends.ended, ends.periods, ends.strobes)
 
 
@@ -116,7 +118,7 @@ def order(collection: Collection) -> dict[int, int]:
         orbit, (low, high) = collection.orbits[place], collection.ranges[place]
         if orbit is None:
             return 1.0, 0.0, round(max(high, -low), 2), -round(float(collection.targets[place].strobes[:, 0].mean()), 2)
-        return 0.0, float(orbit.periods), round(max(high, -low), 6), -round(high, 6)
+        return 0.0, float(orbit.period), round(max(high, -low), 6), -round(high, 6)
 
     moving = [place for place, target in enumerate(collection.targets) if target.kind != "rest"]
     labels = {place: i + 1 for i, place in enumerate(sorted(moving, key=rank))}

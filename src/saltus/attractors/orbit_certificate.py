@@ -63,18 +63,18 @@ class Certificate:
             "defect": self.orbit.defect,
             "distance": self.distance,
             "amplitude": self.orbit.amplitude,
-            "impacts": self.orbit.signature.crossings,
+            "impacts": self.orbit.signature.impact_count,
         }
 
 
-def certify(system: System, state: np.ndarray, period: int | None, longest: int = 16) -> Certificate:
+def certify(system: System, state: np.ndarray, period: int | None, max_period: int = 16) -> Certificate:
     """The orbit under a motion with this state (coordinate, velocity) at phase 0, which repeats itself after `period` periods.
 
-    Without a period the one of its nearest return within `longest` is tried, and a motion on its way there may be farther off.
+    Without a period the one of its nearest return within `max_period` is tried, and a motion on its way there may be farther off.
     """
     name = system.model.coordinates[0]
     begin = {name: float(state[0]), "velocity": float(state[1])}
-    strobes = np.concatenate([[state], _strobes(system, begin, period or longest)])
+    strobes = np.concatenate([[state], _strobes(system, begin, period or max_period)])
     q = period or 1 + int(np.argmin(np.abs(strobes[1:] - strobes[0]).max(axis=1)))
     try:
         orbit = orbit_from(Problem(system, Signature((), 1)), begin, q)

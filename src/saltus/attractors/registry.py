@@ -76,10 +76,10 @@ class Collection:
         if not orbit.stable:
             largest = np.abs(orbit.multipliers).max()
             self.reasons.append(
-                f"motions stay on an orbit of period {orbit.periods} {at} with a multiplier of modulus {largest:.6g}"
+                f"motions stay on an orbit of period {orbit.period} {at} with a multiplier of modulus {largest:.6g}"
             )
             return FAILED
-        return self.add_orbit(orbit, strobes[-orbit.periods :])
+        return self.add_orbit(orbit, strobes[-orbit.period :])
 
     def solved(self, state: np.ndarray, periods: int) -> PeriodicOrbit | None:
         """The orbit through a state at phase 0."""
@@ -98,7 +98,7 @@ class Collection:
         if known is not None:
             return known
         largest = np.abs(orbit.multipliers).max()
-        text = f"orbit of period {orbit.periods}: residual {orbit.residual:.1g}, largest multiplier {largest:.6g}"
+        text = f"orbit of period {orbit.period}: residual {orbit.residual:.1g}, largest multiplier {largest:.6g}"
         return self._add(Target(0, "periodic", strobes), orbit, (orbit.lowest, orbit.highest), text)
 
     def add_sampled(self, kind: str, cloud: np.ndarray, range_: tuple[float, float], evidence: str) -> int:
@@ -121,7 +121,7 @@ class Collection:
 
     def strobes_of(self, orbit: PeriodicOrbit) -> np.ndarray:
         """The points of an orbit at phase 0, (periods, 2)."""
-        return strobes_from(self.system, np.array([orbit.state]), orbit.periods)[0]
+        return strobes_from(self.system, np.array([orbit.state]), orbit.period)[0]
 
     def belonging(self, ends: Ends, places: np.ndarray) -> None:
         """Give motions that have not settled to the attractor on which, or within NEAR of which, they move."""
@@ -137,13 +137,13 @@ class Collection:
                     places[i] = place
                     break
 
-    def judge(self, ends: Ends, i: int, longest: int) -> int:
+    def judge(self, ends: Ends, i: int, max_period: int) -> int:
         """The place of what motion i, which does not settle, moves on, by its verdict; FAILED if there is none."""
         from saltus.attractors.verdict.classification import classify
 
         state = ends.strobes[i, -1]
         start: dict[str, Any] = {self.system.model.coordinates[0]: float(state[0]), "velocity": float(state[1])}
-        verdict = classify(self.system, **start, periods=VERDICT_PERIODS, longest=max(longest, 16))
+        verdict = classify(self.system, **start, periods=VERDICT_PERIODS, max_period=max(max_period, 16))
         if verdict.kind == "rest":
             return self.add_rest()
         if verdict.kind == "periodic" and verdict.orbit is not None:

@@ -205,7 +205,7 @@ def _said_of_diagram(tree: Any) -> Iterator[str]:
             more = f" and {len(kinds) - 8} more" if len(kinds) > 8 else ""
             x = branch["parameter"].values
             yield (
-                f"{name}: period {int(branch['periods'][0])}, {path} {x.min():.6g} to {x.max():.6g}, "
+                f"{name}: period {int(branch['period'][0])}, {path} {x.min():.6g} to {x.max():.6g}, "
                 f"{int(branch['stable'].sum())} of {x.size} points stable; {', '.join(kinds[:8]) or 'no special points'}{more}"
             )
     for low, high, rate in zip(*(tree["bands"][name].values for name in ("low", "high", "exponent")), strict=True):
@@ -215,7 +215,7 @@ def _said_of_diagram(tree: Any) -> Iterator[str]:
 def _said_of_attractors(data: Any) -> Iterator[str]:
     share, of = ("cells", "cells") if "cells" in data else ("fraction", "starts")
     for i, label in enumerate(data["attractor"].values):
-        periods = int(data["attractor_periods"][i])
+        periods = int(data["attractor_period"][i])
         kind = str(data["attractor_kind"].values[i]) + (f", period {periods}" if periods else "")
         part, size = 100 * float(data[share][i]), float(data["amplitude"][i])
         yield f"{int(label)}: {kind}, amplitude {size:.4g}, {part:.3g} % of the {of}"

@@ -45,11 +45,9 @@ def _state(motion: Motion) -> list[tuple[str, str]]:
 def _events(motion: Motion) -> list[tuple[str, str]]:
     if not motion.system.model.sides:  # nothing to hit
         return []
-    crossings = motion.crossings
-    last = (
-        f", the last at {crossings.time[-1]:.12g} with speed {abs(crossings.velocity_before[-1]):.6g}" if len(crossings) else ""
-    )
-    rows = [("impacts", f"{len(crossings)}{last}")]
+    impacts = motion.impacts
+    last = f", the last at {impacts.time[-1]:.12g} with speed {abs(impacts.velocity_before[-1]):.6g}" if len(impacts) else ""
+    rows = [("impacts", f"{len(impacts)}{last}")]
     kinds = Counter(event.kind.value for event in motion.events)
     kinds.pop("crossing", None)
     if kinds:

@@ -11,7 +11,7 @@ from .kernel_layout import (
     AT_A_ROOT,
     AT_NONE,
     AT_ONCE,
-    CROSSING,
+    IMPACT,
     LIMIT,
     NEVER_AGAIN,
     RELEASE,
@@ -19,7 +19,7 @@ from .kernel_layout import (
     RESTING,
     STATE,
 )
-from .motion import Crossings, DenseOutput, Event, EventKind, Motion, Stop
+from .motion import DenseOutput, Event, EventKind, Impacts, Motion, Stop
 from .sensitivity import Sensitivities, sensitivities
 from .simulation import limits_of, program, simulate, taylor_order
 from .validity import Validity
@@ -30,8 +30,8 @@ __all__ = [
     "AT_A_ROOT",
     "AT_NONE",
     "AT_ONCE",
-    "CROSSING",
     "FIRST_PLACE",
+    "IMPACT",
     "LIMIT",
     "NEVER_AGAIN",
     "NEW_SIDE",
@@ -44,10 +44,10 @@ __all__ = [
     "SIDE_NOW",
     "STATE",
     "STRIDE",
-    "Crossings",
     "DenseOutput",
     "Event",
     "EventKind",
+    "Impacts",
     "Inputs",
     "Jobs",
     "Lanes",

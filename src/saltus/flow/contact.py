@@ -19,7 +19,6 @@ from saltus.flow.kernel_layout import (
     CHATTERING,
     COLUMNS,
     CONTACT,
-    CROSSING,
     DOF,
     END,
     EVENTS,
@@ -27,6 +26,7 @@ from saltus.flow.kernel_layout import (
     GRAZING,
     HELD,
     HORIZON,
+    IMPACT,
     LAST,
     LENGTH,
     LOSSLESS,
@@ -255,9 +255,9 @@ def impact(where, state, env, model, events, t, origin, before):
     next_side, after = model[2](t, origin, before, side, env, piece)
     if not rate_of(model, next_side) * after >= 0.0:
         return NO_IMPACT
-    record_event(where, events, CROSSING, where[SIDE], int(next_side), t, before, after)
+    record_event(where, events, IMPACT, where[SIDE], int(next_side), t, before, after)
     if where[COLUMNS] > 0:
-        model[5](CROSSING, 0, t, origin, side, env, piece, state)
+        model[5](IMPACT, 0, t, origin, side, env, piece, state)
         record_shift(where, state, events)
     where[SIDE], state[STATE + where[DOF]] = int(next_side), after
     return PAUSED

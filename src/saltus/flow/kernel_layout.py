@@ -11,7 +11,7 @@ import numpy as np
 
 ARC, CONTACT, REST, CHATTER = 0, 1, 2, 3  # modes
 DONE, FULL, PAUSED, NOT_UNIQUE, NO_IMPACT, NOT_FINITE, STALLED, LIMITED, VISITED = range(9)  # why `advance` returns
-CROSSING, GRAZING, RESTING, RELEASE, CHATTERING, LIMIT = 0, 1, 2, 3, 4, 5  # events
+IMPACT, GRAZING, RESTING, RELEASE, CHATTERING, LIMIT = 0, 1, 2, 3, 4, 5  # events
 RESET_SLOPES = 6  # for `tangent`: the derivatives of the reset alone, at a fixed instant of impact
 AFTER_IMPACTS, AT_ONCE, NEVER_AGAIN = 0, 1, 2  # how rest comes about, for `tangent`: never again for states beside it,
 AT_A_ROOT, AT_A_JUMP, AT_NONE = 0, 1, 2  # and a release: where the contact acceleration has a simple root, or jumps through 0

@@ -31,7 +31,7 @@ class Stop(StrEnum):
 class EventKind(StrEnum):
     """What happens at an instant of a motion."""
 
-    CROSSING = "crossing"  # an impact: the gap closes with a speed
+    IMPACT = "impact"  # an impact: the gap closes with a speed
     GRAZING = "grazing"  # the gap touches zero without a speed, to within the working precision
     REST = "rest"  # the system comes to rest at contact, at once or as the limit of impacts
     RELEASE = "release"  # it leaves contact from rest
@@ -51,7 +51,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Crossings:
+class Impacts:
     """The impacts of a motion, as arrays of one length."""
 
     time: np.ndarray
@@ -93,7 +93,7 @@ class Motion:
     chatter_speed: float | None  # of the gap just after impacts on `side`, if it ends in chatter; theta and theta' are then 0
     periods: int  # whole forcing periods since time 0
     events: Events
-    crossings: Crossings
+    impacts: Impacts
     dense: DenseOutput | None
     samples: Samples | None
     sampled_validity: Validity | None
@@ -108,7 +108,7 @@ class Motion:
         names = self.system.model.coordinates
         state = ", ".join(f"{n}={x:.12g}" for n, x in zip(names, np.atleast_1d(self.position), strict=True))
         where = f"{self.stop.value} ({self.limit})" if self.limit else self.stop.value
-        return f"Motion(time={self.time:.12g}, {state}, velocity={self.velocity}, crossings={len(self.crossings)}, stop={where})"
+        return f"Motion(time={self.time:.12g}, {state}, velocity={self.velocity}, impacts={len(self.impacts)}, stop={where})"
 
     @property
     def rest_time(self) -> float | None:

@@ -34,9 +34,9 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
         dataset[name] = ("time", position[i], {"units": unit})
         dataset[rate] = ("time", velocity[i], {"units": unit, "long_name": f"d {name} / d tau"})
     dataset["side"] = ("time", side.astype(np.int8), {"units": "1", "long_name": "side, 0 at rest"})
-    crossings = motion.crossings
+    impacts = motion.impacts
     for name in ("time", "velocity_before", "velocity_after"):
-        dataset[f"crossing_{name}"] = ("crossing", getattr(crossings, name), {"units": "1"})
+        dataset[f"impact_{name}"] = ("impact", getattr(impacts, name), {"units": "1"})
     dataset.attrs = {
         "title": "motion computed by saltus",
         "saltus_version": __version__,

@@ -10,14 +10,14 @@ import numpy as np
 from saltus.errors import MotionError
 from saltus.flow import kernel_layout as k
 from saltus.flow.dense_output import DenseOutput
-from saltus.flow.motion import Crossings, Event, EventKind, Samples
+from saltus.flow.motion import Event, EventKind, Impacts, Samples
 from saltus.flow.validity import Validity, ValidityCheck
 from saltus.systems import System
 
 MOST_STEPS = 10_000_000  # kept whole; about 2 GB
 BUFFER = 4096  # steps, and events, that one call of the kernel may record
 EVENT_KINDS = (
-    EventKind.CROSSING,
+    EventKind.IMPACT,
     EventKind.GRAZING,
     EventKind.REST,
     EventKind.RELEASE,
@@ -60,11 +60,11 @@ class Events(Sequence[Event]):
         """What the kernel noted with each event, as `layout.py` says: of a limit, which margin it is."""
         return self._labels[:, 3]
 
-    def crossings(self) -> Crossings:
+    def impacts(self) -> Impacts:
         """The impacts, as arrays."""
-        impacts = self.of(EventKind.CROSSING)
+        impacts = self.of(EventKind.IMPACT)
         labels, values = impacts._labels, impacts._values
-        return Crossings(impacts._times, labels[:, 2].astype(np.int8), values[:, 1], values[:, 2])
+        return Impacts(impacts._times, labels[:, 2].astype(np.int8), values[:, 1], values[:, 2])
 
 
 class Recorder:

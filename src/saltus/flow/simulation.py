@@ -373,7 +373,7 @@ def _collect(
         chatter_speed=float(state[k.SPEED]) if where[k.MODE] == k.CHATTER else None,
         periods=int(where[k.PERIOD]),
         events=events,
-        crossings=events.crossings(),
+        impacts=events.impacts(),
         dense=recorder.dense(),
         samples=samples,
         sampled_validity=None if samples is None else recorder.validity(time - start),

@@ -60,7 +60,7 @@ class Singular:
         signature = self.problem.signature
         if self.closing > 0 or not signature.sides:
             return None
-        periods = signature.periods * (1 if signature.symmetric else 2)
+        periods = signature.period * (1 if signature.symmetric else 2)
         second = tuple(-s for s in signature.sides) if signature.symmetric else signature.sides
         return self.problem.with_signature(Signature((*signature.sides, *second), periods))
 

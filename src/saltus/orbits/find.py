@@ -30,7 +30,7 @@ def find_orbit(
     velocity: Any = 0.0,
     period: int | None = None,
     settle: int | None = None,
-    longest: int = LONGEST,
+    max_period: int = LONGEST,
     parameters: tuple[str, ...] = (),
     **coordinates: float,
 ) -> PeriodicOrbit:
@@ -41,10 +41,10 @@ def find_orbit(
     Args:
         system: what moves, under a load with a frequency.
         velocity, coordinates: the state at phase 0, by the model's names: theta=0.3.
-        period: how many forcing periods the orbit takes; by default the fewest, up to `longest`, after which the settled motion
+        period: how many forcing periods the orbit takes; by default the fewest, up to `max_period`, after which the motion
             returns.
         settle: forcing periods to let pass first; by default as many as it takes, up to 4960.
-        longest: the longest period looked for.
+        max_period: the longest period looked for.
         parameters: dotted paths along which the orbit will be continued; `continue_orbit` sees to them itself.
 
     Raises:
@@ -55,24 +55,24 @@ def find_orbit(
         raise ParameterError(f"find_orbit takes a System(model=..., load=..., impact=...), got {system!r}")
     if period is not None:
         check_whole("period", period, 1)
-    check_whole("longest", longest, 1)
+    check_whole("max_period", max_period, 1)
     if settle is not None:
         check_whole("settle", settle, 0)
     base = Problem(system, Signature((), 1), parameters)  # refuses what has no orbits
     state = {**coordinates, "velocity": velocity}
     if settle is not None:
         state = _after(system, state, settle)
-        return _polish(base, state, _period_of(system, state, period, longest), None)
+        return _polish(base, state, _period_of(system, state, period, max_period), None)
     passed = 0
     for attempt in range(ROUNDS):
         state = _after(system, state, wait := 160 * 2**attempt)
         passed += wait
-        q = _returning(system, state, period, longest)
+        q = _returning(system, state, period, max_period)
         if q is not None:
             return _polish(base, state, q, passed)
     raise MotionError(
-        f"the motion has not settled on a periodic orbit of up to {period or longest} forcing periods after {passed}: it is "
-        "chaotic, slow to settle or longer; try another start, longest=..., or settle=0 with period=... for an unstable orbit "
+        f"the motion has not settled on a periodic orbit of up to {period or max_period} forcing periods after {passed}: it is "
+        "chaotic, slow to settle or longer; try another start, max_period=..., or settle=0 with period=... for an unstable orbit "
         "near the start"
     )
 
@@ -135,21 +135,21 @@ def _strobes(system: System, state: dict[str, Any], count: int) -> list[np.ndarr
     return strobes
 
 
-def _returning(system: System, state: dict[str, Any], period: int | None, longest: int) -> int | None:
+def _returning(system: System, state: dict[str, Any], period: int | None, max_period: int) -> int | None:
     """The fewest forcing periods after which a settled motion returns, or None."""
-    strobes = _strobes(system, state, period or longest)
-    for q in (period,) if period else range(1, longest + 1):
+    strobes = _strobes(system, state, period or max_period)
+    for q in (period,) if period else range(1, max_period + 1):
         if np.abs(strobes[q] - strobes[0]).max() < NEAR:
             return q
     return None
 
 
-def _period_of(system: System, state: dict[str, Any], period: int | None, longest: int) -> int:
+def _period_of(system: System, state: dict[str, Any], period: int | None, max_period: int) -> int:
     """The number of forcing periods after which a motion comes nearest to where it was, if it is not given."""
     if period is not None:
         return period
-    strobes = _strobes(system, state, longest)
-    return 1 + int(np.argmin([np.abs(strobes[q] - strobes[0]).max() for q in range(1, longest + 1)]))
+    strobes = _strobes(system, state, max_period)
+    return 1 + int(np.argmin([np.abs(strobes[q] - strobes[0]).max() for q in range(1, max_period + 1)]))
 
 
 def _polish(base: Problem, state: dict[str, Any], periods: int, passed: int | None) -> PeriodicOrbit:
@@ -187,14 +187,14 @@ def orbit_near(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOr
 
 def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tuple[Problem, np.ndarray]:
     """The problem with a motion's signature, and its unknowns along the motion."""
-    crossings = motion.crossings
+    impacts = motion.impacts
     # with two sides an odd impact is one near the section that was counted once too often, or not at all
-    count = len(crossings) - (len(crossings) % 2 if len(base.system.model.sides) == 2 else 0)
+    count = len(impacts) - (len(impacts) % 2 if len(base.system.model.sides) == 2 else 0)
     if not count:
         return base.with_signature(Signature((), periods, False, motion.side)), state
-    rate = np.abs(crossings.velocity_before[:count])
-    sides = tuple(int(s) for s in crossings.side[:count])
-    unknowns = np.stack([crossings.time[:count] * base.frequency(base.values), rate], axis=1).ravel()
+    rate = np.abs(impacts.velocity_before[:count])
+    sides = tuple(int(s) for s in impacts.side[:count])
+    unknowns = np.stack([impacts.time[:count] * base.frequency(base.values), rate], axis=1).ravel()
     return base.with_signature(Signature(sides, periods)), unknowns
 
 
@@ -209,10 +209,10 @@ def simplest(problem: Problem, solution: Any) -> tuple[Problem, Any]:
 def divide(problem: Problem, solution: Any) -> tuple[Problem, Any] | None:
     """An orbit that repeats after a divisor of its period, as an orbit of that; None where it does not."""
     signature, n = problem.signature, len(problem.signature.sides)
-    for q in range(1, signature.periods):
-        if signature.periods % q or (n * q) % signature.periods:
+    for q in range(1, signature.period):
+        if signature.period % q or (n * q) % signature.period:
             continue
-        part = n * q // signature.periods
+        part = n * q // signature.period
         if signature.sides and (part == 0 or signature.sides[:part] != signature.sides[part : 2 * part]):
             continue
         shorter = problem.with_signature(Signature(signature.sides[:part], q, False, signature.side))

@@ -53,8 +53,8 @@ def _signatures(dataset: xarray.Dataset) -> list[Signature]:
     """The signature of each orbit: of a branch one a point, of a curve one for all."""
     if "sides" not in dataset:
         one, sides = dataset.attrs, np.atleast_1d(dataset.attrs["sides"])
-        return [_signature(sides, one["periods"], one["symmetric"], one["side"])] * dataset.sizes["point"]
-    columns = (dataset[name].values for name in ("sides", "periods", "symmetric", "side"))
+        return [_signature(sides, one["period"], one["symmetric"], one["side"])] * dataset.sizes["point"]
+    columns = (dataset[name].values for name in ("sides", "period", "symmetric", "side"))
     return [_signature(*row) for row in zip(*columns, strict=True)]
 
 
@@ -75,7 +75,7 @@ def _orbit(problem: Problem, row: np.ndarray, value: np.ndarray) -> PeriodicOrbi
 
 def _resting_orbits(dataset: xarray.Dataset, system: System) -> list[PeriodicOrbit]:
     """The orbits of a family that rests for a part of its period: the load's release that they begin with says all."""
-    path, columns = str(dataset.attrs["path"]), ("parameter", "periods")
+    path, columns = str(dataset.attrs["path"]), ("parameter", "period")
     orbits: list[PeriodicOrbit] = []
     for first, value, periods in zip(dataset["releases"].values[:, 0], *(dataset[name].values for name in columns), strict=True):
         here = system.with_({path: float(value)})

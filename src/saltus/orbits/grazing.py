@@ -60,9 +60,9 @@ def inserted(point: Point) -> tuple[Problem, np.ndarray] | str:
     sides = (side,) if _turns_round(problem, side) else (side, -side)
     touches = np.array([phase, 0.0] * len(sides))
     if not signature.sides:
-        return problem.with_signature(Signature(sides, signature.periods)), touches
+        return problem.with_signature(Signature(sides, signature.period)), touches
     place = segment + 1
-    longer = Signature((*signature.sides[:place], *sides, *signature.sides[place:]), signature.periods, signature.symmetric)
+    longer = Signature((*signature.sides[:place], *sides, *signature.sides[place:]), signature.period, signature.symmetric)
     unknowns = point.solution.unknowns
     return problem.with_signature(longer), np.concatenate([unknowns[: 2 * place], touches, unknowns[2 * place :]])
 
@@ -82,7 +82,7 @@ def removed(point: Point) -> tuple[Problem, np.ndarray] | str:
     kept = [i for i in range(n) if i not in gone]
     if not kept:
         return _without_impacts(point, slow)
-    shorter = Signature(tuple(signature.sides[i] for i in kept), signature.periods, signature.symmetric)
+    shorter = Signature(tuple(signature.sides[i] for i in kept), signature.period, signature.symmetric)
     return problem.with_signature(shorter), point.solution.unknowns.reshape(n, 2)[kept].ravel()
 
 
@@ -107,7 +107,7 @@ def _without_impacts(point: Point, slow: int) -> tuple[Problem, np.ndarray] | st
     side = signature.along()[int(np.argmax(lengths))]
     whole = 2.0 * np.pi * np.ceil(touch / (2.0 * np.pi))
     contact = np.array([float(problem.at(point.solution.values).model.contact), 0.0])
-    for periods in range(1, signature.periods + 1):  # three families may meet here: then on with that of the shortest period
+    for periods in range(1, signature.period + 1):  # three families may meet here: then on with that of the shortest period
         other = problem.with_signature(Signature((), periods, False, side))
         state = other.carried(contact, touch, whole, point.solution.values)
         later = other.carried(contact, touch, whole + other.closing, point.solution.values)

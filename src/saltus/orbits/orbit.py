@@ -40,9 +40,9 @@ class PeriodicOrbit:
         return self.problem.signature
 
     @property
-    def periods(self) -> int:
+    def period(self) -> int:
         """q: after so many forcing periods it repeats."""
-        return self.signature.periods
+        return self.signature.period
 
     @property
     def symmetric(self) -> bool:
@@ -57,7 +57,7 @@ class PeriodicOrbit:
     @property
     def duration(self) -> float:
         """q 2 pi / Omega."""
-        return 2.0 * math.pi * self.periods / self.frequency
+        return 2.0 * math.pi * self.period / self.frequency
 
     @cached_property
     def _phases(self) -> np.ndarray:
@@ -65,7 +65,7 @@ class PeriodicOrbit:
         return np.concatenate([phases, phases + self.problem.closing]) if self.symmetric else phases
 
     @cached_property
-    def crossings(self) -> np.ndarray:
+    def impact_times(self) -> np.ndarray:
         """The times of the impacts, from phase 0 of the load's period in which the first one lies, (n,)."""
         times: np.ndarray = (self._phases - 2.0 * math.pi * self._shift) / self.frequency
         return times
@@ -125,7 +125,7 @@ class PeriodicOrbit:
     def admissible(self) -> bool:
         """Whether it is a motion of the system: every impact has a speed, the next one comes later, the gap is open between."""
         phases = self._phases
-        in_order = np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.periods)) > -TOUCH
+        in_order = np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.period)) > -TOUCH
         return self.clearance > -TOUCH and self.slowest > -TOUCH and bool(in_order.all())
 
     @cached_property
@@ -162,14 +162,14 @@ class PeriodicOrbit:
             velocity = float(state[n]) if n == 1 else tuple(map(float, state[n:]))
             return {**dict(zip(self.system.model.coordinates, map(float, state[:n]), strict=True)), "velocity": velocity}
         model, load, impact = self.system.model, self.system.load, self.system.impact
-        side, time = int(self.sides[0]), float(self.crossings[0])
+        side, time = int(self.sides[0]), float(self.impact_times[0])
         inward = -np.sign(float(model.gap(model.contact + 1.0, side)) - float(model.gap(model.contact, side)))
         _, after = model.reset(time, float(inward * self.speeds[0]), side, load, impact)
         return {model.coordinates[0]: float(model.contact), "velocity": float(after), "time": time}
 
     def motion(self, periods: float | None = None, tol: float = 1e-13) -> Motion:
         """The exact motion from its state, over one period of the orbit if not said otherwise."""
-        return simulate(self.system, **self.start(), periods=self.periods if periods is None else periods, tol=tol)
+        return simulate(self.system, **self.start(), periods=self.period if periods is None else periods, tol=tol)
 
     @cached_property
     def defect(self) -> float:
@@ -183,7 +183,7 @@ class PeriodicOrbit:
         if self.signature.sides:  # the motion ends at an impact: before or after it
             ends = [np.abs(np.append(np.atleast_1d(motion.position) - begin, np.abs(motion.velocity) - np.abs(v))).max()
                     for v in (start["velocity"], self.speeds[0])]  # fmt: skip
-            return min(ends) if self.grazes or abs(len(motion.crossings) - self.signature.crossings) <= 1 else math.inf
+            return min(ends) if self.grazes or abs(len(motion.impacts) - self.signature.impact_count) <= 1 else math.inf
         velocity = np.atleast_1d(motion.velocity) - np.atleast_1d(start["velocity"])
         return float(np.abs(np.concatenate([np.atleast_1d(motion.position) - begin, velocity])).max())
 
@@ -198,7 +198,7 @@ class PeriodicOrbit:
         return float(np.atleast_1d(motion.position)[0]), float(np.atleast_1d(motion.velocity)[0])
 
     def _to_phase_zero(self) -> float:
-        return 2.0 * math.pi / self.frequency - float(self.crossings[0])
+        return 2.0 * math.pi / self.frequency - float(self.impact_times[0])
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name in ("problem", "solution"):
@@ -217,7 +217,7 @@ class PeriodicOrbit:
     def __repr__(self) -> str:
         kind = "symmetric " if self.symmetric else ""
         return (
-            f"PeriodicOrbit({kind}period {self.periods}, {self.signature.crossings} impacts, amplitude={self.amplitude:.9g}, "
+            f"PeriodicOrbit({kind}period {self.period}, {self.signature.impact_count} impacts, amplitude={self.amplitude:.9g}, "
             f"{'stable' if self.stable else 'unstable'}, largest multiplier {self.multipliers[0]:.6g}, "
             f"residual={self.residual:.1g})"
         )

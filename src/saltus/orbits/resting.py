@@ -120,7 +120,7 @@ class RestingOrbit(PeriodicOrbit):
     @cached_property
     def defect(self) -> float:
         """The largest distance between its states and those a period later, by direct simulation over two, at 64 instants."""
-        motion = self.motion(2 * self.periods)
+        motion = self.motion(2 * self.period)
         times = motion.start + self.duration * (np.arange(64) + 0.5) / 64.0
         now, later = motion.at(times), motion.at(times + self.duration)
         return float(np.abs(np.asarray(now) - np.asarray(later)).max())
@@ -128,34 +128,34 @@ class RestingOrbit(PeriodicOrbit):
     def __repr__(self) -> str:
         kind = "symmetric " if self.symmetric else ""
         return (
-            f"RestingOrbit({kind}period {self.periods}, {len(self.releases)} rests, "
+            f"RestingOrbit({kind}period {self.period}, {len(self.releases)} rests, "
             f"together {100 * self.rest_share:.3g} % of the time, amplitude={self.amplitude:.9g}, "
             f"{'stable' if self.stable else 'unstable'}, residual={self.residual:.1g})"
         )
 
 
-def resting_near(base: Problem, motion: Motion, longest: int) -> RestingOrbit | None:
-    """The resting orbit of up to `longest` forcing periods on which a motion is after its last release; None if there is none.
+def resting_near(base: Problem, motion: Motion, max_period: int) -> RestingOrbit | None:
+    """The resting orbit of up to `max_period` forcing periods on which a motion is after its last release; None if there is none.
 
     Its times are counted from its earliest release in a forcing period.
     """
     last = motion.events.of(EventKind.RELEASE)
     release = _known(load_releases(base.system), last[-1].time, last[-1].side, base.system) if len(last) else None
-    found = None if release is None else resting_orbit(base, release, longest)
+    found = None if release is None else resting_orbit(base, release, max_period)
     if found is None:
         return None
     period = base.system.load.period
     earliest = int(np.argmin(found.releases % period))
     release = _known(load_releases(base.system), found.releases[earliest], int(found.release_sides[earliest]), base.system)
-    return found if release is None else resting_orbit(base, release, longest)
+    return found if release is None else resting_orbit(base, release, max_period)
 
 
-def resting_orbit(base: Problem, release: Release, longest: int) -> RestingOrbit | None:
-    """The resting orbit of up to `longest` forcing periods that the motion from a release leads to; None if there is none."""
+def resting_orbit(base: Problem, release: Release, max_period: int) -> RestingOrbit | None:
+    """The resting orbit of up to `max_period` forcing periods that the motion from a release leads to; None if there is none."""
     system, period = base.system, base.system.load.period
     assert period is not None
     roots = load_releases(system)
-    motion = _released(system, release, longest + 1, dense=False)
+    motion = _released(system, release, max_period + 1, dense=False)
     chain, times = [release], [release.time]
     for event in motion.events.of(EventKind.RELEASE):
         if event.time - release.time < SAME * period:
@@ -166,7 +166,7 @@ def resting_orbit(base: Problem, release: Release, longest: int) -> RestingOrbit
         if following in chain:
             first = chain.index(following)
             periods = round((event.time - times[first]) / period)
-            return _orbit(base, tuple(chain[first:]), periods) if periods <= longest else None
+            return _orbit(base, tuple(chain[first:]), periods) if periods <= max_period else None
         chain.append(following)
         times.append(event.time)
     return None
@@ -203,12 +203,12 @@ def _orbit(base: Problem, chain: tuple[Release, ...], periods: int) -> RestingOr
     excursions = _excursions(motion, first, first.time + span * period, SAME * period)
     if excursions is None:
         return None
-    crossings = motion.crossings
-    problem = base.with_signature(Signature(tuple(int(s) for s in crossings.side), periods, symmetric))
+    impacts = motion.impacts
+    problem = base.with_signature(Signature(tuple(int(s) for s in impacts.side), periods, symmetric))
     equations, bends = _between(problem, motion, excursions)
     if equations is None:
         return None
-    unknowns = np.stack([crossings.time * base.frequency(base.values), np.abs(crossings.velocity_before)], axis=1).ravel()
+    unknowns = np.stack([impacts.time * base.frequency(base.values), np.abs(impacts.velocity_before)], axis=1).ravel()
     return RestingOrbit(problem, Solution(unknowns, problem.values, equations, 0), excursions, bends)
 
 
@@ -227,16 +227,16 @@ def _excursions(motion: Motion, first: Release, end: float, slack: float) -> np.
 
 def _between(problem: Problem, motion: Motion, excursions: np.ndarray) -> tuple[Equations | None, np.ndarray]:
     """The equations of the impacts along the smooth segments between them, with a look at each, and the gap's bends at impact."""
-    crossings, contact = motion.crossings, float(problem.system.model.contact)
-    speeds = np.abs(crossings.velocity_before)
-    opened = np.searchsorted(crossings.time, excursions[:, RELEASED])  # the first impact of each excursion
-    begins, before = np.append(-np.inf, crossings.time[:-1]), np.append(0, crossings.side[:-1]).astype(np.int64)
+    impacts, contact = motion.impacts, float(problem.system.model.contact)
+    speeds = np.abs(impacts.velocity_before)
+    opened = np.searchsorted(impacts.time, excursions[:, RELEASED])  # the first impact of each excursion
+    begins, before = np.append(-np.inf, impacts.time[:-1]), np.append(0, impacts.side[:-1]).astype(np.int64)
     approach, states = np.append(0.0, speeds[:-1]), np.zeros((len(speeds), 2))
-    into = excursions[:, RELEASED] + INTO * (crossings.time[opened] - excursions[:, RELEASED])
+    into = excursions[:, RELEASED] + INTO * (impacts.time[opened] - excursions[:, RELEASED])
     begins[opened], before[opened], approach[opened] = into, 0, 0.0
     states[opened] = np.stack(motion.at(into), axis=1)
-    spans = np.stack([begins, crossings.time, approach], axis=1)
-    along = crossings.side.astype(np.int64)
+    spans = np.stack([begins, impacts.time, approach], axis=1)
+    along = impacts.side.astype(np.int64)
     flown = problem.fly(spans, np.stack([before, along], axis=1), states, problem.values, look=True)
     if flown is None:
         return None, np.empty(0)

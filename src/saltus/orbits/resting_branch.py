@@ -102,12 +102,12 @@ def _followed(orbit: RestingOrbit, path: str, value: float, index: int = 0) -> R
     nearest = min((release for release in load_releases(system) if release.side == side), key=apart, default=None)
     if nearest is None or apart(nearest) > MOST_CHANGE:
         return None
-    found = resting_orbit(Problem(system, Signature((), 1), (path,)), nearest, orbit.periods)
+    found = resting_orbit(Problem(system, Signature((), 1), (path,)), nearest, orbit.period)
     return found if found is not None and found.excursions[0, 0] == nearest.time else None
 
 
 def _itinerary(orbit: RestingOrbit) -> tuple[int, bool, tuple[int, ...]]:
-    return orbit.periods, orbit.symmetric, tuple(map(int, orbit.release_sides))
+    return orbit.period, orbit.symmetric, tuple(map(int, orbit.release_sides))
 
 
 def _change(a: RestingOrbit, b: RestingOrbit) -> float:

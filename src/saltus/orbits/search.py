@@ -30,7 +30,7 @@ class Settled:
     """What direct simulation has settled on, an array entry for each motion that has."""
 
     value: np.ndarray  # of the parameter
-    periods: np.ndarray  # forcing periods after which it repeats
+    period: np.ndarray  # forcing periods after which it repeats
     highest: np.ndarray  # of the first coordinate over that time
     lowest: np.ndarray
 
@@ -48,7 +48,7 @@ class Search:
     orbits: tuple[PeriodicOrbit, ...]
     values: np.ndarray  # of the parameter
     starts: int  # at each value
-    longest: int  # forcing periods
+    max_period: int  # forcing periods
     region: tuple[float, float]
     seed: int
     unsettled: np.ndarray  # (values,): how many motions did not settle on an orbit of up to so many periods: slow or chaotic;
@@ -56,7 +56,7 @@ class Search:
     settled: Settled  # the attractors as simulation shows them
 
     def __repr__(self) -> str:
-        kinds = sorted({orbit.periods for orbit in self.orbits})
+        kinds = sorted({orbit.period for orbit in self.orbits})
         stable = sum(orbit.stable for orbit in self.orbits)
         return (
             f"Search({len(self.orbits)} orbits, {stable} of them stable, of periods {kinds}; from {self.starts} states in "
@@ -69,24 +69,24 @@ def search_orbits(
     path: str,
     values: Iterable[float],
     *,
-    longest: int = 6,
+    max_period: int = 6,
     starts: int = 48,
     region: tuple[float, float] = REGION,
     seed: int = 0,
     repelling: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Search:
-    """Periodic orbits of up to `longest` forcing periods at several values of a parameter, each once for each value.
+    """Periodic orbits of up to `max_period` forcing periods at several values of a parameter, each once for each value.
 
     Initial states are spread evenly (a sequence of low discrepancy) over the region around the contact, or around 0 for a
     model without one. Motions that settle lead to the attracting orbits. Returns of the motions near to where they were, on
     their way or in chaos, are first guesses for Newton's method, which finds repelling ones, of up to `repelling` forcing
-    periods (by default `longest`; 0 looks for none).
+    periods (by default `max_period`; 0 looks for none).
 
     Raises:
         ParameterError: an unknown parameter, no values, an effort without meaning.
     """
-    for name, number in (("longest", longest), ("starts", starts)):
+    for name, number in (("max_period", max_period), ("starts", starts)):
         check_whole(name, number, 1)
     region = check_region(region)
     system.get(path)
@@ -96,7 +96,7 @@ def search_orbits(
     if len(system.model.coordinates) > 1:
         raise ParameterError("search_orbits works on models with one coordinate; use find_orbit from your own states")
     states = initial_states(system, starts, region, seed)
-    early, late, extrema = _strobes(system, path, grid, states, longest)
+    early, late, extrema = _strobes(system, path, grid, states, max_period)
     found: list[PeriodicOrbit] = []
     unsettled, at_rest = np.zeros(len(grid), dtype=int), np.zeros(len(grid), dtype=int)
     settled: list[tuple[float, int, float, float]] = []
@@ -105,9 +105,9 @@ def search_orbits(
         alive = np.isfinite(late[i]).all(axis=(1, 2))
         moving = alive & (np.abs(extrema[i] - _contact(system)[0]).max(axis=(1, 2)) > 1e-6)
         at_rest[i] = int((alive & ~moving).sum())
-        here, seen, unsettled[i] = _attracting(base, late[i][moving], extrema[i][moving], longest)
+        here, seen, unsettled[i] = _attracting(base, late[i][moving], extrema[i][moving], max_period)
         settled += [(float(value), *row) for row in seen]
-        reach = longest if repelling is None else repelling
+        reach = max_period if repelling is None else repelling
         if reach > 0:
             here += _repelling(base, np.concatenate([early[i][moving], late[i][moving]]), reach, here)
         found += here
@@ -115,7 +115,7 @@ def search_orbits(
             progress((i + 1) / len(grid))
     columns = np.array(settled, dtype=float).reshape(-1, 4).T
     dots = Settled(columns[0], columns[1].astype(int), columns[2], columns[3])
-    return Search(path, tuple(found), grid, starts, longest, region, seed, unsettled, at_rest, dots)
+    return Search(path, tuple(found), grid, starts, max_period, region, seed, unsettled, at_rest, dots)
 
 
 def check_region(region: Any) -> tuple[float, float]:
@@ -146,11 +146,11 @@ def _contact(system: System) -> np.ndarray:
 
 
 def _strobes(
-    system: System, path: str, grid: np.ndarray, states: np.ndarray, longest: int
+    system: System, path: str, grid: np.ndarray, states: np.ndarray, max_period: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """States at the ends of forcing periods, (values, starts, periods, 2): early ones, those after settling, and the extrema of
     the first coordinate in the latter."""
-    name, kept = system.model.coordinates[0], max(TRANSIENT, longest + 1)
+    name, kept = system.model.coordinates[0], max(TRANSIENT, max_period + 1)
 
     def run(theta: Any, velocity: Any, periods: int) -> tuple[np.ndarray, np.ndarray]:
         result = simulate_many(
@@ -173,7 +173,7 @@ def _strobes(
 
 
 def _attracting(
-    base: Problem, late: np.ndarray, extrema: np.ndarray, longest: int
+    base: Problem, late: np.ndarray, extrema: np.ndarray, max_period: int
 ) -> tuple[list[PeriodicOrbit], list[tuple[int, float, float]], int]:
     """The orbits on which settled motions are, what simulation shows of each, and how many motions have not settled."""
     found: list[PeriodicOrbit] = []
@@ -183,7 +183,7 @@ def _attracting(
     for strobes, range_ in zip(late, extrema, strict=True):
         if known.size and np.abs(known - strobes[-1]).max(axis=1).min() < 1e-5:
             continue
-        period = next((q for q in range(1, longest + 1) if np.abs(strobes[-1] - strobes[-1 - q]).max() < SETTLED), None)
+        period = next((q for q in range(1, max_period + 1) if np.abs(strobes[-1] - strobes[-1 - q]).max() < SETTLED), None)
         if period is None:
             unsettled += 1
             continue
@@ -195,10 +195,10 @@ def _attracting(
     return found, seen, unsettled
 
 
-def _repelling(base: Problem, strobes: np.ndarray, longest: int, known: list[PeriodicOrbit]) -> list[PeriodicOrbit]:
+def _repelling(base: Problem, strobes: np.ndarray, max_period: int, known: list[PeriodicOrbit]) -> list[PeriodicOrbit]:
     """Orbits near which motions return to where they were."""
     found: list[PeriodicOrbit] = []
-    for q in range(1, longest + 1):
+    for q in range(1, max_period + 1):
         if strobes.shape[1] <= q or not len(strobes):
             break
         distance = np.abs(strobes[:, q:] - strobes[:, :-q]).max(axis=2)
@@ -238,7 +238,7 @@ def _add(found: list[PeriodicOrbit], orbit: PeriodicOrbit) -> None:
 
 def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> bool:
     """Whether two orbits of one system are the same, or mirror images; by their period, impacts, speeds and extrema."""
-    if (a.periods, a.signature.crossings) != (b.periods, b.signature.crossings):
+    if (a.period, a.signature.impact_count) != (b.period, b.signature.impact_count):
         return False
     one, other = np.array([a.highest, a.lowest]), np.array([b.highest, b.lowest])
     same = np.abs(one - other).max() < 1e-6 or (mirrored and np.abs(one + other[::-1]).max() < 1e-6)

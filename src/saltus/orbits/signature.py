@@ -14,19 +14,19 @@ class Signature:
     """
 
     sides: tuple[int, ...]  # empty for an orbit without impacts
-    periods: int  # forcing periods, q
+    period: int  # forcing periods, q
     symmetric: bool = False
     side: int = 1  # of an orbit without impacts
 
     @property
-    def crossings(self) -> int:
+    def impact_count(self) -> int:
         """Impacts in one period of the orbit."""
         return len(self.sides) * (2 if self.symmetric else 1)
 
     @property
     def span(self) -> float:
         """Forcing periods that the equations cover: q, or q / 2."""
-        return self.periods / 2 if self.symmetric else float(self.periods)
+        return self.period / 2 if self.symmetric else float(self.period)
 
     def along(self) -> tuple[int, ...]:
         """The side of each segment: segment i follows impact i and ends with the next one."""

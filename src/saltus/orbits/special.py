@@ -59,7 +59,7 @@ class SpecialPoint:
     def __repr__(self) -> str:
         return (
             f"SpecialPoint(kind={self.kind!r}, parameter={self.parameter:.12g}, amplitude={self.amplitude:.9g}, "
-            f"period {self.orbit.periods}, {self.orbit.signature.crossings} impacts, bracket {self.evidence.bracket:.1g})"
+            f"period {self.orbit.period}, {self.orbit.signature.impact_count} impacts, bracket {self.evidence.bracket:.1g})"
         )
 
 
@@ -115,11 +115,11 @@ def asymmetry(point: Point) -> np.ndarray | None:
     if signature.symmetric or n == 0 or n % 2:
         return None
     first, second = signature.sides[: n // 2], signature.sides[n // 2 :]
-    expected = tuple(-s for s in first) if signature.periods % 2 else first
-    if second != expected or (signature.periods % 2 and not point.curve.symmetric):
+    expected = tuple(-s for s in first) if signature.period % 2 else first
+    if second != expected or (signature.period % 2 and not point.curve.symmetric):
         return None
     halves = point.solution.unknowns.reshape(2, n // 2, 2).copy()
-    halves[1, :, 0] -= np.pi * signature.periods
+    halves[1, :, 0] -= np.pi * signature.period
     return np.asarray((halves[1] - halves[0]).ravel())
 
 
@@ -168,9 +168,9 @@ def parent_point(kind: str, a: Point, b: Point) -> SpecialPoint | None:
     share = length / (length + float(np.linalg.norm(after)))
     place = a.place + share * (b.place - a.place)
     halves = place[:-1].reshape(2, n // 2, 2).copy()
-    halves[1, :, 0] -= np.pi * signature.periods
-    odd = bool(signature.periods % 2)
-    short = Signature(signature.sides[: n // 2], signature.periods if odd else signature.periods // 2, odd)
+    halves[1, :, 0] -= np.pi * signature.period
+    odd = bool(signature.period % 2)
+    short = Signature(signature.sides[: n // 2], signature.period if odd else signature.period // 2, odd)
     curve = Curve(a.curve.problem.with_signature(short), a.curve.scale, a.curve.symmetric)
     guess = np.append(halves.mean(axis=0).ravel(), place[-1])
     upwards = np.append(np.zeros(curve.problem.size), 1.0)

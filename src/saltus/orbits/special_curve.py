@@ -175,7 +175,7 @@ class Locus:
             "closed": int(self.closed),
             "sides": list(signature.sides) or [0],
             "side": signature.side,
-            "periods": signature.periods,
+            "period": signature.period,
             "symmetric": int(signature.symmetric),
             "system": system.to_json(),
             "saltus": saltus.__version__,

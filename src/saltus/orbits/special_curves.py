@@ -273,7 +273,7 @@ def _over_whole_period(problem: Problem, solution: Solution) -> tuple[Problem, S
     """A symmetric orbit, at a fold too, as a solution of the problem of its whole period."""
     signature, unknowns = problem.signature, solution.unknowns
     sides = (*signature.sides, *(-s for s in signature.sides))
-    other = problem.with_signature(Signature(sides, signature.periods, False, signature.side))
+    other = problem.with_signature(Signature(sides, signature.period, False, signature.side))
     if sides:
         later = unknowns.copy()
         later[::2] += problem.closing

@@ -60,9 +60,9 @@ def _kernel(matrix: np.ndarray) -> np.ndarray:
 def _doubled(point: Point) -> Point | None:
     """The orbit gone round twice, and the direction in which the two rounds differ."""
     problem, signature = point.curve.problem, point.curve.problem.signature
-    if 2 * signature.periods > LONGEST:
+    if 2 * signature.period > LONGEST:
         return None
-    twice = Signature((*signature.sides, *signature.sides), 2 * signature.periods, False, signature.side)
+    twice = Signature((*signature.sides, *signature.sides), 2 * signature.period, False, signature.side)
     unknowns, direction = point.solution.unknowns, _kernel(point.solution.equations.jacobian(-1.0))
     if not signature.sides:
         return _along(point, problem.with_signature(twice), unknowns, direction)
@@ -113,7 +113,7 @@ def mirror_image(orbit_problem: Problem, solution: Solution) -> tuple[Problem, S
         return orbit_problem, solution
     if not signature.sides:
         return None
-    other = orbit_problem.with_signature(Signature(tuple(-s for s in signature.sides), signature.periods, False, -signature.side))
+    other = orbit_problem.with_signature(Signature(tuple(-s for s in signature.sides), signature.period, False, -signature.side))
     unknowns = solution.unknowns.copy()
     unknowns[::2] += np.pi
     found = solve(other, unknowns, solution.values)
@@ -134,7 +134,7 @@ class Cascade:
     @property
     def periods(self) -> np.ndarray:
         """Of the orbits that double."""
-        return np.array([point.orbit.periods for point in self.points])
+        return np.array([point.orbit.period for point in self.points])
 
     @property
     def ratios(self) -> np.ndarray:
@@ -143,8 +143,8 @@ class Cascade:
         return np.asarray(steps[:-1] / steps[1:])
 
 
-def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, longest: int = 32, step: float = STEP) -> Cascade:
-    """The period doublings that follow one, each on the branch born at the one before, up to orbits of `longest` forcing periods.
+def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_period: int = 32, step: float = STEP) -> Cascade:
+    """The period doublings that follow one, each on the branch born at the one before, up to `max_period` forcing periods.
 
     It ends early where a doubled branch has no further doubling within the bounds.
 
@@ -155,7 +155,7 @@ def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, longes
         raise ParameterError(f"a cascade begins at a PD, not at a {first.kind}")
     low, high = check_bounds(bounds)
     points = [first]
-    while 2 * points[-1].orbit.periods <= longest:
+    while 2 * points[-1].orbit.period <= max_period:
         start = _doubled(points[-1].point)
         if start is None:
             break

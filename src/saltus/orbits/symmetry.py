@@ -45,7 +45,7 @@ def keeps_symmetry(system: System, path: str) -> bool:
 def half(problem: Problem, solution: Solution) -> tuple[Problem, Solution] | None:
     """An orbit that is its own mirror image, as a solution of the half problem; None where it is not."""
     signature = problem.signature
-    if signature.symmetric or signature.periods % 2 == 0:
+    if signature.symmetric or signature.period % 2 == 0:
         return None
     if not signature.sides:
         return _half_shooting(problem, solution)
@@ -53,18 +53,18 @@ def half(problem: Problem, solution: Solution) -> tuple[Problem, Solution] | Non
     if n % 2 == 0 or len(signature.sides) % 2:
         return None
     phases, speeds = solution.unknowns[::2], solution.unknowns[1::2]
-    halfway = np.pi * signature.periods
+    halfway = np.pi * signature.period
     if np.abs(phases[n:] - phases[:n] - halfway).max() > SAME or np.abs(speeds[n:] - speeds[:n]).max() > SAME:
         return None
     return _solved(
-        problem.with_signature(Signature(signature.sides[:n], signature.periods, True)), solution.unknowns[: 2 * n], solution
+        problem.with_signature(Signature(signature.sides[:n], signature.period, True)), solution.unknowns[: 2 * n], solution
     )
 
 
 def _half_shooting(problem: Problem, solution: Solution) -> tuple[Problem, Solution] | None:
     if problem.system.model.sides:
         return None
-    other = problem.with_signature(Signature((), problem.signature.periods, True, problem.signature.side))
+    other = problem.with_signature(Signature((), problem.signature.period, True, problem.signature.side))
     found = _solved(other, solution.unknowns, solution)
     return found if found and np.abs(found[1].unknowns - solution.unknowns).max() < SAME else None
 
@@ -80,7 +80,7 @@ def whole(problem: Problem, solution: Solution) -> tuple[Problem, Solution]:
     if not signature.symmetric:
         return problem, solution
     other = problem.with_signature(
-        Signature((*signature.sides, *(-s for s in signature.sides)), signature.periods, False, signature.side)
+        Signature((*signature.sides, *(-s for s in signature.sides)), signature.period, False, signature.side)
     )
     unknowns = solution.unknowns
     if signature.sides:

@@ -22,7 +22,7 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
     result = np.full(len(orbits), np.inf)
     groups: dict[int, list[int]] = {}
     for i, orbit in enumerate(orbits):
-        groups.setdefault(orbit.periods, []).append(i)
+        groups.setdefault(orbit.period, []).append(i)
     for periods, places in groups.items():
         result[places] = _defects([orbits[i] for i in places], rounds * periods, tol)
     return result

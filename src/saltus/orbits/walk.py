@@ -145,11 +145,11 @@ class Walk:
             self.reason = following
         elif (shorter := repetition(following)) is not None:
             self.reason = f"ends at a grazing of the {shorter}"
-        elif following.curve.problem.signature.crossings > MOST_IMPACTS:
+        elif following.curve.problem.signature.impact_count > MOST_IMPACTS:
             self.reason = f"more than {MOST_IMPACTS} impacts a period"
         elif self._accumulates(following):
             self.reason = (
-                f"grazings accumulate near {following.parameter:.9g}: {following.orbit.signature.crossings} impacts and more"
+                f"grazings accumulate near {following.parameter:.9g}: {following.orbit.signature.impact_count} impacts and more"
             )
         else:
             self.points.append(following)
@@ -157,8 +157,8 @@ class Walk:
 
     def _accumulates(self, following: Point) -> bool:
         """Whether the last grazings have all added impacts, ever closer to one parameter."""
-        last = [(s.parameter, s.orbit.signature.crossings) for s in self.special if s.kind == "GR"][-ACCUMULATE:]
-        counts = [*(n for _, n in last), following.orbit.signature.crossings]
+        last = [(s.parameter, s.orbit.signature.impact_count) for s in self.special if s.kind == "GR"][-ACCUMULATE:]
+        counts = [*(n for _, n in last), following.orbit.signature.impact_count]
         span = max((p for p, _ in last), default=0.0) - min((p for p, _ in last), default=0.0)
         growing = len(last) == ACCUMULATE and bool((np.diff(counts) > 0).all())
         small = following.orbit.amplitude < SMALL * max(point.orbit.amplitude for point in self.points)
@@ -187,7 +187,7 @@ class Walk:
 
     def _end_at_image(self, a: Point, b: Point) -> None:
         """End where the orbit becomes its own image: on the branch that its family was born from, at its BPC or PD."""
-        kind = "BPC" if a.curve.problem.signature.periods % 2 else "PD"
+        kind = "BPC" if a.curve.problem.signature.period % 2 else "PD"
         parent = parent_point(kind, a, b)
         self.reason = f"meets its own image at a {kind}"
         if parent is not None:
@@ -246,11 +246,11 @@ def repetition(point: Point) -> str | None:
     """What an orbit is that is another one gone round several times, or its own mirror image; None for one that is not."""
     signature, n = point.curve.problem.signature, len(point.curve.problem.signature.sides)
     difference = asymmetry(point)
-    if signature.periods % 2 and difference is not None and np.abs(difference).max() < SAME:
+    if signature.period % 2 and difference is not None and np.abs(difference).max() < SAME:
         return "symmetric orbit"
-    for periods in range(1, signature.periods):
-        part = n * periods // signature.periods
-        if signature.periods % periods or n * periods % signature.periods or part == 0 or signature.symmetric:
+    for periods in range(1, signature.period):
+        part = n * periods // signature.period
+        if signature.period % periods or n * periods % signature.period or part == 0 or signature.symmetric:
             continue
         pairs = point.solution.unknowns.reshape(-1, part, 2).copy()
         pairs[:, :, 0] -= 2.0 * math.pi * periods * np.arange(len(pairs))[:, None]
@@ -266,7 +266,7 @@ def separation(problem: Problem, unknowns: np.ndarray, other: Point) -> np.ndarr
     """
     target, signature = other.curve.problem.signature, problem.signature
     n = len(signature.sides)
-    if (n, signature.periods, signature.symmetric) != (len(target.sides), target.periods, target.symmetric):
+    if (n, signature.period, signature.symmetric) != (len(target.sides), target.period, target.symmetric):
         return None
     if n == 0:
         return unknowns if signature.side == target.side else None

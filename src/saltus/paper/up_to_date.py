@@ -49,8 +49,20 @@ def _imports(module: str) -> list[str]:
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            homes = _behind_the_door(node.module)
+            names += [node.module, *(homes.get(alias.name, f"{node.module}.{alias.name}") for alias in node.names)]
     return [name for name in names if name.startswith("saltus.")]
+
+
+@cache
+def _behind_the_door(package: str) -> dict[str, str]:
+    """The modules of the names that a room's front door gives, as its stub lists them."""
+    path = _path(package)
+    stub = None if path is None else path.with_suffix(".pyi")
+    if stub is None or path is None or path.name != "__init__.py" or not stub.exists():
+        return {}
+    imports = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom)]
+    return {alias.name: f"{package}.{node.module}" for node in imports for alias in node.names}
 
 
 @cache

@@ -1,4 +1,5 @@
 from .chart import chart_legend, curves_of, data_is_tree, draw_chart, draw_closed_form, draw_lines
+from .conventions import DOUBLE_COLUMN, FAINT, SINGLE_COLUMN, STABLE, UNSTABLE, new_figure, panel_label, style, styled
 from .diagram import POINTS
 from .energy_space import draw_space
 from .impact_approach import draw_history, draw_phase
@@ -19,7 +20,6 @@ from .response import (
     runs,
 )
 from .rocking import draw_errors, draw_jump, draw_periods
-from .style import DOUBLE_COLUMN, FAINT, SINGLE_COLUMN, STABLE, UNSTABLE, new_figure, panel_label, style, styled
 from .time_histories import draw_histories
 from .unit_cell import draw_cell, draw_frames, label_deformed, label_heights, label_undeformed
 

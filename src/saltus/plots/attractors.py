@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import Normal, Stroke
 
 from saltus.plots.basins import AT_REST, MARK, MARKERS, MOST_NAMED, POINT
+from saltus.plots.conventions import INK, SINGLE_COLUMN, new_figure, shades, styled
 from saltus.plots.diagram import axis_name
-from saltus.plots.style import INK, SINGLE_COLUMN, new_figure, shades, styled
 
 START: dict[str, Any] = {
     "linestyle": "none",
@@ -69,7 +69,7 @@ def _handle(marker: str, colour: Any, text: str) -> Line2D:
 
 
 def _words(dataset: Any, i: int, label: int) -> str:
-    kind, periods = str(dataset["attractor_kind"].values[i]), int(dataset["attractor_periods"].values[i])
+    kind, periods = str(dataset["attractor_kind"].values[i]), int(dataset["attractor_period"].values[i])
     share, error = (100 * float(dataset[v].values[i]) for v in ("fraction", "fraction_error"))
     what = kind if kind != "periodic" else "equilibrium" if _steady(dataset) else f"period {periods}"
     text = f"{label}: {what}"

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import Normal, Stroke
 
-from saltus.plots.style import INK, SINGLE_COLUMN, new_figure, shades, styled
+from saltus.plots.conventions import INK, SINGLE_COLUMN, new_figure, shades, styled
 
 UNDECIDED = "#ffffff"
 AT_REST = "#dddddd"  # lighter than every colour of a moving attractor
@@ -98,7 +98,7 @@ def _legend(dataset: Any, numbers: list[int], colours: list[Any]) -> list[Line2D
     """What each colour and mark stands for, and its share of the cells."""
     handles = []
     for i, number in enumerate(numbers[:MOST_NAMED]):
-        kind, periods = str(dataset["attractor_kind"].values[i]), int(dataset["attractor_periods"].values[i])
+        kind, periods = str(dataset["attractor_kind"].values[i]), int(dataset["attractor_period"].values[i])
         what = kind if kind != "periodic" else "equilibrium" if _steady(dataset) else f"period {periods}"
         text = f"{number}: {what}, {_percent(float(dataset['cells'].values[i]))}"
         handles.append(_handle(MARKERS[i % len(MARKERS)], colours[i], text))

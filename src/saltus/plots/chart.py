@@ -8,8 +8,8 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 
+from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, new_figure, styled
 from saltus.plots.diagram import parameter_name
-from saltus.plots.style import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, new_figure, styled
 
 COLOURS = "viridis_r"  # large amplitudes dark, beside the white of rest small ones light
 LEVELS = 12

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure, styled
 from saltus.plots.response import branches, draw_bands, draw_limits, draw_response, response_legend
-from saltus.plots.style import DOUBLE_COLUMN, INK, new_figure, styled
 
 NAMES = {
     "load.frequency": r"frequency $\Omega$",

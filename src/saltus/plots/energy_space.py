@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.plots.style import DASHES, INK, STABLE, shades
+from saltus.plots.conventions import DASHES, INK, STABLE, shades
 
 
 def draw_space(ax: Any, data: Any) -> None:

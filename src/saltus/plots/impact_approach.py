@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from saltus.plots.conventions import DASHES, FAINT, STABLE, UNSTABLE
 from saltus.plots.marks import arrow_along
-from saltus.plots.style import DASHES, FAINT, STABLE, UNSTABLE
 
 PHI: dict[str, Any] = {"color": UNSTABLE, "ls": DASHES[1], "lw": 1.2}
 THETA: dict[str, Any] = {"color": STABLE, "ls": "-", "lw": 1.2}

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from saltus.plots.conventions import INK, STABLE_LINE, UNSTABLE_LINE
 from saltus.plots.marks import arrow_along
-from saltus.plots.style import INK, STABLE_LINE, UNSTABLE_LINE
 
 TINT = "#dfeaf4"
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.plots.style import INK, LIMIT, LIMIT_LINE, STABLE, UNSTABLE
+from saltus.plots.conventions import INK, LIMIT, LIMIT_LINE, STABLE, UNSTABLE
 
 
 def fixed_points(ax: Any, theta: np.ndarray, stable: np.ndarray, size: float = 4.5) -> None:

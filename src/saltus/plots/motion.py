@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from saltus.plots.conventions import DOUBLE_COLUMN, FAINT, INK, STABLE, UNSTABLE, new_figure, styled
 from saltus.plots.marks import limit_lines
-from saltus.plots.style import DOUBLE_COLUMN, FAINT, INK, STABLE, UNSTABLE, new_figure, styled
 
 if TYPE_CHECKING:
     import xarray
@@ -63,10 +63,10 @@ def symbol(name: str) -> str:
 def arcs(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time, position and velocity with the impacts put in between the samples, parted by NaN where the velocity jumps."""
     time, position, velocity = (dataset[n].values for n in ("time", name, rate_of(dataset, name)))
-    if rate_of(dataset, name) != "velocity" or "crossing_time" not in dataset:
+    if rate_of(dataset, name) != "velocity" or "impact_time" not in dataset:
         return time, position, velocity
-    at = dataset["crossing_time"].values
-    before, after = (dataset[f"crossing_velocity_{when}"].values for when in ("before", "after"))
+    at = dataset["impact_time"].values
+    before, after = (dataset[f"impact_velocity_{when}"].values for when in ("before", "after"))
     # Samples at the very instant of an impact show the state after it, and so follow it.
     times = np.concatenate([at, at, at, time])
     order = np.argsort(times, kind="stable")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from saltus.plots.style import DASHES, shades
+from saltus.plots.conventions import DASHES, shades
 
 
 def draw_family(ax: Any, family: Any, names: list[str], title: str) -> None:

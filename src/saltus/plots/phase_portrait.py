@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from saltus.plots.conventions import FAINT, SEPARATRIX_LINE, STABLE
 from saltus.plots.marks import arrow_along, fixed_points, limit_lines
-from saltus.plots.style import FAINT, SEPARATRIX_LINE, STABLE
 
 CORE = 0.032  # motions this close in energy to theta = 0 are left out: their impacts would fill it with ink
 EYE = 0.0012  # the same at a deformed equilibrium, where they spiral

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from saltus.plots.conventions import FAINT, SEPARATRIX_LINE, SINGLE_COLUMN, STABLE, UNSTABLE, new_figure, styled
 from saltus.plots.diagram import axis_name
 from saltus.plots.marks import arrow_along, fixed_points
-from saltus.plots.style import FAINT, SEPARATRIX_LINE, SINGLE_COLUMN, STABLE, UNSTABLE, new_figure, styled
 
 CELLS = 48  # along each side of the window: motions that were spread end where they come so near to one that is drawn
 LAPS = 160  # the same for a motion and its own earlier laps

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.plots.style import INK, LIMIT, LIMIT_LINE, STABLE_LINE, UNSTABLE_LINE
+from saltus.plots.conventions import INK, LIMIT, LIMIT_LINE, STABLE_LINE, UNSTABLE_LINE
 
 DENSER = 6  # parts into which a step of a branch is divided when it is drawn
 PLACES, AROUND = 24, 0.05  # tried for an inset along each side, and what its ticks take, in shares of the axes
@@ -85,7 +85,7 @@ def runs(branch: Any, quantity: str = "amplitude") -> Iterator[tuple[bool, range
     They are cut where the stability changes and at every grazing, where curves have corners.
     """
     x, y = np.asarray(branch["parameter"].values), np.asarray(branch[quantity].values)
-    stable, impacts = np.asarray(branch["stable"].values, dtype=bool), branch["crossings"].values
+    stable, impacts = np.asarray(branch["stable"].values, dtype=bool), branch["impact_count"].values
     turned = stable[1:] != stable[:-1]
     cuts = [int(cut) + 1 for cut in np.flatnonzero(turned | (impacts[1:] != impacts[:-1]))]
     turns = {cut: [_between(branch, quantity, cut)] if turned[cut - 1] else [] for cut in cuts}

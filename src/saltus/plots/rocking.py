@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.plots.style import FAINT, INK, STABLE, shades
+from saltus.plots.conventions import FAINT, INK, STABLE, shades
 
 SHORT, SLENDER = (0, (1, 1.3)), (0, (5, 2))
 

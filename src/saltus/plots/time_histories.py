@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from saltus.plots.style import DASHES, FAINT, shades
+from saltus.plots.conventions import DASHES, FAINT, shades
 
 
 def draw_histories(ax: Any, data: Any, names: list[str], theta0: float) -> None:

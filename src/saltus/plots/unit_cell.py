@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from matplotlib.patches import Circle, Polygon
 
+from saltus.plots.conventions import INK, LIMIT, SEPARATRIX, STABLE, UNSTABLE
 from saltus.plots.marks import arc, dimension
-from saltus.plots.style import INK, LIMIT, SEPARATRIX, STABLE, UNSTABLE
 
 BAR = "#5f6b76"
 FORCE = UNSTABLE

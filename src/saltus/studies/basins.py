@@ -40,14 +40,14 @@ def basin_sweep(
     Args:
         system: what moves.
         rows: velocities of the grid in one chunk.
-        store, workers, scheduler: where the cells are kept and who computes them, see `saltus.sweep.run`.
-        progress: called with the chunks done, of how many, and the seconds left (None: not known), as by `saltus.sweep.run`;
+        store, workers, scheduler: where the cells are kept and who computes them, see `saltus.sweep.execution`.
+        progress: called with the chunks done, of how many, and the seconds left (None: not known), as by `saltus.sweep.execution`;
             first when all arguments have been checked.
         options: those of `basins`.
 
     Raises:
         ParameterError: an argument without meaning.
-        SweepError, SweepInterrupted: as `saltus.sweep.run`.
+        SweepError, SweepInterrupted: as `saltus.sweep.execution`.
     """
     from saltus.sweep import run
 

@@ -131,7 +131,7 @@ def _sampled(system: System, state: np.ndarray, duration: float, samples: int) -
     motion = simulate(system, **begin, velocity=float(state[1]), duration=duration)
     times = np.linspace(0.0, motion.time, samples)
     position, velocity = (np.asarray(x, dtype=float).reshape(samples, -1)[:, 0] for x in motion.at(times))
-    impacts = motion.crossings
+    impacts = motion.impacts
     before, after = impacts.velocity_before, impacts.velocity_after
     at, gap = np.full(len(impacts), float(system.model.contact)), np.full(len(impacts), np.nan)
     parts = [(times, position, velocity), (impacts.time, at, before)]

@@ -18,7 +18,7 @@ from saltus.sweep.chunk import Arrays, Failure
 from saltus.sweep.chunking import Index
 from saltus.sweep.jsonable import differences
 from saltus.sweep.plan import Plan
-from saltus.sweep.status import read_plan, status
+from saltus.sweep.store_status import read_plan, status
 
 if TYPE_CHECKING:
     import xarray

@@ -11,7 +11,7 @@ from saltus.flow import (
     AT_A_ROOT,
     AT_NONE,
     AT_ONCE,
-    CROSSING,
+    IMPACT,
     LIMIT,
     NEVER_AGAIN,
     RELEASE,
@@ -63,7 +63,7 @@ def _events(trace: Trace) -> list[tuple[int, int, dict[Expr, Expr]]]:
     still, unknown = [number(0.0)] * trace.columns, [NONE] * trace.columns
     return [
         *events,
-        (CROSSING, 0, after),
+        (IMPACT, 0, after),
         (RESET_SLOPES, 0, _reset_slopes(trace)),
         (RESTING, AFTER_IMPACTS, at_rest | _shifts(tangent.rest_shift(trace))),
         (RESTING, AT_ONCE, at_rest),

@@ -1,4 +1,4 @@
-"""From a trace to a structure's three functions for lanes, LLVM's instructions for all lanes at once (compare `scalar_source.py`).
+"""From a trace to a structure's three functions for lanes, LLVM's instructions for all lanes (compare `scalar_source.py`).
 
 They are written directly: it takes a second, as numba sees three calls only. A trace reaches the generated file as tapes: lists
 of nodes, operands before what uses them, each (operation, operands or value). The Taylor series are in `series.py`.

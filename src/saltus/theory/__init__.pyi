@@ -1,9 +1,9 @@
 from .bouncing import Peaks, peaks, reciprocal, unloaded_half_periods, unloaded_peak_ratio, unloaded_period
-from .divergence import Divergence, divergence, linear_equilibria
 from .energy import potential_energy, potential_slope, total_energy
-from .equilibria import Equilibrium, Stability, equilibria, undeformed_stability
 from .high_frequency import high_frequency_onset
+from .impact_oscillator import WallOrbit, WallOrbits, wall_orbits
 from .layer import Layer, layers, open_layer
+from .loaded_equilibria import Equilibrium, Stability, equilibria, undeformed_stability
 from .pendulum import pendulum_acceleration
 from .piecewise_linear import LinearMotion, linear_motion
 from .quasi_static import (
@@ -36,7 +36,7 @@ from .small_vibrations import (
     upright_period,
     vibrations,
 )
-from .wall_orbits import WallOrbit, WallOrbits, wall_orbits
+from .static_divergence import Divergence, divergence, linear_equilibria
 
 __all__ = [
     "Contact",

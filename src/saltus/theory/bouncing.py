@@ -12,8 +12,8 @@ import numpy as np
 from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.systems import System
-from saltus.theory.equilibria import zeros_of_slope
 from saltus.theory.layer import Layer, layers
+from saltus.theory.loaded_equilibria import zeros_of_slope
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ import numpy as np
 from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.systems import Load, Metainterface, System
-from saltus.theory.equilibria import zeros_of_slope
 from saltus.theory.layer import open_layer
+from saltus.theory.loaded_equilibria import zeros_of_slope
 
 
 def critical_horizontal(beta0: float, vertical: Any) -> Any:

@@ -87,7 +87,7 @@ def edge_saddles(system: System, low: np.ndarray, high: np.ndarray) -> list[Peri
             for one in (orbit, *_image(collection, orbit)):
                 if not any(same_orbit(one, other, mirrored=False) for other in found):
                     found.append(one)
-    return sorted(found, key=lambda orbit: orbit.periods)[:MOST_SADDLES]
+    return sorted(found, key=lambda orbit: orbit.period)[:MOST_SADDLES]
 
 
 def _returns(track: np.ndarray) -> list[tuple[np.ndarray, int]]:
@@ -124,5 +124,5 @@ def _image(collection: Collection, orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
     if orbit.symmetric or not is_symmetric(collection.system):
         return []
     state = -strobes_from(collection.system, np.array([orbit.state]), 0.5)[0, 0]
-    image = collection.solved(state, orbit.periods)
+    image = collection.solved(state, orbit.period)
     return [] if image is None else [image]

@@ -45,15 +45,15 @@ class Contraction:
             return float("nan")
         if len(motion.events.of(EventKind.REST)):
             return float("-inf")
-        crossings = motion.crossings
-        bounds = np.concatenate([[motion.start], crossings.time, [motion.time]])
-        sides = np.append(crossings.side, motion.side)
+        impacts = motion.impacts
+        bounds = np.concatenate([[motion.start], impacts.time, [motion.time]])
+        sides = np.append(impacts.side, motion.side)
         total = sum(rate * np.diff(bounds)[sides == side].sum() for side, rate in self._rates.items())
-        for side in set(crossings.side.tolist()):
-            here = crossings.side == side
-            before, after = crossings.velocity_before[here], crossings.velocity_after[here]
+        for side in set(impacts.side.tolist()):
+            here = impacts.side == side
+            before, after = impacts.velocity_before[here], impacts.velocity_after[here]
             with np.errstate(divide="ignore"):
-                total += np.log(np.abs(self._slope(int(side), crossings.time[here], before) * after / before)).sum()
+                total += np.log(np.abs(self._slope(int(side), impacts.time[here], before) * after / before)).sum()
         return float(total)
 
     def _slope(self, side: int, time: np.ndarray, before: np.ndarray) -> Any:

@@ -39,9 +39,7 @@ class Separatrix:
     time: np.ndarray  # (n,), from 0 to negative times
     theta: np.ndarray  # (n,)
     velocity: np.ndarray  # (n,)
-    crossings: (
-        np.ndarray
-    )  # (m, 2): the times and velocities, just before each, of the impacts of the forward motion, latest first
+    impacts: np.ndarray  # (m, 2): the times and velocities, just before each, of the impacts of the forward motion, latest first
     ends: str  # "window", "saddle" or "span"
 
 
@@ -98,25 +96,25 @@ def _branch(
         elif frame.far(piece[1:, -1:].T)[0]:
             ends = "window"
         left = left or bool(apart[-1] > 10.0 * CLOSE)
-        within = motion.crossings.time < piece[0, -1] - now + step
-        impacts.append(np.stack([now + motion.crossings.time, -motion.crossings.velocity_after], axis=1)[within])
+        within = motion.impacts.time < piece[0, -1] - now + step
+        impacts.append(np.stack([now + motion.impacts.time, -motion.impacts.velocity_after], axis=1)[within])
         pieces.append(piece)
         now, theta, velocity = now + PIECE, motion.position, motion.velocity
     time, thetas, velocities = np.concatenate(pieces, axis=1)
-    crossings = np.concatenate(impacts) * np.array([-1.0, 1.0])
-    return Separatrix(saddle.theta, -time, thetas, -velocities, crossings, ends)
+    contacts = np.concatenate(impacts) * np.array([-1.0, 1.0])
+    return Separatrix(saddle.theta, -time, thetas, -velocities, contacts, ends)
 
 
 def _sampled(motion: Motion, begin: float, step: float) -> np.ndarray:
     """Rows (time, coordinate, velocity) of a motion, with both sides of every impact, and nan between them where they differ."""
     times = np.linspace(0.0, PIECE, round(PIECE / step) + 1)
     theta, velocity = motion.at(times)
-    crossings, contact = motion.crossings, float(motion.system.model.contact)
+    impacts, contact = motion.impacts, float(motion.system.model.contact)
     rows = [np.stack([times, theta, velocity])]
     jump = not (isinstance(motion.system.impact, VelocityReduction) and len(motion.system.model.sides) == 2)
-    for values in (crossings.velocity_before, np.full(len(crossings), np.nan), crossings.velocity_after)[:: 1 if jump else 2]:
-        at = np.full(len(crossings), contact)
-        rows.append(np.stack([crossings.time, np.where(np.isnan(values), np.nan, at), values]))
+    for values in (impacts.velocity_before, np.full(len(impacts), np.nan), impacts.velocity_after)[:: 1 if jump else 2]:
+        at = np.full(len(impacts), contact)
+        rows.append(np.stack([impacts.time, np.where(np.isnan(values), np.nan, at), values]))
     joined = np.concatenate(rows, axis=1)
     joined = joined[:, np.argsort(joined[0], kind="stable")]
     return joined + np.array([[begin], [0.0], [0.0]])

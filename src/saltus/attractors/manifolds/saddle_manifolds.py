@@ -119,7 +119,7 @@ def _manifold(orbit: PeriodicOrbit, stable: bool, window: Any, periods: int, ste
     frame = check_window(window, step)
     system = orbit.system
     moving = reversed_system(system) if stable else system
-    q = orbit.periods
+    q = orbit.period
     strobes = np.roll(strobes_from(system, np.array([orbit.state]), q)[0], 1, axis=0)
     multiplier, directions = _directions(system, strobes, stable)
     ratio = 1.0 / abs(multiplier) if stable else abs(multiplier)

@@ -10,7 +10,7 @@ import numpy as np
 from saltus.attractors.lyapunov.averages import BATCHES
 from saltus.attractors.recurrence import clocked, settle
 from saltus.attractors.verdict.nonsettling import STAGES, STROBES, wandering
-from saltus.attractors.verdict.verdict import DRIVEN_LONGEST, Case, Verdict, settled
+from saltus.attractors.verdict.verdict import DRIVEN_MAX_PERIOD, Case, Verdict, settled
 from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.systems import System
@@ -22,7 +22,7 @@ def classify(
     velocity: float = 0.0,
     periods: int = 4000,
     transient: int = 500,
-    longest: int = DRIVEN_LONGEST,
+    max_period: int = DRIVEN_MAX_PERIOD,
     seed: int = 0,
     tol: float = 1e-12,
     progress: Callable[[float], object] | None = None,
@@ -47,7 +47,7 @@ def classify(
         velocity, coordinates: the state at the start, at phase 0.
         periods: how long it may take, in forcing periods: so many for settling, so many for the exponents; at least 96.
         transient: how many to let pass first.
-        longest: the longest period looked for, at least 16.
+        max_period: the longest period looked for, at least 16.
         seed: of the companions' states and the frequencies of the 0-1 test.
         tol: the error that one step may make.
         progress: called with the fraction done.
@@ -59,14 +59,14 @@ def classify(
     for name, value, least in (
         ("periods", periods, STAGES * 2 * BATCHES),
         ("transient", transient, 0),
-        ("longest", longest, DRIVEN_LONGEST),
+        ("max_period", max_period, DRIVEN_MAX_PERIOD),
     ):
         check_number(name, value, at_least=least)
         if value != int(value):
             raise ParameterError(f"{name} must be a whole number, got {value!r}")
-    case = Case(system, clock, int(periods), int(longest), int(seed), float(tol), progress or (lambda done: None))
+    case = Case(system, clock, int(periods), int(max_period), int(seed), float(tol), progress or (lambda done: None))
     ends = settle(
-        clock, start, int(transient + periods), kept=max(STROBES, 4 * int(longest)), tol=tol, progress=case.part(0.0, 0.1)
+        clock, start, int(transient + periods), kept=max(STROBES, 4 * int(max_period)), tol=tol, progress=case.part(0.0, 0.1)
     )
     verdict = settled(case, ends, start[0]) or wandering(case, ends)
     case.progress(1.0)

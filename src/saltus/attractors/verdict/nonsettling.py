@@ -82,7 +82,7 @@ def _beside(case: Case, state: dict[str, Any]) -> Ends:
     """How motions end that begin at a state, the first, and beside it."""
     around = np.random.default_rng(case.seed).uniform(-ASIDE, ASIDE, (COMPANIONS, 2))
     states = _row(case, state) + np.concatenate([[[0.0, 0.0]], around])
-    kept = 4 * case.longest
+    kept = 4 * case.max_period
     return settle(case.clock, states, max(case.periods, LEAST), kept=kept, tol=case.tol, progress=case.part(0.9, 1.0))
 
 
@@ -135,7 +135,7 @@ def _regular(case: Case, ends: Ends, last: Exponents, opinion: ZeroOne | None, g
         assert opinion is not None
         text = f"its exponents are 0 ({size}), it does not repeat itself, and the 0-1 test sees order (K = {opinion.K:.3g})"
         return case.verdict("quasi-periodic", text, ends, **given)
-    found = certify(case.clock, _row(case, last.state), None, longest=case.longest)
+    found = certify(case.clock, _row(case, last.state), None, max_period=case.max_period)
     if found.sound:
         return on_cycle(case, ends, found, "it approaches slowly", **given)
     given["evidence"] |= {} if against is None else {"no_tori": against}

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray
 
 KINDS = ("rest", "periodic", "quasi-periodic", "chaotic", "undecided")
-DRIVEN_LONGEST = 16  # the longest cycle that `settle` looks for
+DRIVEN_MAX_PERIOD = 16  # the longest cycle that `settle` looks for
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class Case:
     system: System
     clock: System  # the same, with a forcing period
     periods: int
-    longest: int
+    max_period: int
     seed: int
     tol: float
     progress: Callable[[float], object]
@@ -91,7 +91,7 @@ def settled(case: Case, ends: Ends, start: np.ndarray) -> Verdict | None:
         return case.verdict("rest", text, ends, state=point)
     if ends.ended[0]:
         return case.verdict("undecided", _why_ended(case, start, done), ends)
-    cycle = int(ends.cycle[0]) or _long_cycle(ends.strobes[0], case.longest)
+    cycle = int(ends.cycle[0]) or _long_cycle(ends.strobes[0], case.max_period)
     if not cycle:
         return None
     found = certify(case.clock, ends.strobes[0, -1], cycle)
@@ -110,9 +110,9 @@ def _why_ended(case: Case, start: np.ndarray, periods: int) -> str:
     return f"the motion cannot be followed beyond some {periods} forcing periods"
 
 
-def _long_cycle(strobes: np.ndarray, longest: int) -> int:
+def _long_cycle(strobes: np.ndarray, max_period: int) -> int:
     """The cycle, longer than `settle` looks for, on which the last states are; 0 if there is none."""
-    for q in range(DRIVEN_LONGEST + 1, min(longest, len(strobes) // 2 - 1) + 1):
+    for q in range(DRIVEN_MAX_PERIOD + 1, min(max_period, len(strobes) // 2 - 1) + 1):
         if np.abs(strobes[-q:] - strobes[-2 * q : -q]).max() < 1e-9:
             return q
     return 0
@@ -123,7 +123,7 @@ def on_cycle(case: Case, ends: Ends, found: Certificate, seen: str, **more: Any)
     more["evidence"] = more.get("evidence", {}) | found.evidence
     if found.orbit is None or not found.sound:
         return case.verdict("undecided", f"{seen}, but {found.doubt}", ends, **more)
-    q = found.orbit.periods
+    q = found.orbit.period
     text = f"{seen}, on an orbit of period {q} with the largest multiplier {abs(found.orbit.multipliers[0]):.6g}"
     if case.system.load.period is None:
         text = f"it comes to the equilibrium at {float(ends.strobes[0, -1, 0]):.9g}, which attracts"

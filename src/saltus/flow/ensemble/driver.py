@@ -32,12 +32,12 @@ from saltus.flow.ensemble.lane_layout import (
     CAPTURE,
     CAPTURED,
     CONSTANTS_AT,
-    CROSSINGS,
     ENDED_VELOCITY,
     ENDS_ASKED,
     FREE_LEGS,
     GAUGES,
     IMPACT_CODE,
+    IMPACT_COUNT,
     LANE_LABELS,
     LANE_ORDER,
     LAST_LOOK,
@@ -233,9 +233,9 @@ def commit(at, m, moved, hit):
     going, struck = mask(moved), mask(hit)
     store(m, NOW, select(going, load(m, NEW_TIME), load(m, NOW)))
     store(m, SIDE_NOW, select(struck, load(m, NEW_SIDE), load(m, SIDE_NOW)))
-    least, impacts = load(m, LEAST), load(m, CROSSINGS)
+    least, impacts = load(m, LEAST), load(m, IMPACT_COUNT)
     store(m, LEAST, select(struck, minimum(least, absolute(load(m, at[NEW_VELOCITY]))), least))
-    store(m, CROSSINGS, select(struck, impacts + 1.0, impacts))
+    store(m, IMPACT_COUNT, select(struck, impacts + 1.0, impacts))
     count = sizes_rows(at)
     for row in range(2 * count):  # positions, then velocities, lie one behind the other
         new = select(struck, load(m, at[AFTER_POSITION] + row), load(m, at[NEW_POSITION] + row))
@@ -320,7 +320,7 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
                     pass_on(m, free)
                     control[1] += lane_count(free)
                     past &= ~free
-                looking = bits(load(m, CROSSINGS) > load(m, NEXT_LOOK)) & flags[AWAKE] & ~past
+                looking = bits(load(m, IMPACT_COUNT) > load(m, NEXT_LOOK)) & flags[AWAKE] & ~past
             arrived = bits(load(m, NOW) >= load(m, TARGET)) & flags[AWAKE]
         concerned = away | captured | looking | arrived
         while concerned:

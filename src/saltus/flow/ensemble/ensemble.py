@@ -62,7 +62,7 @@ def simulate_many(
         side: +1 or -1, the side to leave by where the motion from rest at contact is not unique.
         stop_at: margins of the model that end a trajectory; its own `stops` always do.
         sample: what is kept of each of the `last` forcing periods: "state" (at its end, stroboscopically), "extrema" of the first
-            coordinate in it, "crossings" (the number of impacts), "speed" (the least abs(v-) of its impacts). They are counted
+            coordinate in it, "impact_count" (the number of impacts), "speed" (the least abs(v-) of its impacts). They are counted
             from the start, and the one in which the trajectory ends is kept, however short. Of "extrema" and "speed" the whole
             motion's are returned too.
         last: of how many forcing periods, counted back from the end; "all" keeps every one.
@@ -76,8 +76,8 @@ def simulate_many(
         coordinates: the state at the start by the model's names: theta=..., or x=... for a wall oscillator.
 
     Returns:
-        A Dataset with the state at the end, `time`, `side`, `stop` (why it ended), `crossings`, `grazings`, `periods` done (2.5
-        for two and a half), and what `sample` asks for, all over the dimensions of the arguments; see `ensemble_dataset.py`.
+        A Dataset with the state at the end, `time`, `side`, `stop` (why it ended), `impact_count`, `grazings`, `periods` done
+        (2.5 for two and a half), and what `sample` asks for, all over the dimensions of the arguments; see `ensemble_dataset.py`.
 
     Raises:
         ParameterError: an argument without meaning. A trajectory that cannot go on raises nothing: `stop` says so.

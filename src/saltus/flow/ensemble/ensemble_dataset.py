@@ -24,7 +24,7 @@ KEPT: dict[str, Callable[[int], list[int]]] = {
     "state": lambda own: list(range(2 * own)),
     "extrema": lambda own: [2 * own, 2 * own + 1],
     "speed": lambda own: [2 * own + 2],
-    "crossings": lambda own: [2 * own + 3],
+    "impact_count": lambda own: [2 * own + 3],
 }
 # Why a trajectory ended: the driver's reason, and its name.
 STOPS = {
@@ -57,8 +57,8 @@ MEANINGS = {
 
 # What a dataset has besides the coordinates and velocities of the model and what is called after those.
 FIXED = (
-    *("time", "side", "stop", "limit", "cycle", "crossings", "grazings", "periods", "chatter_speed", "derivative"),
-    *("least_speed", "overall_least_speed", "period_crossings", "start_time"),
+    *("time", "side", "stop", "limit", "cycle", "impact_count", "grazings", "periods", "chatter_speed", "derivative"),
+    *("least_speed", "overall_least_speed", "period_impact_count", "start_time"),
 )
 DIMENSIONS = ("period", "state", "column")
 
@@ -145,7 +145,7 @@ def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends) -> None:
     writer.add("time", ends.labels[:, 4] * lengths + ends.numbers[:, 0], "1", "dimensionless time tau at the end")
     held = (ends.labels[:, 2] == k.REST) | (ends.labels[:, 2] == k.CHATTER)
     writer.add("side", np.where(held, 0, ends.labels[:, 3]).astype(np.int8), "1", "side at the end, 0 at rest")
-    writer.add("crossings", ends.labels[:, 5], "1", "impacts")
+    writer.add("impact_count", ends.labels[:, 5], "1", "impacts")
     writer.add("grazings", ends.labels[:, 6], "1", "touches of the contact without an impact")
     if (lengths > 0).all():
         done = legs + (ends.numbers[:, 0] - jobs.numbers[:, 0]) / lengths
@@ -216,7 +216,7 @@ def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
         "state": [(f"sampled_{name}", f"{name} at the end of the forcing period") for name in (*writer.names, *writer.rates)],
         "extrema": [(f"{which}_{first}", f"the {which} {first} in the forcing period") for which in ("largest", "smallest")],
         "speed": [("least_speed", f"{slowest}, in the forcing period")],
-        "crossings": [("period_crossings", "impacts in the forcing period")],
+        "impact_count": [("period_impact_count", "impacts in the forcing period")],
     }
     for name in KEPT:
         if name in sample:

@@ -22,7 +22,6 @@ from saltus.flow.ensemble.lane_layout import (
     CONSTANTS_AT,
     CONSTANTS_CODE,
     COUNT,
-    CROSSINGS,
     END_TIME,
     ENDED_HIGHEST,
     ENDED_POSITION,
@@ -36,6 +35,7 @@ from saltus.flow.ensemble.lane_layout import (
     HELD_NOW,
     HIGHEST,
     IDENT,
+    IMPACT_COUNT,
     LAST_KEPT,
     LAST_LEG,
     LAST_LOOK,
@@ -187,7 +187,7 @@ def begin_records(lane, at, m):
     """Start what is recorded of a forcing period, with the position at its beginning."""
     x = m[at[POSITION] * WIDTH + lane]
     m[HIGHEST * WIDTH + lane], m[LOWEST * WIDTH + lane] = x, x
-    m[LEAST * WIDTH + lane], m[CROSSINGS * WIDTH + lane] = np.inf, 0.0
+    m[LEAST * WIDTH + lane], m[IMPACT_COUNT * WIDTH + lane] = np.inf, 0.0
 
 
 @inline_jit
@@ -200,7 +200,7 @@ def end_here(lane, at, m):
     for j in range(4):
         m[(ENDED_HIGHEST + j) * WIDTH + lane] = m[(HIGHEST + j) * WIDTH + lane]
     total_up(lane, m)
-    m[NEXT_LOOK * WIDTH + lane] -= m[CROSSINGS * WIDTH + lane]
+    m[NEXT_LOOK * WIDTH + lane] -= m[IMPACT_COUNT * WIDTH + lane]
     m[LEGS_DONE * WIDTH + lane] += 1.0
     begin_records(lane, at, m)
 
@@ -249,7 +249,7 @@ def end_leg(lane, sizes, at, m, lanes, results):
 @inline_jit
 def total_up(lane, m):
     """Add what was recorded of a leg to what is recorded of the trajectory."""
-    m[COUNT * WIDTH + lane] += m[CROSSINGS * WIDTH + lane]
+    m[COUNT * WIDTH + lane] += m[IMPACT_COUNT * WIDTH + lane]
     m[TOP * WIDTH + lane] = max(m[TOP * WIDTH + lane], m[HIGHEST * WIDTH + lane])
     m[BOTTOM * WIDTH + lane] = min(m[BOTTOM * WIDTH + lane], m[LOWEST * WIDTH + lane])
     m[SLOWEST * WIDTH + lane] = min(m[SLOWEST * WIDTH + lane], m[LEAST * WIDTH + lane])
@@ -291,7 +291,7 @@ def finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results):
     state, numbers, labels, _ = results
     i, half = where[lane, IDENT], state.shape[1] // 2
     none = m[LEGS_DONE * WIDTH + lane] == 0.0
-    part = m[NOW * WIDTH + lane] > m[LEG_START * WIDTH + lane] or m[CROSSINGS * WIDTH + lane] > 0.0 or none
+    part = m[NOW * WIDTH + lane] > m[LEG_START * WIDTH + lane] or m[IMPACT_COUNT * WIDTH + lane] > 0.0 or none
     if part and reason != DONE and reason != SETTLED and reason != OUTSIDE:  # it ends within a leg
         end_here(lane, at, m)
     else:

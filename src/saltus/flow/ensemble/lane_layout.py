@@ -10,8 +10,8 @@ from __future__ import annotations
 # Slots of one vector: the state of each lane, what its step proposes, its contact, what is recorded of its leg, and its clock.
 NOW, ORIGIN, SIDE_NOW, NEW_TIME, NEW_SIDE, TARGET = 0, 1, 2, 3, 4, 5
 POINT, RATE_UP, RATE_DOWN, CAPTURE = 6, 7, 8, 9
-HIGHEST, LOWEST, LEAST, CROSSINGS = 10, 11, 12, 13  # since the leg began
-ENDED_HIGHEST, ENDED_LOWEST, ENDED_LEAST, ENDED_CROSSINGS, ENDED_SIDE = 14, 15, 16, 17, 18  # when the last leg ended
+HIGHEST, LOWEST, LEAST, IMPACT_COUNT = 10, 11, 12, 13  # since the leg began
+ENDED_HIGHEST, ENDED_LOWEST, ENDED_LEAST, ENDED_IMPACT_COUNT, ENDED_SIDE = 14, 15, 16, 17, 18  # when the last leg ended
 TOP, BOTTOM, SLOWEST, COUNT = 19, 20, 21, 22  # from the start to the end of the last leg
 WALL = 23  # the time that no step goes beyond; it may go beyond the end of a leg, TARGET
 LEG, LEG_START, LEG_LENGTH, LEGS_DONE = 24, 25, 26, 27  # which forcing period, from what local time on, how long; how many ended

@@ -10,15 +10,15 @@ import numpy as np
 from saltus.flow.ensemble.lane_layout import (
     BOTTOM,
     COUNT,
-    CROSSINGS,
-    ENDED_CROSSINGS,
     ENDED_HIGHEST,
+    ENDED_IMPACT_COUNT,
     ENDED_LEAST,
     ENDED_LOWEST,
     ENDED_POSITION,
     ENDED_SIDE,
     ENDED_VELOCITY,
     HIGHEST,
+    IMPACT_COUNT,
     LANE_ORDER,
     LEAST,
     LOWEST,
@@ -108,12 +108,12 @@ def pass_ends(m, at, sizes, h, bend, past, helpers, poly, gap):
     x, v = load(m, at[ENDED_POSITION]), load(m, at[ENDED_VELOCITY])
     if sizes[WATCH] > 0:
         watch_range(m, at, sizes, h, bend, splat(0.0), load(m, at[VELOCITY]), since, x, v, past, helpers, poly, gap)
-    high, low, least, impacts = load(m, HIGHEST), load(m, LOWEST), load(m, LEAST), load(m, CROSSINGS)
+    high, low, least, impacts = load(m, HIGHEST), load(m, LOWEST), load(m, LEAST), load(m, IMPACT_COUNT)
     store(m, ENDED_SIDE, select(anew, load(m, SIDE_NOW), load(m, ENDED_SIDE)))
     store(m, ENDED_HIGHEST, select(anew, high, load(m, ENDED_HIGHEST)))
     store(m, ENDED_LOWEST, select(anew, low, load(m, ENDED_LOWEST)))
     store(m, ENDED_LEAST, select(anew, least, load(m, ENDED_LEAST)))
-    store(m, ENDED_CROSSINGS, select(anew, impacts, load(m, ENDED_CROSSINGS)))
+    store(m, ENDED_IMPACT_COUNT, select(anew, impacts, load(m, ENDED_IMPACT_COUNT)))
     store(m, TOP, select(anew, maximum(load(m, TOP), high), load(m, TOP)))
     store(m, BOTTOM, select(anew, minimum(load(m, BOTTOM), low), load(m, BOTTOM)))
     store(m, SLOWEST, select(anew, minimum(load(m, SLOWEST), least), load(m, SLOWEST)))
@@ -121,7 +121,7 @@ def pass_ends(m, at, sizes, h, bend, past, helpers, poly, gap):
     store(m, HIGHEST, select(anew, x, high))
     store(m, LOWEST, select(anew, x, low))
     store(m, LEAST, select(anew, splat(np.inf), least))
-    store(m, CROSSINGS, select(anew, splat(0.0), impacts))
+    store(m, IMPACT_COUNT, select(anew, splat(0.0), impacts))
     store(m, NEXT_LOOK, select(anew, load(m, NEXT_LOOK) - impacts, load(m, NEXT_LOOK)))
 
 

@@ -16,12 +16,12 @@ from saltus.flow.ensemble.lane_layout import (
     CAPTURED,
     CHATTER_NOW,
     COLUMN_COUNT,
-    CROSSINGS,
     END_TIME,
     FORCED_SIDE,
     HELD_NOW,
     HIGHEST,
     IDENT,
+    IMPACT_COUNT,
     LAST_LEG,
     LEAST,
     LEG,
@@ -49,7 +49,6 @@ from saltus.flow.kernel_layout import (
     ARC,
     CHATTER,
     COLUMNS,
-    CROSSING,
     DENSE,
     DOF,
     DONE,
@@ -60,6 +59,7 @@ from saltus.flow.kernel_layout import (
     GRAZING,
     HELD,
     HORIZON,
+    IMPACT,
     LAST,
     LENGTH,
     MODE,
@@ -122,8 +122,8 @@ def note(lane, where, m, lanes, steps, events, sizes, poly):
     detail = 0
     for i in range(where[EVENTS]):
         kind, detail = events[0][i, 1], events[0][i, 3]
-        if kind == CROSSING:
-            m[CROSSINGS * WIDTH + lane] += 1.0
+        if kind == IMPACT:
+            m[IMPACT_COUNT * WIDTH + lane] += 1.0
             m[LEAST * WIDTH + lane] = min(m[LEAST * WIDTH + lane], abs(events[1][i, 1]))
         elif kind == GRAZING:
             lanes[0][lane, TOUCHES] += 1

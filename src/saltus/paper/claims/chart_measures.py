@@ -20,7 +20,7 @@ def cells(panel: Any) -> dict[str, np.ndarray]:
     inside = chart.isel(vertical=chart["vertical"] < 0, horizontal=chart["horizontal"] > 0)
     border = np.interp(inside["vertical"].values, static["vertical"].values, static["true"].values)
     found = {name: inside[name].values for name in ("amplitude", "count", "unsettled", "motion_amplitude", "motion_period")}
-    found["motion_crossings"] = inside["motion_crossings"].values
+    found["motion_impact_count"] = inside["motion_impact_count"].values
     found["static"] = inside["horizontal"].values[None, :] < border[:, None]
     found["rest_alone"] = (found["count"] == 0) & (found["unsettled"] == 0)
     found["horizontal"], found["vertical"] = inside["horizontal"].values, inside["vertical"].values
@@ -43,7 +43,7 @@ def onset(panel: Any, vertical: np.ndarray) -> np.ndarray:
     """The least Hhat at V on the folds of the first motion (one period, two impacts), from the exact curves; NaN without one."""
     least = np.full(len(vertical), np.nan)
     for curve in curves_of(panel):
-        if str(curve.attrs["kind"]) != "LP" or (int(curve.attrs["periods"]), int(curve.attrs["crossings"])) != (
+        if str(curve.attrs["kind"]) != "LP" or (int(curve.attrs["period"]), int(curve.attrs["impact_count"])) != (
             PERIOD_ONE,
             TWICE,
         ):
@@ -76,7 +76,7 @@ def lost_by_curves(panel: Any) -> float:
     return float(1 - np.trapezoid(begins, vertical) / np.trapezoid(border, vertical))
 
 
-def others(panel: Any, period: int, crossings: int) -> np.ndarray:
+def others(panel: Any, period: int, impact_count: int) -> np.ndarray:
     """Cells, (vertical, horizontal), with a motion of so many forcing periods and impacts in them."""
     here = cells(panel)
-    return np.asarray(((here["motion_period"] == period) & (here["motion_crossings"] == crossings)).any(axis=2))
+    return np.asarray(((here["motion_period"] == period) & (here["motion_impact_count"] == impact_count)).any(axis=2))

@@ -30,7 +30,7 @@ def within(spectrum: Any, branch: Any) -> np.ndarray:
 
 def main_branch(spectrum: Any) -> Any:
     """The period-1 branch that covers most of the range."""
-    return max((b for _, b in named_branches(spectrum) if int(b["periods"][0]) == 1), key=lambda b: np.ptp(b["parameter"].values))
+    return max((b for _, b in named_branches(spectrum) if int(b["period"][0]) == 1), key=lambda b: np.ptp(b["parameter"].values))
 
 
 def detached(spectrum: Any) -> list[tuple[str, Any]]:

@@ -96,7 +96,7 @@ def _decay(e: float = 0.9, alpha: float = 0.3, theta0: float = 1e-4) -> dict[str
     period = float(rocking_period(theta0, alpha=alpha))
     end = final_time(period=period, e=e)
     motion = simulate(block(alpha, e), theta=theta0, velocity=0.0, duration=1.2 * end)
-    second, third = motion.crossings.time[1:3]
+    second, third = motion.impacts.time[1:3]
     # theta'' is nearly constant on each side, so the peak is where the parabola's time is half over
     peak = abs(motion.at(np.array([(second + third) / 2]))[0][0])
     return {

@@ -166,7 +166,7 @@ def _route(name: str, data: Any, frequencies: dict[str, float]) -> Claim:
     doubled, grazed, parts = [], [], []
     for panel, w in frequencies.items():
         spectrum = data[panel]
-        periods = sorted({int(b["periods"][0]) for _, b in named_branches(spectrum) if "PD" in " ".join(b.attrs["ends"])})
+        periods = sorted({int(b["period"][0]) for _, b in named_branches(spectrum) if "PD" in " ".join(b.attrs["ends"])})
         marks = [str(mark) for edge in ("low_mark", "high_mark") for mark in spectrum["bands"][edge].values]
         doubled.append(count(spectrum, "PD") > 0 and any(q % 2 == 0 for q in periods))
         grazed.append(count(spectrum, "GR") > 0)

@@ -138,7 +138,7 @@ def _loops(id: str, where: str, amplitudes: dict[str, float], data: Any) -> Clai
         above = [branch for _, branch in found if _rises_above(branch, main, low_high)]
         larger[size] = len(above)
         spans = [
-            f"period {int(b['periods'][0])}, Ω {float(b['parameter'].min()):.3f} to {float(b['parameter'].max()):.3f}"
+            f"period {int(b['period'][0])}, Ω {float(b['parameter'].min()):.3f} to {float(b['parameter'].max()):.3f}"
             for b in above
         ]
         parts.append(f"{size:g}: " + (", ".join(spans[:3]) or "none"))

@@ -42,7 +42,7 @@ def _measured_period(system: Any, theta0: float, guess: float) -> float:
     """The time between the first and the third impact."""
     from saltus.flow import simulate
 
-    times = simulate(system, theta=theta0, velocity=0.0, duration=1.6 * guess, tol=TOLERANCE).crossings.time
+    times = simulate(system, theta=theta0, velocity=0.0, duration=1.6 * guess, tol=TOLERANCE).impacts.time
     return float(times[2] - times[0])
 
 
@@ -70,7 +70,7 @@ def _decay(e: float) -> dict[str, float]:
 
     period = float(linear_period(SMALL, beta0=BETA0, vertical=VERTICAL))
     motion = simulate(free(e=e), theta=SMALL, velocity=0.0, duration=1.5 * final_time(period=period, e=e), tol=TOLERANCE)
-    impact = motion.crossings.time[:6]
+    impact = motion.impacts.time[:6]
     peaks = (impact[1:-1:2] + impact[2::2]) / 2  # theta'' is all but constant on each side
     amplitude = np.abs(motion.at(peaks)[0])
     return {
@@ -128,8 +128,8 @@ def _divergence() -> dict[str, float]:
     return {
         "theta_a": full,
         "theta_a_linear": linear,
-        "impacts_inside": len(back.crossings),
-        "impacts_outside": len(away.crossings),
+        "impacts_inside": len(back.impacts),
+        "impacts_outside": len(away.impacts),
     }
 
 
@@ -169,7 +169,7 @@ def _linear_solution() -> dict[str, float]:
     system = free(damping=0.1, stiffness=1.5, e=0.9)
     linear = linear_motion(system, SMALL, 5)
     exact = simulate(system, theta=SMALL, velocity=0.0, duration=1.01 * float(linear.impact_times[-1]), tol=TOLERANCE)
-    return {"linear_solution": float(np.abs(exact.crossings.time[:5] / linear.impact_times - 1).max())}
+    return {"linear_solution": float(np.abs(exact.impacts.time[:5] / linear.impact_times - 1).max())}
 
 
 def claims(data: Any) -> list[Claim]:

@@ -41,7 +41,7 @@ def _periods(samples: int) -> Any:
         for j, dot in enumerate(DOTS):
             expected = float(rocking_period(dot * alpha, alpha=alpha))
             motion = simulate(block(float(alpha)), theta=float(dot * alpha), velocity=0.0, duration=1.6 * expected, tol=TOLERANCE)
-            simulated[i, j] = motion.crossings.time[2] - motion.crossings.time[0]
+            simulated[i, j] = motion.impacts.time[2] - motion.impacts.time[0]
     names = ("exact", "short", "slender")
     meanings = ("closed form with an elliptic integral", "4 sqrt(2 theta0 / sin(alpha))", "4 arccosh(1 / (1 - theta0 / alpha))")
     return dataset(

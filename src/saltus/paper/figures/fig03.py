@@ -23,7 +23,7 @@ def compute(alpha0: float = 45.0, samples: int = 400) -> Any:
     cell = UnitCell(alpha0=np.deg2rad(alpha0), beta0=beta0)
     system = System(model=Metainterface(beta0=beta0, damping=0.1), load=Load(vertical=-0.5))
     motion = simulate(system, theta=0.4, velocity=0.0, duration=4.0, tol=TOLERANCE)
-    impact = float(motion.crossings.time[0])
+    impact = float(motion.impacts.time[0])
     to_go = np.concatenate([np.linspace(SPAN, 0.05, samples), np.geomspace(0.05, 1e-8, samples)[1:]])
     theta, velocity = motion.at(impact - to_go)
     data = dataset(
@@ -40,7 +40,7 @@ def compute(alpha0: float = 45.0, samples: int = 400) -> Any:
         tol=TOLERANCE,
         alpha0_degrees=alpha0,
         impact_time=impact,
-        impact_velocity=float(motion.crossings.velocity_before[0]),
+        impact_velocity=float(motion.impacts.velocity_before[0]),
         psi=cell.psi,
         sin_beta0=float(np.sin(beta0)),
     )

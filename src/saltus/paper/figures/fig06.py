@@ -41,11 +41,11 @@ def _histories(cases: list[tuple[float, float]], impact: Any, samples: int) -> A
         system = System(model=model, load=Load(vertical=0.0), impact=impact)
         cycle = float(unloaded_period(k, m))
         motion = simulate(system, theta=THETA0, velocity=0.0, duration=CYCLES * cycle, tol=TOLERANCE)
-        first, second, third = motion.crossings.time[:3]
+        first, second, third = motion.impacts.time[:3]
         theta.append(motion.at(np.minimum(phase * cycle, motion.time))[0])
         peak.append(float(motion.at(np.array([(first + second) / 2]))[0][0]))
         period.append(float(third - first))
-        after = motion.crossings.velocity_after[0]
+        after = motion.impacts.velocity_after[0]
         energy.append(total_energy(system, 0.0, after, 1) / total_energy(system, THETA0, 0.0))
     k, m = np.array(cases).T
     conserving = type(impact).__name__ == "EnergyRestitution"

@@ -41,7 +41,7 @@ def simulated_peak(system: Any, theta0: float) -> float:
 
     period = peaks(system, theta0).period
     motion = simulate(system, theta=theta0, velocity=0.0, duration=period, tol=TOLERANCE)
-    first, second = motion.crossings.time[:2]
+    first, second = motion.impacts.time[:2]
     return float(motion.at(np.array([(first + second) / 2]))[0][0])
 
 

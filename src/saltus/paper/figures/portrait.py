@@ -42,7 +42,7 @@ def portrait(system: System, starts: Sequence[tuple[float, float]], duration: fl
             "velocity": (("trajectory", "sample"), velocity, "1", "theta', rad per unit of tau"),
             "energy": (("trajectory", "sample"), _energy(system, theta, velocity), "K2", "kinetic and potential energy"),
             "end": ("trajectory", [m.theta for m in motions], "rad", "theta at the end"),
-            "impacts": ("trajectory", [len(m.crossings) for m in motions], "1", "impacts in the time shown"),
+            "impacts": ("trajectory", [len(m.impacts) for m in motions], "1", "impacts in the time shown"),
             "corner": ("trajectory", [_corner(m) for m in motions], "1", "jump of theta'' at the first impact upward, or NaN"),
             "wrong_reaction": (
                 "trajectory",
@@ -87,7 +87,7 @@ def portrait(system: System, starts: Sequence[tuple[float, float]], duration: fl
 def _corner(motion: Any) -> float:
     """The jump of theta'' at the first impact with theta' > 0, from the series of the steps on both sides of it; NaN if none."""
     dense = motion.dense
-    for time, velocity in zip(motion.crossings.time, motion.crossings.velocity_before, strict=True):
+    for time, velocity in zip(motion.impacts.time, motion.impacts.velocity_before, strict=True):
         after = int(np.searchsorted(dense.start, time))
         if velocity > 0 and 0 < after < dense.start.size:
             powers = np.arange(dense.series.shape[2])

@@ -9,9 +9,9 @@ import numpy as np
 
 def curve(motion: Any, start: float, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(tau, theta, theta') of a motion from `start` to its end, arrays (n,); NaN marks a jump of the velocity."""
-    crossings = motion.crossings
-    instants = np.asarray(crossings.time, dtype=float)
-    before, after = np.asarray(crossings.velocity_before, float), np.asarray(crossings.velocity_after, float)
+    impacts = motion.impacts
+    instants = np.asarray(impacts.time, dtype=float)
+    before, after = np.asarray(impacts.velocity_before, float), np.asarray(impacts.velocity_after, float)
     jump = np.where(before == after, 0.0, np.nan)
     times = np.setdiff1d(np.linspace(start, motion.time, samples), instants)
     theta, velocity = (np.asarray(a, dtype=float) for a in motion.at(times))

@@ -15,7 +15,7 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-EACH = ("amplitude", "other", "period", "crossings", "theta", "velocity")  # what a chart keeps of a motion
+EACH = ("amplitude", "other", "period", "impact_count", "theta", "velocity")  # what a chart keeps of a motion
 EQUAL = 1e-4  # of the amplitude: between motions that are one
 ADDED = "added_by_continuation"  # an attribute of the chart: how many
 
@@ -40,8 +40,8 @@ def _add(cell: dict[str, Any], count: Any, column: int, orbit: PeriodicOrbit) ->
     """Put an orbit among the motions of a cell, by falling amplitude; returns how many are added."""
     here = np.isfinite(cell["amplitude"])
     position, velocity = orbit.state
-    new = (orbit.amplitude, min(orbit.highest, -orbit.lowest), orbit.periods, len(orbit.crossings), position, velocity)
-    known = here & (np.abs(cell["amplitude"] - orbit.amplitude) <= EQUAL * orbit.amplitude) & (cell["period"] == orbit.periods)
+    new = (orbit.amplitude, min(orbit.highest, -orbit.lowest), orbit.period, len(orbit.impact_times), position, velocity)
+    known = here & (np.abs(cell["amplitude"] - orbit.amplitude) <= EQUAL * orbit.amplitude) & (cell["period"] == orbit.period)
     if known.any() or here.sum() == MOTIONS:
         return 0
     place = int((cell["amplitude"][here] > orbit.amplitude).sum())

@@ -226,6 +226,6 @@ def curve_dataset(locus: Any, paths: Sequence[str]) -> xarray.Dataset:
         data[name] = ("point", locus.parameters[:, i])
     kept = data[["horizontal", "vertical", "amplitude", "residual", "special_kind"]]
     kept["special_place"] = (("special", "axis"), data["special_parameter"].values[:, order])
-    crossings = locus.orbits[0].signature.crossings
-    kept.attrs = {**data.attrs, "crossings": crossings, "path": list(paths)}
+    impact_count = locus.orbits[0].signature.impact_count
+    kept.attrs = {**data.attrs, "impact_count": impact_count, "path": list(paths)}
     return kept

@@ -31,7 +31,7 @@ MOTION = np.dtype(
     [
         ("cell", np.int64),
         ("period", np.int64),  # forcing periods
-        ("crossings", np.int64),  # impacts in them
+        ("impact_count", np.int64),  # impacts in them
         ("amplitude", float),  # max abs(theta)
         ("other", float),  # the extremum on the other side, counted positive there
         ("state", float, (2,)),  # theta and theta' at phase 0
@@ -45,7 +45,7 @@ class Task:
 
     system: System
     parameters: Mapping[str, np.ndarray]  # by dotted path, a number for each cell
-    longest: int
+    max_period: int
     least: float
     periods: int
     tol: float
@@ -92,7 +92,7 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
     task = Task(
         system=System.from_json(arguments["system"]),
         parameters={path: values.ravel() for path, values in zip(arguments["paths"].values(), grid, strict=True)},
-        **{name: arguments[name] for name in ("longest", "least", "periods", "tol", "threads")},
+        **{name: arguments[name] for name in ("max_period", "least", "periods", "tol", "threads")},
     )
     states = starts(task.system, arguments["starts"], tuple(arguments["region"]), arguments["seed"])
     found = settle(task, np.repeat(np.arange(task.size), len(states)), np.tile(states, (task.size, 1)))
@@ -144,8 +144,8 @@ def _follow(task: Task, tracks: Tracks, periods: int, motions: list[np.ndarray])
     ends = _simulate(task, tracks, periods)
     name, stops = task.system.model.coordinates[0], ends.stop.attrs["flag_meanings"].split()
     captured = np.isin(ends["stop"].values, [stops.index("captured"), stops.index("rest")])
-    settled = (ends["cycle"].values > 0) & (ends["cycle"].values <= task.longest) & ~captured
-    kept = np.where(settled, ends["cycle"].values, task.longest)  # of the last forcing periods
+    settled = (ends["cycle"].values > 0) & (ends["cycle"].values <= task.max_period) & ~captured
+    kept = np.where(settled, ends["cycle"].values, task.max_period)  # of the last forcing periods
     window = np.arange(ends.sizes["period"])[::-1] < kept[:, None]
     extremes = [np.nanmax(np.where(window, side, np.nan), axis=1, initial=-np.inf) for side in (
         ends[f"largest_{name}"].values, -ends[f"smallest_{name}"].values)]  # fmt: skip
@@ -155,7 +155,7 @@ def _follow(task: Task, tracks: Tracks, periods: int, motions: list[np.ndarray])
     new = np.empty(int(large.sum()), MOTION)
     new["cell"], new["period"], new["state"] = tracks.cell[large], kept[large], state[large]
     new["amplitude"], new["other"] = tracks.amplitude[large], np.minimum(*extremes)[large]
-    new["crossings"] = np.nansum(np.where(window, ends["period_crossings"].values, 0.0), axis=1)[large]
+    new["impact_count"] = np.nansum(np.where(window, ends["period_impact_count"].values, 0.0), axis=1)[large]
     motions.append(new)
     return tracks, settled, captured
 
@@ -169,8 +169,8 @@ def _simulate(task: Task, tracks: Tracks, periods: int) -> Any:
         periods=periods,
         tol=task.tol,
         until=("rest", "settled"),
-        sample=("extrema", "crossings"),
-        last=task.longest,
+        sample=("extrema", "impact_count"),
+        last=task.max_period,
         threads=task.threads,
     )
 
@@ -257,7 +257,7 @@ def has(known: np.ndarray, cell: np.ndarray, motions: np.ndarray, tolerance: flo
 
 def _alike(some: np.ndarray, others: np.ndarray, tolerance: float) -> np.ndarray:
     """Whether motions are of the same period and impacts, and of about the same extrema."""
-    like = (some["period"] == others["period"]) & (some["crossings"] == others["crossings"])
+    like = (some["period"] == others["period"]) & (some["impact_count"] == others["impact_count"])
     for name in ("amplitude", "other"):
         like &= np.abs(some[name] - others[name]) <= tolerance * others["amplitude"]
     return np.asarray(like)
@@ -287,7 +287,7 @@ def table(found: Found, motions: np.ndarray, size: int) -> dict[str, np.ndarray]
     kept = rank < MOTIONS
     place = motions["cell"][kept], rank[kept]
     columns = {}
-    for name, empty in (("amplitude", np.nan), ("other", np.nan), ("period", 0), ("crossings", 0)):
+    for name, empty in (("amplitude", np.nan), ("other", np.nan), ("period", 0), ("impact_count", 0)):
         columns[name] = np.full((size, MOTIONS), empty)
         columns[name][place] = motions[name][kept]
     for i, name in enumerate(("theta", "velocity")):

@@ -64,7 +64,7 @@ def unseen(cells: Cells, curves: Sequence[xarray.Dataset]) -> np.ndarray:
     Where another border of theirs is less than a cell away they exist in too narrow a strip for a cell to show it.
     """
     every = [
-        (number, spot, height, int(curve.attrs["periods"]), curve.attrs["kind"])
+        (number, spot, height, int(curve.attrs["period"]), curve.attrs["kind"])
         for number, curve in enumerate(curves)
         for place, amplitude in crossings(cells, curve)
         for spot, height in zip(place, amplitude, strict=True)
@@ -153,7 +153,7 @@ def explained(cells: Cells, ends: Ends, curves: Sequence[xarray.Dataset]) -> np.
     known = np.zeros(len(ends), dtype=bool)
     for curve in curves:
         for place, amplitude in crossings(cells, curve):
-            known |= _ends_there(cells, ends, place, amplitude, int(curve.attrs["periods"]))
+            known |= _ends_there(cells, ends, place, amplitude, int(curve.attrs["period"]))
     return known
 
 

@@ -35,7 +35,7 @@ def stability_chart(
     horizontal: Any = None,
     vertical: Any = None,
     paths: tuple[str, str] = ("load.horizontal.amplitude", "load.vertical"),
-    longest: int = LONGEST,
+    max_period: int = LONGEST,
     starts: int = STARTS,
     region: tuple[float, float] = REGION,
     least: float = LEAST,
@@ -62,20 +62,20 @@ def stability_chart(
         system: what moves, under a load with a frequency.
         horizontal, vertical: the values along the two axes, by default 101 from 0 to 0.5 and from -2 to 0.
         paths: the dotted paths of the parameters along them.
-        longest: the longest period of a motion, in forcing periods; what repeats later counts as unsettled.
+        max_period: the longest period of a motion, in forcing periods; what repeats later counts as unsettled.
         starts, region, seed: initial states, as `search_orbits` takes them.
         least: the smallest amplitude that counts.
         periods: forcing periods after which a motion that has not settled counts as unsettled; by default what the damping takes.
         tol: the error of a step, see `simulate_many`.
         rows: how many rows are one chunk, within which neighbours know of one another.
-        store, workers, scheduler, progress: where the chunks are kept and who computes them, see `saltus.sweep.run`.
+        store, workers, scheduler, progress: where the chunks are kept and who computes them, see `saltus.sweep.execution`.
 
     Returns:
         A Dataset over (vertical, horizontal): `amplitude` of the largest motion (rad, NaN where there is none), its `period`,
         `smallest_amplitude`, the `count` of motions (mirror images count once), whether some start was captured at `rest`,
         and how many starts ended on `tiny` motions, or `unsettled`; with `motion` up to 8 motions by falling amplitude:
         `motion_amplitude`, `motion_other` (the extremum on the other side, counted positive there; that of a symmetric motion is
-        its amplitude), `motion_period`, `motion_crossings` (impacts in a period of the motion), and the state at phase 0,
+        its amplitude), `motion_period`, `motion_impact_count` (impacts in a period of the motion), and the state at phase 0,
         `motion_theta` and `motion_velocity`. For the metainterface also `beyond_line` and `beyond_kinematic`: whether the largest
         motion goes beyond pi - beta0, or 2 (pi - beta0) (erratum 20).
 
@@ -89,7 +89,7 @@ def stability_chart(
         np.linspace(0.0, 0.5, 101) if horizontal is None else horizontal,
         np.linspace(-2.0, 0.0, 101) if vertical is None else vertical,
         paths=paths,
-        longest=longest,
+        max_period=max_period,
         starts=starts,
         region=region,
         least=least,
@@ -148,7 +148,7 @@ def _variables() -> dict[str, Any]:
         "motion_amplitude": variable("f8", "rad", "amplitude of each motion", each),
         "motion_other": variable("f8", "rad", "extremum of each motion on the other side, as its amplitude if symmetric", each),
         "motion_period": variable("i2", "1", "forcing periods of each motion", each),
-        "motion_crossings": variable("i4", "1", "impacts in a period of each motion", each),
+        "motion_impact_count": variable("i4", "1", "impacts in a period of each motion", each),
         "motion_theta": variable("f8", "rad", "theta of each motion at phase 0", each),
         "motion_velocity": variable("f8", "1", "d theta / d tau of each motion at phase 0", each),
     }
@@ -170,11 +170,11 @@ def check_options(system: Any, paths: Any, axes: dict[str, np.ndarray], **option
             raise ParameterError(f"{path} is not a number of the system, so it cannot be an axis")
         for end in (values.min(), values.max()):
             system.with_({path: float(end)})
-    for name in ("longest", "starts", "periods", "rows"):
+    for name in ("max_period", "starts", "periods", "rows"):
         check_whole(name, options[name], 1)
     check_whole("seed", options["seed"], 0)
-    if options["longest"] > 16:
-        raise ParameterError(f"longest must be at most 16 forcing periods, got {options['longest']}")
+    if options["max_period"] > 16:
+        raise ParameterError(f"max_period must be at most 16 forcing periods, got {options['max_period']}")
     check_number("least", options["least"], above=0.0)
     check_number("tol", options["tol"], at_least=1e-15, at_most=1e-6)
     check_region(options["region"])

@@ -50,7 +50,7 @@ class Atlas:
         """Follow an orbit unless it lies on a known branch; returns orbits of the branches on which its own ends."""
         if self.knows(orbit):
             return []
-        branch = continue_orbit(orbit, self.path, self._range(orbit.periods), step=self.step)
+        branch = continue_orbit(orbit, self.path, self._range(orbit.period), step=self.step)
         self.branches.append(branch)
         specials = filter(self._begins, branch.special) if self.switch else ()
         return [beside for special in specials if _is_parent(special, branch) for beside in _beside(special)]
@@ -98,7 +98,7 @@ class Atlas:
                 family = branch.points[inner].orbit if len(branch.points) > 2 else branch.points[end].orbit
                 if (
                     special.kind in reason
-                    and family.periods == _periods_born(special)
+                    and family.period == _periods_born(special)
                     and _meet(branch.points[end].orbit, special)
                 ):
                     return True
@@ -113,7 +113,7 @@ class Atlas:
 
 def _periods_born(special: SpecialPoint) -> int:
     """Of the orbits that are born at a special point."""
-    return special.orbit.periods * (2 if special.kind == "PD" else 1)
+    return special.orbit.period * (2 if special.kind == "PD" else 1)
 
 
 def _meet(end: PeriodicOrbit, special: SpecialPoint) -> bool:
@@ -125,7 +125,7 @@ def _meet(end: PeriodicOrbit, special: SpecialPoint) -> bool:
 def _is_parent(special: SpecialPoint, branch: Branch) -> bool:
     """Whether a special point at a branch's end is one of the branch from which its orbits are born."""
     inner = branch.points[len(branch.points) // 2].orbit
-    return special.orbit.periods < inner.periods or (special.orbit.symmetric and not inner.symmetric)
+    return special.orbit.period < inner.period or (special.orbit.symmetric and not inner.symmetric)
 
 
 def _beside(special: SpecialPoint) -> list[PeriodicOrbit]:

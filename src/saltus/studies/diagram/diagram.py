@@ -112,7 +112,7 @@ def diagram(
         system.with_({path: 0.5 * (low + high)}),
         path,
         grid,
-        longest=max_period,
+        max_period=max_period,
         starts=starts,
         region=region,
         seed=seed,
@@ -121,7 +121,7 @@ def diagram(
     )
     atlas = Atlas(path, (low, high), max_period, step, switch)
     atlas.fill(
-        sorted(found.orbits, key=lambda o: (o.periods, not o.stable)),
+        sorted(found.orbits, key=lambda o: (o.period, not o.stable)),
         lambda share: say(SEARCHED + (FOLLOWED - SEARCHED) * share, f"following, {len(atlas.branches)} branches"),
     )
     say(FOLLOWED, "looking for chaos")

@@ -38,7 +38,7 @@ def diagram_tree(
         **facts,
     }
     nodes = {"/": xarray.Dataset(attrs=attributes)}
-    by_length = sorted(branches, key=lambda b: (b.points[0].orbit.periods, -len(b.points)))
+    by_length = sorted(branches, key=lambda b: (b.points[0].orbit.period, -len(b.points)))
     nodes |= {f"branch_{i:03d}": confirmed(branch) for i, branch in enumerate(by_length)}
     bands = {"bands": band_dataset()} if chaos is None else chaos.marked(turning_points(branches)).to_datasets()
     return xarray.DataTree.from_dict({**nodes, "attractors": _attractors(found), **bands, "search": _search(found)})
@@ -80,7 +80,7 @@ def _distances(orbits: list[PeriodicOrbit], rounds: int) -> np.ndarray:
 
 def _moved(orbit: RestingOrbit, rounds: int) -> float:
     """The largest distance at 64 instants of a period: at its release alone every orbit that rests is the same."""
-    motion = orbit.motion((rounds + 1) * orbit.periods)
+    motion = orbit.motion((rounds + 1) * orbit.period)
     times = motion.start + orbit.duration * (np.arange(INSTANTS) + 0.5) / INSTANTS
     now, later = motion.at(times), motion.at(times + rounds * orbit.duration)
     return float(np.abs(np.asarray(now) - np.asarray(later)).max())
@@ -96,7 +96,7 @@ def _attractors(found: Search) -> xarray.Dataset:
         "amplitude": ("dot", dots.amplitude),
         "highest": ("dot", dots.highest),
         "lowest": ("dot", dots.lowest),
-        "periods": ("dot", dots.periods, {"long_name": "forcing periods after which it repeats"}),
+        "period": ("dot", dots.period, {"long_name": "forcing periods after which it repeats"}),
     }
     return xarray.Dataset(columns)
 

@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass
 
 from saltus.systems import System
-from saltus.theory.equilibria import ROUNDING, Equilibrium, Stability, slope_sign, undeformed_stability
 from saltus.theory.layer import Layer, layers
+from saltus.theory.loaded_equilibria import ROUNDING, Equilibrium, Stability, slope_sign, undeformed_stability
 
 
 @dataclass(frozen=True, slots=True)
