@@ -14,7 +14,7 @@ from saltus import flow
 SOURCE = Path(saltus.__file__).parent
 
 # A room may import the front doors of the rooms in its list, and what every room shares; `plots` knows datasets only.
-SHARED = {"errors", "checks", "files", "_front_door"}
+SHARED = {"errors", "checks", "files", "progress", "provenance", "_front_door"}
 MAY_IMPORT = {
     "systems": set(),
     "theory": {"systems"},
@@ -22,7 +22,7 @@ MAY_IMPORT = {
     "bounds": {"systems", "taylor"},
     "flow": {"systems", "taylor", "bounds"},
     "orbits": {"systems", "taylor", "flow"},
-    "attractors": {"systems", "taylor", "flow", "orbits"},
+    "attractors": {"systems", "taylor", "bounds", "flow", "orbits"},
     "sweep": set(),
     "studies": {"systems", "theory", "flow", "orbits", "attractors", "sweep"},
     "plots": set(),

@@ -23,8 +23,7 @@ from saltus import (
     simulate,
 )
 from saltus.errors import MotionError
-from saltus.flow import EventKind
-from saltus.orbits.load_release import contact_pull, load_releases
+from saltus.flow import EventKind, contact_pull, load_releases
 from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.resting_branch import RestingBranch
 

@@ -123,7 +123,7 @@ def test_a_zoom_shows_its_window_of_the_same_data(axes):
 
 def test_the_legend_names_only_the_kinds_and_bands_that_are_there():
     figure = style.new_figure()
-    response.legend(figure, [diagram(folded(), loop())])
+    response.response_legend(figure, [diagram(folded(), loop())])
     names = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "fold (LP)" in names
     assert "chaotic" in names

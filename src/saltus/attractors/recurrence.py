@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.flow import simulate_many
-from saltus.orbits import load_releases
+from saltus.flow import load_releases, simulate_many
 from saltus.systems import Load, System
 
 if TYPE_CHECKING:

@@ -19,6 +19,7 @@ from .kernel_layout import (
     RESTING,
     STATE,
 )
+from .load_release import Release, contact_pull, load_releases, peak_near
 from .motion import DenseOutput, Event, EventKind, Impacts, Motion, Stop
 from .sensitivity import Sensitivities, sensitivities
 from .simulation import limits_of, program, simulate, taylor_order
@@ -52,6 +53,7 @@ __all__ = [
     "Jobs",
     "Lanes",
     "Motion",
+    "Release",
     "Sensitivities",
     "Stop",
     "Validity",
@@ -60,13 +62,16 @@ __all__ = [
     "broadcast",
     "check_parameters",
     "compiled_lanes",
+    "contact_pull",
     "limits_of",
     "load_advance",
     "load_driver",
     "load_helpers",
+    "load_releases",
     "load_segments",
     "numeric",
     "parameter_table",
+    "peak_near",
     "program",
     "read_inputs",
     "sensitivities",

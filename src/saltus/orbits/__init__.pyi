@@ -2,7 +2,6 @@ from .branch import STEP, Branch, check_bounds, continue_orbit, follow_stable
 from .codimension import CodimensionTwo
 from .find import check_whole, find_orbit, orbit_from
 from .from_dataset import orbits_of
-from .load_release import Release, load_releases
 from .newton import solve
 from .orbit import PeriodicOrbit
 from .problem import Problem
@@ -27,7 +26,6 @@ __all__ = [
     "Locus",
     "PeriodicOrbit",
     "Problem",
-    "Release",
     "RestingOrbit",
     "Search",
     "Signature",
@@ -43,7 +41,6 @@ __all__ = [
     "follow_stable",
     "initial_states",
     "is_symmetric",
-    "load_releases",
     "orbit_from",
     "orbits_of",
     "same_orbit",

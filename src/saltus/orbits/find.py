@@ -9,8 +9,7 @@ import numpy as np
 
 from saltus.checks import check_number
 from saltus.errors import MotionError, ParameterError
-from saltus.flow import EventKind, Motion, simulate
-from saltus.orbits.load_release import load_releases
+from saltus.flow import EventKind, Motion, load_releases, simulate
 from saltus.orbits.newton import solve
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.orbits.load_release import load_releases
+from saltus.flow import load_releases
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem

@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import EventKind, Motion, simulate
+from saltus.flow import EventKind, Motion, Release, load_releases, peak_near, simulate
 from saltus.flow import segments as at
-from saltus.orbits.load_release import Release, load_releases, peak_near
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import TOUCH, PeriodicOrbit
 from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem

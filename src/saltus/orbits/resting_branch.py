@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from saltus.errors import SaltusError
+from saltus.flow import Release, load_releases, peak_near
 from saltus.orbits.branch import Branch
-from saltus.orbits.load_release import Release, load_releases, peak_near
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.path import Curve, Point
 from saltus.orbits.problem import Problem

@@ -41,7 +41,7 @@ def basin_sweep(
         system: what moves.
         rows: velocities of the grid in one chunk.
         store, workers, scheduler: where the cells are kept and who computes them, see `saltus.sweep.execution`.
-        progress: called with the chunks done, of how many, and the seconds left (None: not known), as by `saltus.sweep.execution`;
+        progress: called with the chunks done, of how many, and the seconds left (None: not known);
             first when all arguments have been checked.
         options: those of `basins`.
 

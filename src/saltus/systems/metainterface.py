@@ -43,6 +43,7 @@ class Metainterface(Model):
     dissipation_ratio: float = 1.0  # c = C1 / C2, at least 0
     smoothing: float | None = None  # B of `smoothing`: sgn(theta) becomes tanh(B theta / 2); None is exact
 
+    units: ClassVar[tuple[str, ...]] = ("rad",)
     channels: ClassVar[tuple[str, ...]] = (
         "horizontal",
         "vertical",

@@ -10,7 +10,8 @@ from saltus.errors import ParameterError
 class Model:
     """A piecewise-smooth oscillator. Subclass it as a frozen, keyword-only dataclass of numbers and give it:
 
-    1. `coordinates`, the names of its degrees of freedom, and `channels`, the load channels that it reads;
+    1. `coordinates`, the names of its degrees of freedom, their `units` ("1" where it gives none), and `channels`, the load
+       channels that it reads;
     2. `sides`, the numbers of its smooth modes: (+1, -1) for a motion that crosses the contact, (+1,) for a wall that
        turns it back, () for a motion without contact;
     3. `acceleration`, an expression of numbers, NumPy functions, load channels and `abs` of the coordinate. It is traced
@@ -29,8 +30,13 @@ class Model:
     __slots__ = ()
 
     coordinates: ClassVar[tuple[str, ...]] = ("theta",)
+    units: ClassVar[tuple[str, ...]] = ()
     channels: ClassVar[tuple[str, ...]] = ()
     stops: ClassVar[tuple[str, ...]] = ()
+
+    def unit_of(self, coordinate: str) -> str:
+        """The unit of one of the coordinates, such as "rad"."""
+        return self.units[self.coordinates.index(coordinate)] if self.units else "1"
 
     @property
     def sides(self) -> tuple[int, ...]:

@@ -28,6 +28,7 @@ class RockingBlock(Model):
 
     alpha: float  # slenderness angle, rad, in (0, pi/2)
 
+    units: ClassVar[tuple[str, ...]] = ("rad",)
     channels: ClassVar[tuple[str, ...]] = ("ground_horizontal", "ground_vertical")
     stops: ClassVar[tuple[str, ...]] = ("overturned",)
 

@@ -38,6 +38,7 @@ class TwoLayer(Model):
     dissipation_ratio: float = 1.0  # c = C1 / C2, at least 0
 
     coordinates: ClassVar[tuple[str, ...]] = ("theta_1", "theta_2")
+    units: ClassVar[tuple[str, ...]] = ("rad", "rad")
     channels: ClassVar[tuple[str, ...]] = Metainterface.channels
     stops: ClassVar[tuple[str, ...]] = ("lower_contact", "upper_contact")
 
