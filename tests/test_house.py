@@ -1,67 +1,169 @@
-"""The house: what may import what, how light the door is, and that every public name is there."""
+"""The house: what may import what, through which door, how long a function may be, and how light the front door is."""
+
+from __future__ import annotations
 
 import ast
 import os
+import statistics
 import subprocess
 import sys
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 import saltus
-from saltus import flow
 
 SOURCE = Path(saltus.__file__).parent
+FILES = sorted(SOURCE.rglob("*.py"))
+ROOMS = sorted(path.parent.name for path in SOURCE.glob("*/__init__.py"))
 
-# A room may import the front doors of the rooms in its list, and what every room shares; `plots` knows datasets only.
-SHARED = {"errors", "checks", "files", "progress", "provenance", "_front_door"}
+SHARED = {"errors", "checks", "files", "progress", "provenance", "_front_door"}  # what every room may import
+# The rooms whose front doors a room may use besides its own; `plots` knows datasets only, `continuation` functions and arrays.
 MAY_IMPORT = {
     "systems": set(),
     "theory": {"systems"},
     "taylor": {"systems"},
     "bounds": {"systems", "taylor"},
     "flow": {"systems", "taylor", "bounds"},
-    "orbits": {"systems", "taylor", "flow"},
-    "attractors": {"systems", "taylor", "bounds", "flow", "orbits"},
+    "continuation": set(),
+    "orbits": {"systems", "taylor", "flow", "continuation"},
+    "attractors": {"systems", "taylor", "bounds", "flow", "continuation", "orbits"},
     "sweep": set(),
-    "studies": {"systems", "theory", "flow", "orbits", "attractors", "sweep"},
+    "studies": {"systems", "theory", "flow", "continuation", "orbits", "attractors", "sweep"},
     "plots": set(),
-    "config": {"systems", "flow"},
-    "paper": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots"},
+    "config": {"systems", "flow", "attractors", "studies"},
+    "paper": {"systems", "theory", "flow", "continuation", "orbits", "attractors", "sweep", "studies", "plots"},
     "cli": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots", "config", "paper"},
 }
 HEAVY = (
     *("scipy", "numba", "xarray", "matplotlib", "pydantic", "h5netcdf", "zarr", "distributed"),
     *("saltus.flow", "saltus.sweep", "saltus.paper"),
 )
+LONGEST_FUNCTION, MEDIAN_FUNCTION, LONGEST_FILE = 60, 8, 400  # lines, docstrings included
 
 
-def imported_rooms(path: Path) -> set[str]:
-    """The rooms of saltus that a file imports, at its top or inside its functions, but not for type checking alone."""
+# --- imports ---------------------------------------------------------------------------------------------------------------
+
+
+def module_of(path: Path) -> str:
+    parts = path.relative_to(SOURCE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+@cache
+def behind_the_door(package: str) -> dict[str, str]:
+    """The module of each name that a front door gives, by its stub."""
+    stub = SOURCE.parent.joinpath(*package.split("."), "__init__.pyi")
+    if not stub.exists():
+        return {}
+    imports = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom)]
+    return {a.name: f"{package}.{node.module}" if node.module else package for node in imports for a in node.names}
+
+
+def statements(path: Path) -> Iterator[ast.stmt]:
+    """The import statements of a file, at its top or inside its functions, but not for type checking alone."""
     tree = ast.parse(path.read_text())
     for node in ast.walk(tree):
         if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
             node.body = []
-    names = [n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)]
-    names += [a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names]
-    return {name.split(".")[1] for name in names if name.startswith("saltus.")} - SHARED
+    return (node for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom)))
 
 
-@pytest.mark.parametrize("room", MAY_IMPORT)
+def imported(path: Path) -> Iterator[tuple[int, str, str]]:
+    """(line, the module as it is written, the module that is reached) of all that a file imports of saltus."""
+    for node in statements(path):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, a.name, a.name) for a in node.names if a.name.startswith("saltus"))
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "saltus":
+            for a in node.names:
+                home = behind_the_door(node.module).get(a.name)
+                submodule = f"{node.module}.{a.name}"
+                is_module = home is None and any(module_of(other) == submodule for other in FILES)
+                yield node.lineno, node.module, submodule if is_module else home or node.module
+
+
+def room_of(module: str) -> str:
+    return [*module.split("."), ""][1]
+
+
+@pytest.mark.parametrize("room", ROOMS)
 def test_imports_run_one_way(room: str) -> None:
     for path in (SOURCE / room).rglob("*.py"):
-        foreign = imported_rooms(path) - MAY_IMPORT[room] - {room}
+        foreign = {room_of(reached) for _, _, reached in imported(path)} - SHARED - MAY_IMPORT[room] - {room, ""}
         assert not foreign, f"{path.relative_to(SOURCE)} imports {foreign}"
 
 
-@pytest.mark.parametrize("name", saltus.__all__)
-def test_every_public_name_is_there(name: str) -> None:
-    assert getattr(saltus, name) is not None
+def test_rooms_import_each_other_through_their_front_doors() -> None:
+    past = []
+    for path in FILES:
+        room = room_of(module_of(path))
+        for line, written, reached in imported(path):
+            other = room_of(reached)
+            inner = other in ROOMS and other != room and (written != f"saltus.{other}" or reached.endswith(f".{other}"))
+            if inner and room in ROOMS:
+                past.append(f"{path.relative_to(SOURCE)}:{line} {reached}")
+    assert not past
 
 
-@pytest.mark.parametrize("name", flow.__all__)
-def test_every_name_of_the_flow_is_there(name: str) -> None:
-    assert getattr(flow, name) is not None
+def test_no_files_import_each_other_in_a_circle() -> None:
+    graph = {module_of(path): {reached for _, _, reached in imported(path)} for path in FILES if path.name != "__init__.py"}
+    graph = {module: {other for other in others if other in graph} - {module} for module, others in graph.items()}
+    while free := [module for module, others in graph.items() if not others]:
+        graph = {module: others - set(free) for module, others in graph.items() if module not in free}
+    while ends := set(graph) - {other for others in graph.values() for other in others}:
+        graph = {module: others for module, others in graph.items() if module not in ends}
+    assert not graph, f"circles among {sorted(graph)}"
+
+
+@pytest.mark.parametrize("package", ["saltus", *(f"saltus.{room}" for room in ROOMS if behind_the_door(f"saltus.{room}"))])
+def test_every_name_of_a_front_door_is_there_and_no_file_hides_it(package: str) -> None:
+    door = __import__(package, fromlist=["_"])
+    assert sorted(door.__all__) == sorted(set(door.__all__))
+    for name in door.__all__:
+        assert getattr(door, name) is not None
+    if package != "saltus":
+        folder = SOURCE.parent.joinpath(*package.split("."))
+        assert not [name for name in door.__all__ if (folder / f"{name}.py").exists() or (folder / name).is_dir()]
+
+
+def test_a_wrong_public_name_is_answered_with_the_near_ones() -> None:
+    with pytest.raises(AttributeError, match="no 'Motoin'; did you mean 'Motion'"):
+        _ = saltus.flow.Motoin
+    with pytest.raises(AttributeError, match="no 'simulat'; did you mean 'simulate'"):
+        _ = saltus.simulat
+
+
+# --- size ------------------------------------------------------------------------------------------------------------------
+
+
+def functions() -> Iterator[tuple[str, int]]:
+    for path in FILES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                where = f"{path.relative_to(SOURCE)}:{node.lineno} {node.name}"
+                yield where, (node.end_lineno or node.lineno) - node.lineno + 1
+
+
+def test_functions_are_short() -> None:
+    lengths = dict(functions())
+    assert len(lengths) > 1000
+    assert not {where: lines for where, lines in lengths.items() if lines > LONGEST_FUNCTION}
+    assert statistics.median(lengths.values()) <= MEDIAN_FUNCTION
+
+
+def test_files_hold_one_thing() -> None:
+    lengths = {str(path.relative_to(SOURCE)): path.read_text().count("\n") for path in FILES}
+    assert not {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE}
+
+
+@pytest.mark.parametrize("path", [p for p in FILES if p.name == "__init__.py"], ids=lambda p: str(p.relative_to(SOURCE)))
+def test_every_room_says_what_is_in_it(path: Path) -> None:
+    assert len(ast.get_docstring(ast.parse(path.read_text())) or "") > 40
+
+
+# --- weight ----------------------------------------------------------------------------------------------------------------
 
 
 def test_one_motion_needs_no_lanes_and_an_ensemble_no_dask() -> None:
@@ -73,15 +175,8 @@ def test_one_motion_needs_no_lanes_and_an_ensemble_no_dask() -> None:
     assert result.stdout.split("\n")[:2] == ["[]", "['saltus.flow.ensemble', 'xarray']"]
 
 
-def test_a_wrong_public_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="no 'Motoin'"):
-        _ = flow.Motoin
-    with pytest.raises(AttributeError, match="no 'simulat'"):
-        _ = saltus.simulat
-
-
 @pytest.mark.parametrize("statement", ["import saltus", "import saltus.cli", "from saltus import Metainterface, System"])
-def test_the_door_is_light(statement: str) -> None:
+def test_the_front_door_is_light(statement: str) -> None:
     loaded = f"{statement}; import sys; print([m for m in {HEAVY!r} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
