@@ -60,6 +60,47 @@ def _short(value: float) -> str:
     return f"{value:g}"
 
 
+def check_count(name: str, value: Any, at_least: int, at_most: int | None = None) -> None:
+    """Refuse what is not a whole number within the stated bounds.
+
+    Raises:
+        ParameterError: with the name, the range and the value.
+    """
+    check_number(name, value, at_least=at_least, at_most=at_most)
+    if value != int(value):
+        raise ParameterError(f"{name} must be a whole number, got {value!r}")
+
+
+def check_bounds(bounds: Any) -> tuple[float, float]:
+    """Two finite numbers, the smaller first.
+
+    Raises:
+        ParameterError: bounds that are no such pair.
+    """
+    try:
+        low, high = (float(x) for x in bounds)
+    except (TypeError, ValueError):
+        raise ParameterError(f"bounds must be two numbers (lowest, highest), got {bounds!r}") from None
+    if not -math.inf < low < high < math.inf:
+        raise ParameterError(f"bounds must be two numbers, the smaller one first, got {bounds!r}")
+    return low, high
+
+
+def check_states(name: str, states: Any) -> np.ndarray:
+    """States (coordinate, velocity) as an array (n, 2).
+
+    Raises:
+        ParameterError: with the name, for what is no such array, or not finite.
+    """
+    try:
+        array = np.asarray(states, dtype=float).reshape(-1, 2)
+    except (TypeError, ValueError):
+        array = np.full((1, 2), np.nan)
+    if not np.isfinite(array).all():
+        raise ParameterError(f"{name} must be states (coordinate, velocity), an array (n, 2), got {states!r}")
+    return array
+
+
 def settle_number(owner: Any, name: str, **bounds: Any) -> None:
     """Check the field `name` of a frozen dataclass and store it as a plain float; messages name the field."""
     value = getattr(owner, name)

@@ -11,9 +11,9 @@ import numpy as np
 from saltus.attractors.attractor import REST, UNDECIDED, Attractors
 from saltus.attractors.recurrence import Ends, clocked, settle
 from saltus.attractors.registry import FAILED, OPEN, Collection
-from saltus.checks import check_number
+from saltus.checks import check_count, check_number, check_states
 from saltus.errors import ParameterError
-from saltus.orbits import REGION, Branch, PeriodicOrbit, check_region, check_whole, initial_states
+from saltus.orbits import REGION, Branch, PeriodicOrbit, check_region, initial_states
 from saltus.systems import System
 
 FIRST, SECOND = 400, 4000  # forcing periods in which motions may settle; those that have not then get the second
@@ -55,14 +55,13 @@ def find_attractors(
     Raises:
         ParameterError: several coordinates, a load that never repeats, known orbits of another system, numbers without meaning.
     """
-    clock, further = clocked(system), check_states(also)
-    check_whole("starts", starts, 1)
-    check_whole("max_period", max_period, 1)
-    check_number("max_period", max_period, at_most=16)
+    clock, further = clocked(system), check_states("also", also)
+    check_count("starts", starts, 1)
+    check_count("max_period", max_period, 1, 16)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     widths = check_region(region)
     given = _known(system, known)
-    check_whole("seed", seed, 0)
+    check_count("seed", seed, 0)
     say = progress or (lambda _: None)
     say(0.0)
     states = initial_states(clock, starts, widths, seed)
@@ -123,17 +122,6 @@ def order(collection: Collection) -> dict[int, int]:
     moving = [place for place, target in enumerate(collection.targets) if target.kind != "rest"]
     labels = {place: i + 1 for i, place in enumerate(sorted(moving, key=rank))}
     return labels | {place: REST for place, target in enumerate(collection.targets) if target.kind == "rest"}
-
-
-def check_states(states: Any) -> np.ndarray:
-    """States (n, 2), finite."""
-    try:
-        array = np.asarray(states, dtype=float).reshape(-1, 2)
-    except (TypeError, ValueError):
-        array = np.full((1, 2), np.nan)
-    if not np.isfinite(array).all():
-        raise ParameterError(f"also must be states (coordinate, velocity), an array (n, 2), got {states!r}")
-    return array
 
 
 def _known(system: System, known: Any) -> list[PeriodicOrbit]:

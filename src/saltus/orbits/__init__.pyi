@@ -1,6 +1,6 @@
-from .branch import STEP, Branch, check_bounds, continue_orbit, follow_stable
+from .branch import STEP, Branch, continue_orbit, follow_stable
 from .codimension import CodimensionTwo
-from .find import check_whole, find_orbit, orbit_from
+from .find import find_orbit, orbit_from
 from .from_dataset import orbits_of
 from .newton import solve
 from .orbit import PeriodicOrbit
@@ -30,9 +30,7 @@ __all__ = [
     "Search",
     "Signature",
     "SpecialPoint",
-    "check_bounds",
     "check_region",
-    "check_whole",
     "continue_orbit",
     "continue_special",
     "defects",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import check_bounds
 from saltus.errors import ParameterError
 from saltus.orbits.newton import solve
 from saltus.orbits.orbit import PeriodicOrbit
@@ -190,17 +190,6 @@ def _checked(orbit: PeriodicOrbit, path: str, bounds: Any) -> tuple[float, float
         raise ParameterError(f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range")
     for bound in (low, high):
         orbit.system.with_({path: bound})  # refuses bounds beyond what the system allows
-    return low, high
-
-
-def check_bounds(bounds: Any) -> tuple[float, float]:
-    """Two finite numbers, the smaller first."""
-    try:
-        low, high = (float(x) for x in bounds)
-    except (TypeError, ValueError):
-        raise ParameterError(f"bounds must be two numbers (lowest, highest), got {bounds!r}") from None
-    if not -math.inf < low < high < math.inf:
-        raise ParameterError(f"bounds must be two numbers, the smaller one first, got {bounds!r}")
     return low, high
 
 

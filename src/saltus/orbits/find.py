@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import check_count
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import EventKind, Motion, load_releases, simulate
 from saltus.orbits.newton import solve
@@ -53,10 +53,10 @@ def find_orbit(
     if not isinstance(system, System):
         raise ParameterError(f"find_orbit takes a System(model=..., load=..., impact=...), got {system!r}")
     if period is not None:
-        check_whole("period", period, 1)
-    check_whole("max_period", max_period, 1)
+        check_count("period", period, 1)
+    check_count("max_period", max_period, 1)
     if settle is not None:
-        check_whole("settle", settle, 0)
+        check_count("settle", settle, 0)
     base = Problem(system, Signature((), 1), parameters)  # refuses what has no orbits
     state = {**coordinates, "velocity": velocity}
     if settle is not None:
@@ -74,13 +74,6 @@ def find_orbit(
         "chaotic, slow to settle or longer; try another start, max_period=..., or settle=0 with period=... for an unstable orbit "
         "near the start"
     )
-
-
-def check_whole(name: str, value: Any, least: int) -> None:
-    """Refuse what is not a whole number from `least` on."""
-    check_number(name, value, at_least=least)
-    if value != int(value):
-        raise ParameterError(f"{name} must be a whole number, got {value!r}")
 
 
 def _after(system: System, state: dict[str, Any], periods: int) -> dict[str, Any]:

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_count
 from saltus.errors import ParameterError
 from saltus.flow import simulate_many
-from saltus.orbits.find import check_whole, orbit_from
+from saltus.orbits.find import orbit_from
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
@@ -87,7 +88,7 @@ def search_orbits(
         ParameterError: an unknown parameter, no values, an effort without meaning.
     """
     for name, number in (("max_period", max_period), ("starts", starts)):
-        check_whole(name, number, 1)
+        check_count(name, number, 1)
     region = check_region(region)
     system.get(path)
     grid = np.atleast_1d(np.asarray(list(values), dtype=float))

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_bounds
 from saltus.errors import ParameterError
-from saltus.orbits.branch import check_bounds
 from saltus.orbits.codimension import CodimensionTwo, located, room, tests_of
 from saltus.orbits.conditions import Condition, Singular, Slow, matrix
 from saltus.orbits.find import divide

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.checks import check_bounds
 from saltus.errors import ParameterError
-from saltus.orbits.branch import STEP, Branch, check_bounds, follow_from
+from saltus.orbits.branch import STEP, Branch, follow_from
 from saltus.orbits.newton import Solution, solve
 from saltus.orbits.path import Curve, Point
 from saltus.orbits.problem import Problem

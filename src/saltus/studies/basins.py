@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import basins_of_attraction
+from saltus.checks import check_count
 from saltus.errors import ParameterError
-from saltus.orbits import check_whole
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def basin_sweep(
     """
     from saltus.sweep import run
 
-    check_whole("rows", rows, 1)
+    check_count("rows", rows, 1)
     if store is not None and Path(store).exists():
         _check_store(Path(store), system)
     say = progress or (lambda *_: None)

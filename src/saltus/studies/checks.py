@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from saltus.checks import check_bounds, check_count
 from saltus.errors import ParameterError
-from saltus.orbits import check_bounds, check_whole
 from saltus.systems import System
 
 
@@ -23,5 +23,5 @@ def check_diagram(system: System, path: str, bounds: tuple[float, float], **effo
     for bound in (low, high):
         system.with_({path: bound})  # refuses bounds beyond what the system allows
     for name, effort in efforts.items():
-        check_whole(name, effort, 1 if name in ("max_period", "starts") else 0)
+        check_count(name, effort, 1 if name in ("max_period", "starts") else 0)
     return low, high

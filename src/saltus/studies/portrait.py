@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import Equilibrium, Separatrix, equilibria, separatrices
-from saltus.checks import check_number
+from saltus.checks import check_count, check_number
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.orbits import EVEN, check_whole
+from saltus.orbits import EVEN
 from saltus.systems import System, VelocityReduction
 
 if TYPE_CHECKING:
@@ -59,8 +59,8 @@ def phase_portrait(
         MotionError: a motion that cannot be continued.
     """
     check_number("duration", duration, above=0.0)
-    check_whole("samples", samples, 2)
-    check_whole("seed", seed, 0)
+    check_count("samples", samples, 2)
+    check_count("seed", seed, 0)
     points = equilibria(system, window)  # which refuses what has no phase plane
     states = _spread(system, window, points, seed) if starts is None else _states(system, starts)
     say = progress or (lambda _: None)

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors.attractor import UNDECIDED
+from saltus.checks import check_count
 from saltus.errors import ParameterError
-from saltus.orbits import check_whole
 
 RADIUS = 5  # cells within which a cell of the boundary must meet all labels
 MOST_CELLS = 0.5  # a share of uncertain cells above this grows less than the boundary does: it meets itself
@@ -47,7 +47,7 @@ def basin_entropy(labels: Any, box: int = 5) -> BasinEntropy:
         ParameterError: a grid smaller than a box.
     """
     grid = _labels(labels)
-    check_whole("box", box, 2)
+    check_count("box", box, 2)
     if min(grid.shape) < box:
         raise ParameterError(f"a grid of {grid.shape} cells has no box of {box}; take a finer grid or a smaller box")
     cut = grid[tuple(slice(0, n - n % box) for n in grid.shape)]
@@ -182,7 +182,7 @@ def wada(labels: Any, radius: int = RADIUS) -> Wada:
     from scipy.ndimage import distance_transform_cdt, maximum_filter, minimum_filter
 
     grid = _labels(labels)
-    check_whole("radius", radius, 1)
+    check_count("radius", radius, 1)
     known = [int(label) for label in np.unique(grid) if label != UNDECIDED]
     radii = np.arange(1, int(radius) + 1)
     if len(known) < 2:

@@ -14,9 +14,9 @@ from saltus.attractors.attractors_dataset import attractor_table, coordinate, la
 from saltus.attractors.basins.labelling import label_states
 from saltus.attractors.find import find_attractors
 from saltus.attractors.recurrence import clocked
-from saltus.checks import check_number
+from saltus.checks import check_count, check_number
 from saltus.errors import ParameterError
-from saltus.orbits import REGION, check_whole
+from saltus.orbits import REGION
 from saltus.systems import System, reversed_system
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def basins_of_attraction(
     """
     clock = clocked(system)
     grid = _grid(clock, velocity, coordinates, found)
-    check_whole("periods", periods, 32)
+    check_count("periods", periods, 32)
     check_number("within", within, above=0.0)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     if found is not None and found.system != system:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors.lyapunov.averages import BATCHES
-from saltus.checks import check_number
+from saltus.checks import check_count
 from saltus.errors import ParameterError
 from saltus.systems import Record, System
 
@@ -53,6 +53,4 @@ def check_run(periods: Any, transient: Any) -> None:
         ParameterError: with the least number.
     """
     for name, value, least in (("periods", periods, 2 * BATCHES), ("transient", transient, 0)):
-        check_number(name, value, at_least=least)
-        if value != int(value):
-            raise ParameterError(f"{name} must be a whole number, got {value!r}")
+        check_count(name, value, least)

@@ -20,10 +20,10 @@ import numpy as np
 from saltus.attractors.manifolds.manifold_growth import Level, Window, grow
 from saltus.attractors.recurrence import ensemble
 from saltus.attractors.registry import strobes_from
-from saltus.checks import check_number
+from saltus.checks import check_count, check_number
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import sensitivities
-from saltus.orbits import PeriodicOrbit, check_whole
+from saltus.orbits import PeriodicOrbit
 from saltus.systems import System, reversed_system
 
 OFFSET = 1e-6  # d: the segment lies off the manifold by its square, which shrinks from there on
@@ -110,8 +110,8 @@ def unstable_manifold(
 def _manifold(orbit: PeriodicOrbit, stable: bool, window: Any, periods: int, step: float, points: int) -> Manifold:
     if not isinstance(orbit, PeriodicOrbit):
         raise ParameterError(f"a manifold belongs to a periodic orbit, got {orbit!r}; find_orbit and search_orbits return them")
-    check_whole("periods", periods, 1)
-    check_whole("points", points, 100)
+    check_count("periods", periods, 1)
+    check_count("points", points, 100)
     check_number("step", step, above=0.0, at_most=1.0)
     size = np.sort(np.abs(orbit.multipliers))
     if len(size) != 2 or not (0.0 < size[0] < 1.0 - HYPERBOLIC and size[1] > 1.0 + HYPERBOLIC):

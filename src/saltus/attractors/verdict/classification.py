@@ -11,7 +11,7 @@ from saltus.attractors.lyapunov.averages import BATCHES
 from saltus.attractors.recurrence import clocked, settle
 from saltus.attractors.verdict.nonsettling import STAGES, STROBES, wandering
 from saltus.attractors.verdict.verdict import DRIVEN_MAX_PERIOD, Case, Verdict, settled
-from saltus.checks import check_number
+from saltus.checks import check_count, check_number
 from saltus.errors import ParameterError
 from saltus.systems import System
 
@@ -61,9 +61,7 @@ def classify(
         ("transient", transient, 0),
         ("max_period", max_period, DRIVEN_MAX_PERIOD),
     ):
-        check_number(name, value, at_least=least)
-        if value != int(value):
-            raise ParameterError(f"{name} must be a whole number, got {value!r}")
+        check_count(name, value, least)
     case = Case(system, clock, int(periods), int(max_period), int(seed), float(tol), progress or (lambda done: None))
     ends = settle(
         clock, start, int(transient + periods), kept=max(STROBES, 4 * int(max_period)), tol=tol, progress=case.part(0.0, 0.1)

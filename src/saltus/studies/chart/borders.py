@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import check_count
 from saltus.errors import MotionError, ParameterError
-from saltus.orbits import PeriodicOrbit, SpecialPoint, check_whole, continue_special
+from saltus.orbits import PeriodicOrbit, SpecialPoint, continue_special
 from saltus.studies.chart.augment import ADDED, with_motions
 from saltus.studies.chart.changes import Cells, Ends, ends_of, explained, keys_of, passes, read, unseen
 from saltus.studies.chart.follow import CONTINUED, KINDS, MISSED, SHRINKS, Ending, Follower
@@ -108,7 +109,7 @@ def _borders(
     system: System, chart: xarray.Dataset, most: int, progress: Callable[[float], object] | None
 ) -> tuple[Borders, list[tuple[int, int, PeriodicOrbit]]]:
     """The borders of a chart, and the orbits that it lacks: row, column, orbit."""
-    check_whole("most", most, 0)
+    check_count("most", most, 0)
     found, cells = Borders(), read(chart)
     waiting, follower = ends_of(cells), Follower(system, chart, cells)
     total, looks, easy = max(len(waiting), 1), LOOKS * most, EASY * most

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import check_count, check_number
 from saltus.errors import ParameterError
-from saltus.orbits import REGION, check_region, check_whole
+from saltus.orbits import REGION, check_region
 from saltus.studies.chart.cells import MOTIONS
 from saltus.systems import System
 
@@ -171,8 +171,8 @@ def check_options(system: Any, paths: Any, axes: dict[str, np.ndarray], **option
         for end in (values.min(), values.max()):
             system.with_({path: float(end)})
     for name in ("max_period", "starts", "periods", "rows"):
-        check_whole(name, options[name], 1)
-    check_whole("seed", options["seed"], 0)
+        check_count(name, options[name], 1)
+    check_count("seed", options["seed"], 0)
     if options["max_period"] > 16:
         raise ParameterError(f"max_period must be at most 16 forcing periods, got {options['max_period']}")
     check_number("least", options["least"], above=0.0)

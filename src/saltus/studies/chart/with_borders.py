@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.orbits import check_whole
+from saltus.checks import check_count
 from saltus.studies.chart.borders import disagreements, with_borders
 from saltus.studies.chart.chart import stability_chart
 from saltus.systems import Harmonic, Load, Metainterface, System
@@ -45,7 +45,7 @@ def bordered_chart(
     """
     import xarray as xr
 
-    check_whole("curves", curves, 0)
+    check_count("curves", curves, 0)
     chart, borders = with_borders(
         system, stability_chart(system, progress=progress, **options), most=int(curves), progress=exploring
     )

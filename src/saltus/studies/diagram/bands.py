@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import largest_exponents
+from saltus.checks import check_count
 from saltus.flow import simulate_many
-from saltus.orbits import REGION, check_region, check_whole, initial_states
+from saltus.orbits import REGION, check_region, initial_states
 from saltus.studies.checks import check_diagram
 from saltus.systems import System
 
@@ -125,7 +126,7 @@ def chaotic_bands(
         ParameterError: an argument without meaning.
     """
     bounds = check_diagram(system, path, bounds, starts=starts, seed=seed)
-    check_whole("count", count, 1)
+    check_count("count", count, 1)
     region = check_region(region)
     say = progress or (lambda share: None)
     search = _Search(system, path, starts, region, seed)
