@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import sys
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from saltus.errors import ParameterError
+
+RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
 
 
 def check_number(
@@ -32,7 +36,7 @@ def check_number(
     wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
     if not number:
         kind = wanted.replace("lie in", "be a number in").replace("be finite", "be a finite number")
-        raise ParameterError(f"{name} must {kind}, got {value!r}")
+        raise ParameterError(f"{name} must {kind}, got {value!r}", name)
     inside: bool = (
         math.isfinite(value)
         and (above is None or value > above)
@@ -42,7 +46,7 @@ def check_number(
     )
     if not inside:
         hint = " (degrees?)" if unit == "rad" and math.isfinite(value) and 3.2 < abs(value) <= 360 else ""
-        raise ParameterError(f"{name} must {wanted}, got {value!r}{hint}")
+        raise ParameterError(f"{name} must {wanted}, got {value!r}{hint}", name)
 
 
 def _range_text(above: float | None, below: float | None, at_least: float | None, at_most: float | None) -> str:
@@ -68,7 +72,7 @@ def check_count(name: str, value: Any, at_least: int, at_most: int | None = None
     """
     check_number(name, value, at_least=at_least, at_most=at_most)
     if value != int(value):
-        raise ParameterError(f"{name} must be a whole number, got {value!r}")
+        raise ParameterError(f"{name} must be a whole number, got {value!r}", name)
 
 
 def check_bounds(bounds: Any) -> tuple[float, float]:
@@ -80,10 +84,38 @@ def check_bounds(bounds: Any) -> tuple[float, float]:
     try:
         low, high = (float(x) for x in bounds)
     except (TypeError, ValueError):
-        raise ParameterError(f"bounds must be two numbers (lowest, highest), got {bounds!r}") from None
+        raise ParameterError(f"bounds must be two numbers (lowest, highest), got {bounds!r}", "bounds") from None
     if not -math.inf < low < high < math.inf:
-        raise ParameterError(f"bounds must be two numbers, the smaller one first, got {bounds!r}")
+        raise ParameterError(f"bounds must be two numbers, the smaller one first, got {bounds!r}", "bounds")
     return low, high
+
+
+def check_path(system: Any, path: Any, name: str = "path") -> None:
+    """Refuse what is not the dotted path of a number of the system.
+
+    Raises:
+        ParameterError: of the argument `name`, with the paths that are near.
+    """
+    if path in system.parameters:
+        return
+    try:
+        system.get(path)
+    except ParameterError as error:
+        raise ParameterError(str(error), name) from None
+    raise ParameterError(f"{path} is not a number, so nothing can be computed along it", name)
+
+
+def check_along(system: Any, path: str, values: Iterable[float], name: str) -> None:
+    """Refuse values of the parameter at `path` that the system does not allow.
+
+    Raises:
+        ParameterError: of the argument `name`, with what the system says.
+    """
+    for value in values:
+        try:
+            system.with_({path: float(value)})
+        except ParameterError as error:
+            raise ParameterError(f"{name} reach beyond what the system allows: {error}", name) from None
 
 
 def check_states(name: str, states: Any) -> np.ndarray:
@@ -97,12 +129,16 @@ def check_states(name: str, states: Any) -> np.ndarray:
     except (TypeError, ValueError):
         array = np.full((1, 2), np.nan)
     if not np.isfinite(array).all():
-        raise ParameterError(f"{name} must be states (coordinate, velocity), an array (n, 2), got {states!r}")
+        raise ParameterError(f"{name} must be states (coordinate, velocity), an array (n, 2), got {states!r}", name)
     return array
 
 
-def settle_number(owner: Any, name: str, **bounds: Any) -> None:
-    """Check the field `name` of a frozen dataclass and store it as a plain float; messages name the field."""
-    value = getattr(owner, name)
-    check_number(bounds.pop("label", name), value, **bounds)
-    object.__setattr__(owner, name, float(value))
+def settle_numbers(owner: Any, *names: str, **bounds: Any) -> None:
+    """Check fields of a frozen dataclass against the bounds of `check_number` and store them as plain floats.
+
+    The unit of a field is that of its metadata, as in `field(metadata=RADIANS)`.
+    """
+    units = {f.name: f.metadata.get("unit", "") for f in dataclasses.fields(owner)}
+    for name in names:
+        check_number(name, getattr(owner, name), unit=units[name], **bounds)
+        object.__setattr__(owner, name, float(getattr(owner, name)))

@@ -12,7 +12,23 @@ class SaltusError(Exception):
 
 
 class ParameterError(SaltusError, ValueError):
-    """A value, a name or a combination of them that has no meaning for the system."""
+    """A value, a name or a combination of them that has no meaning for the system.
+
+    `parameter` is the dotted path of what is wrong, such as "load.frequency" or "max_period", or None where it is no single one.
+    """
+
+    def __init__(self, message: str, parameter: str | None = None) -> None:
+        super().__init__(message)
+        self.parameter = parameter
+
+    def inside(self, owner: str) -> ParameterError:
+        """The same refusal as `owner` sees it, of which the parameter is a part: "model.beta0 must ..." for "beta0 must ..."."""
+        message = str(self)
+        if self.parameter is None:
+            return ParameterError(f"{owner}: {message}", owner)
+        path, subject = f"{owner}.{self.parameter}", f"{self.parameter} "
+        predicate = message.removeprefix(subject)
+        return ParameterError(f"{path}: {message}" if predicate == message else f"{path} {predicate}", path)
 
 
 class TraceError(SaltusError, TypeError):

@@ -225,12 +225,12 @@ def test_a_wall_turns_the_velocity_round_with_either_law():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: VelocityReduction(1.1), r"VelocityReduction.e must lie in \[0, 1\], got 1.1"),
-        (lambda: VelocityReduction(-0.1), "VelocityReduction.e"),
-        (lambda: VelocityReduction(math.nan), "VelocityReduction.e"),
-        (lambda: VelocityReduction("1"), "VelocityReduction.e must be a number"),
-        (lambda: EnergyRestitution(0.0), r"EnergyRestitution.r must lie in \(0, inf\), got 0.0"),
-        (lambda: EnergyRestitution(-1.0), "EnergyRestitution.r"),
+        (lambda: VelocityReduction(1.1), r"e must lie in \[0, 1\], got 1.1"),
+        (lambda: VelocityReduction(-0.1), "e must"),
+        (lambda: VelocityReduction(math.nan), "e must"),
+        (lambda: VelocityReduction("1"), "e must be a number"),
+        (lambda: EnergyRestitution(0.0), r"r must lie in \(0, inf\), got 0.0"),
+        (lambda: EnergyRestitution(-1.0), "r must"),
     ],
 )
 def test_impossible_laws_are_refused(make, message):

@@ -138,10 +138,10 @@ def test_the_model_moves_as_the_cell_does_in_si():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"length": 0.0}, r"PhysicalCell.length must lie in \(0, inf\), got 0.0"),
-        ({"upper_stiffness": -1.0}, "PhysicalCell.upper_stiffness must lie in"),
-        ({"lower_mass": -0.1}, "PhysicalCell.lower_mass must lie in"),
-        ({"upper_mass": math.inf}, "PhysicalCell.upper_mass must lie in"),
+        ({"length": 0.0}, r"length must lie in \(0, inf\), got 0.0"),
+        ({"upper_stiffness": -1.0}, "upper_stiffness must lie in"),
+        ({"lower_mass": -0.1}, "lower_mass must lie in"),
+        ({"upper_mass": math.inf}, "upper_mass must lie in"),
         ({"lower_damping": 0.1}, "upper_damping is 0"),
     ],
 )

@@ -15,7 +15,6 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from saltus.config.source import Keys, Source
 from saltus.errors import ParameterError, near
 
-ANGLES = ("beta0", "alpha", "phase", "theta", "theta_1", "theta_2")  # fields of any class; see `is_angle`
 ANGLE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad|°)\s*")
 
 
@@ -118,15 +117,10 @@ def table_of(cls: type, **more: Any) -> type[Table]:
     for f in dataclasses.fields(cls):
         if not f.init or f.name.startswith("_"):
             continue
-        kind = Angle if is_angle(f) else _kind(hints.get(f.name, Any))
+        kind = Angle if f.metadata.get("unit") == "rad" else _kind(hints.get(f.name, Any))
         required = f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
         fields[f.name] = (kind, ...) if required else (kind, Field(default=None, validate_default=False))
     return create_model(cls.__name__, __base__=Table, **{**fields, **more})
-
-
-def is_angle(f: dataclasses.Field[Any]) -> bool:
-    """Whether a field is an angle: by its name, or by `field(metadata={"unit": "rad"})`."""
-    return f.name in ANGLES or f.metadata.get("unit") == "rad"
 
 
 def _kind(hint: Any) -> Any:
@@ -164,22 +158,10 @@ def _refuse(source: Source, keys: Keys, table: type[Table], errors: Sequence[Any
 
 
 def build(source: Source, keys: Keys, cls: type, values: dict[str, Any]) -> Any:
-    """`cls(**values)`, with the refusals of the class itself told at their place."""
-    name = ".".join(keys)
+    """`cls(**values)`, with the refusals of the class itself at their place in the table at `keys`."""
     try:
         return cls(**values)
-    except (ValueError, TypeError, ArithmeticError) as error:
-        text = str(error)
-        found = re.match(rf"(?:{cls.__name__}\.)?(\w+)\b", text)
-        if found and found[1] in values:
-            source.refuse((*keys, found[1]), f"{name}.{text[found.start(1) :]}")
-        source.refuse(keys, f"{name}: {text}")
-
-
-def call(source: Source, action: Any, *arguments: Any, **named: Any) -> Any:
-    """`action(*arguments, **named)`, with a ParameterError told at the dotted path that it names, if it names one."""
-    try:
-        return action(*arguments, **named)
     except ParameterError as error:
-        paths = re.findall(r"\b(?:model|load|impact|simulate)(?:\.\w+)*", str(error))
-        source.refuse(tuple(paths[0].split(".")) if paths else (), str(error))
+        source.refuse_error(error.inside(".".join(keys)))
+    except (ValueError, TypeError, ArithmeticError) as error:  # a class of the user's own may raise anything
+        source.refuse(keys, f"{'.'.join(keys)}: {error}")

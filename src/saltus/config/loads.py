@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.config.fields import Text, build, call, check_table, read_number, show, table_of
+from saltus.config.fields import Text, build, check_table, read_number, show, table_of
 from saltus.config.source import Keys, Source
+from saltus.errors import ParameterError
 from saltus.systems import Constant, Harmonic, Load, Record, Signal, Sum
 
 
@@ -28,8 +29,10 @@ def read_load(source: Source, data: Any) -> Load:
     for name in channels:
         if not name.isidentifier() or name.startswith("__"):
             source.refuse(("load", name), f"load has no channel {show(name)[len('the text ') :]}")
-    loaded: Load = call(source, Load, frequency=frequency, **channels)
-    return loaded
+    try:
+        return Load(frequency=frequency, **channels)
+    except ParameterError as error:
+        source.refuse_error(error)
 
 
 def read_signal(source: Source, keys: Keys, data: Any) -> Signal:

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, create_model
 
-from saltus.config.fields import ANGLES, Angle, Number, Table, check_table, read_number, read_text, read_whole, show
+from saltus.config.fields import Angle, Number, Table, check_table, read_number, read_text, read_whole, show
 from saltus.config.source import Source
-from saltus.systems import System
+from saltus.systems import Model, System
 
 TOLERANCES = (1e-15, 1e-6)
 
@@ -43,7 +43,7 @@ def read_settings(source: Source, system: System, data: Any) -> Settings:
         ParameterError: with the place of what is wrong.
     """
     coordinates = system.model.coordinates
-    values = check_table(source, ("simulate",), data, _table(coordinates, margin_names(system)))
+    values = check_table(source, ("simulate",), data, _table(system.model, margin_names(system)))
     _check_horizon(source, system, values)
     state = {name: values.pop(name, 0.0) for name in coordinates}
     return Settings(state=state, **values)
@@ -71,11 +71,11 @@ def _check_horizon(source: Source, system: System, values: Mapping[str, Any]) ->
         )
 
 
-def _table(coordinates: tuple[str, ...], margins: tuple[str, ...]) -> type[Table]:
-    several = len(coordinates) > 1
-    velocity = Annotated[Any, BeforeValidator(_numbers(len(coordinates)))] if several else Number
+def _table(model: Model, margins: tuple[str, ...]) -> type[Table]:
+    count = len(model.coordinates)
+    velocity = Annotated[Any, BeforeValidator(_numbers(count))] if count > 1 else Number
     positive = Annotated[float, BeforeValidator(_positive)]
-    fields: dict[str, Any] = {name: (Angle if name in ANGLES else Number, 0.0) for name in coordinates}
+    fields: dict[str, Any] = {name: (Angle if model.unit_of(name) == "rad" else Number, 0.0) for name in model.coordinates}
     fields |= {"velocity": (velocity, 0.0), "periods": (positive, None), "duration": (positive, None)}
     fields |= {"tol": (Annotated[float, BeforeValidator(_tolerance)], None), "time": (Number, 0.0)}
     fields |= {"side": (Annotated[int, BeforeValidator(_side)], None)}

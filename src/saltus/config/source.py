@@ -34,6 +34,10 @@ class Source:
         line = f", line {self.lines[keys]}" if keys else ""
         raise ParameterError(one_line(f"{self.path}{line}: {problem}"))
 
+    def refuse_error(self, error: ParameterError) -> NoReturn:
+        """Raise the refusal of a parameter at its place in the file, or at that of the nearest table around it."""
+        self.refuse(tuple((error.parameter or "").split(".")), str(error))
+
 
 def one_line(text: str) -> str:
     """`text` with line breaks and other control characters, which a quoted key may hold, written as escapes."""

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from saltus.config.fields import call
 from saltus.config.loads import read_load
 from saltus.config.questions import ASKS, Ask, read_ask
 from saltus.config.settings import Settings, read_settings
@@ -53,11 +51,7 @@ class Study:
         """
         from saltus.flow import simulate
 
-        arguments = {**self.settings().arguments(), **more}
-        try:
-            return call(self.source, simulate, self.system, **arguments)
-        except (MotionError, TraceError) as error:
-            raise type(error)(f"{self.source.path}: {error}") from error
+        return self.answer(Ask(kind="simulate", options=self.settings().arguments()), simulate, **more)
 
     def answer(self, ask: Ask, function: Callable[..., Any], **more: Any) -> Any:
         """`function(system, ...)` with the arguments of a question, and `more`.
@@ -69,24 +63,10 @@ class Study:
         try:
             return function(self.system, **ask.options, **more)
         except ParameterError as error:
-            key = _named(ask, str(error))
-            place = (ask.kind,) if key is None else (ask.kind, key)
-            said = f".{error}" if str(error).startswith(f"{key} ") else f": {error}"
-            self.source.refuse(place, (ask.kind if said[0] == "." else ".".join(place)) + said)
+            known = error.parameter in ask.options
+            self.source.refuse_error((error if known else ParameterError(str(error))).inside(ask.kind))
         except (MotionError, TraceError, SweepError) as error:
             raise type(error)(f"{self.source.path}, {ask.kind}: {error}") from error
-
-
-def _named(ask: Ask, sentence: str) -> str | None:
-    """The key of a question that a refusal is about: the one that it begins with, or else whose text or name is in it."""
-    words = re.findall(r"\w+", sentence)
-    if words and words[0] in ask.options:
-        return words[0]
-    for key, value in ask.options.items():
-        texts = [value] if isinstance(value, str) else value if isinstance(value, tuple) else []
-        if any(isinstance(text, str) and text in sentence for text in texts):
-            return key
-    return next((word for word in words if word in ask.options), None)
 
 
 def load_study(path: Path | str) -> Study:
@@ -104,7 +84,10 @@ def load_study(path: Path | str) -> Study:
     model = read_part(source, "model", tables["model"])
     load = read_load(source, tables["load"]) if "load" in tables else Load()
     impact = read_part(source, "impact", tables["impact"]) if "impact" in tables else VelocityReduction()
-    system: System = call(source, System, model=model, load=load, impact=impact)
+    try:
+        system = System(model=model, load=load, impact=impact)
+    except ParameterError as error:
+        source.refuse_error(error)
     settings = read_settings(source, system, tables["simulate"]) if "simulate" in tables else None
     asks = tuple(read_ask(source, system, name, tables[name]) for name in tables if name in ASKS)
     return Study(name=source.path.stem, system=system, simulate=settings, asks=asks, source=source)

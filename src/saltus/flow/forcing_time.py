@@ -37,7 +37,9 @@ def clock(time: Any, length: Any, periods: float | None, duration: float | None)
     assert span is not None
     if length is None:
         if periods is not None:
-            raise ParameterError("the load has no frequency, so there are no forcing periods; give duration=... instead")
+            raise ParameterError(
+                "the load has no frequency, so there are no forcing periods; give duration=... instead", "periods"
+            )
         return Clock(0, time, 0, time + span, 0.0)
     reach = np.max(np.abs(time) / length + (span / length if periods is None else span), initial=0.0)
     if not reach < MOST_PERIODS:

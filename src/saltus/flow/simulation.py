@@ -149,7 +149,7 @@ def follow(
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     check_number("time", time)
     if side not in (None, 1, -1):
-        raise ParameterError(f"side must be +1 or -1, got {side!r}")
+        raise ParameterError(f"side must be +1 or -1, got {side!r}", "side")
     run = program(system, limits, sensitivities)
     where, state, settings = _prepare(system, run, position, speeds, periods, duration, float(time), tol)
     sample_times = None if samples is None else _sample_times(samples, float(time))
@@ -172,7 +172,9 @@ def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
     try:
         return tuple(dict.fromkeys((*system.model.stops, *([stop_at] if isinstance(stop_at, str) else stop_at))))
     except TypeError:
-        raise ParameterError(f"stop_at must be the names of margins, such as ['kinematic_limit'], got {stop_at!r}") from None
+        raise ParameterError(
+            f"stop_at must be the names of margins, such as ['kinematic_limit'], got {stop_at!r}", "stop_at"
+        ) from None
 
 
 def _sample_times(samples: Any, start: float) -> np.ndarray:
@@ -181,7 +183,9 @@ def _sample_times(samples: Any, start: float) -> np.ndarray:
     except (TypeError, ValueError):
         times = np.array([np.nan])
     if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0).any() or (times < start).any():
-        raise ParameterError(f"samples must be times that do not decrease, from the start {start:g} on, got {samples!r}")
+        raise ParameterError(
+            f"samples must be times that do not decrease, from the start {start:g} on, got {samples!r}", "samples"
+        )
     return times
 
 
@@ -189,10 +193,10 @@ def _start_state(system: System, velocity: Any, coordinates: dict[str, float]) -
     names = system.model.coordinates
     for name in coordinates:
         if name not in names:
-            raise ParameterError(f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names)}")
+            raise ParameterError(f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names)}", name)
     missing = [name for name in names if name not in coordinates]
     if missing:
-        raise ParameterError(f"the state at the start needs {missing[0]}=...")
+        raise ParameterError(f"the state at the start needs {missing[0]}=...", missing[0])
     for name in names:
         check_number(name, coordinates[name])
     try:
@@ -200,9 +204,9 @@ def _start_state(system: System, velocity: Any, coordinates: dict[str, float]) -
         if np.ndim(velocity) == 0 and velocity == 0.0:
             speeds = np.zeros(len(names))
     except ValueError:
-        raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}") from None
+        raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}", "velocity") from None
     if speeds.shape != (len(names),):
-        raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}")
+        raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}", "velocity")
     for value in speeds:
         check_number("velocity", value)
     return np.array([coordinates[name] for name in names], dtype=float), speeds.astype(float)
@@ -267,7 +271,7 @@ def _choose_side(system: System, where: np.ndarray, position: np.ndarray, speeds
         where[k.SIDE] = inside[0]
     elif min(gaps.values()) < 0:
         name = model.coordinates[0]
-        raise ParameterError(f"{name} = {position[0]:g} lies beyond the contact at {name} = {float(model.contact):g}")
+        raise ParameterError(f"{name} = {position[0]:g} lies beyond the contact at {name} = {float(model.contact):g}", name)
     elif speeds[0] == 0.0:
         where[k.MODE] = k.CONTACT
     else:

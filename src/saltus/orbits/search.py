@@ -93,7 +93,7 @@ def search_orbits(
     system.get(path)
     grid = np.atleast_1d(np.asarray(list(values), dtype=float))
     if not grid.size or not np.isfinite(grid).all():
-        raise ParameterError(f"values must be numbers of {path} at which to search, got {grid.tolist()}")
+        raise ParameterError(f"values must be numbers of {path} at which to search, got {grid.tolist()}", "values")
     if len(system.model.coordinates) > 1:
         raise ParameterError("search_orbits works on models with one coordinate; use find_orbit from your own states")
     states = initial_states(system, starts, region, seed)
@@ -126,7 +126,9 @@ def check_region(region: Any) -> tuple[float, float]:
     except (TypeError, ValueError):
         widths = ()
     if len(widths) != 2 or not all(0.0 < w < np.inf for w in widths):
-        raise ParameterError(f"region must be two half widths above 0, of the coordinate and of the velocity, got {region!r}")
+        raise ParameterError(
+            f"region must be two half widths above 0, of the coordinate and of the velocity, got {region!r}", "region"
+        )
     return widths[0], widths[1]
 
 

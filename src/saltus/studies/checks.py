@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from saltus.checks import check_bounds, check_count
+from saltus.checks import check_along, check_bounds, check_count, check_path
 from saltus.errors import ParameterError
 from saltus.systems import System
 
@@ -17,11 +17,8 @@ def check_diagram(system: System, path: str, bounds: tuple[float, float], **effo
         names = ", ".join(system.model.coordinates)
         raise ParameterError(f"diagrams are for models with one coordinate, and this one has {names}; see continue_orbit")
     low, high = check_bounds(bounds)
-    if path not in system.parameters:
-        system.get(path)  # refuses what leads nowhere
-        raise ParameterError(f"{path} is not a number, so there is no diagram along it")
-    for bound in (low, high):
-        system.with_({path: bound})  # refuses bounds beyond what the system allows
+    check_path(system, path)
+    check_along(system, path, (low, high), "bounds")
     for name, effort in efforts.items():
         check_count(name, effort, 1 if name in ("max_period", "starts") else 0)
     return low, high

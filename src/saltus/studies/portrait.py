@@ -85,7 +85,9 @@ def _spread(system: System, window: Bounds, points: tuple[Equilibrium, ...], see
     states = middle + half * shares
     states = states[_possible(system, states[:, 0])][:MOTIONS]
     if not len(states):
-        raise ParameterError(f"window must reach to where the system can be, got {window!r}: all of it is beyond the contact")
+        raise ParameterError(
+            f"window must reach to where the system can be, got {window!r}: all of it is beyond the contact", "window"
+        )
     ends = [*(point.place for point in points), *window[0]]
     near = [(_beside(point.place, ends, share), 0.0) for point in points if point.stable for share in BESIDE]
     return np.concatenate([np.array(near).reshape(-1, 2), states])
@@ -111,10 +113,10 @@ def _states(system: System, starts: Any) -> np.ndarray:
     except (TypeError, ValueError):
         states = np.empty(0)
     if states.ndim != 2 or states.shape[1] != 2 or not len(states) or not np.isfinite(states).all():
-        raise ParameterError(f"starts must be states (coordinate, velocity), such as [[0.3, 0.0]], got {starts!r:.80}")
+        raise ParameterError(f"starts must be states (coordinate, velocity), such as [[0.3, 0.0]], got {starts!r:.80}", "starts")
     beyond = states[~(_possible(system, states[:, 0]) | (states[:, 0] == float(system.model.contact)))]
     if len(beyond):
-        raise ParameterError(f"starts must lie where the system can be, and {beyond[0].tolist()} is beyond the contact")
+        raise ParameterError(f"starts must lie where the system can be, and {beyond[0].tolist()} is beyond the contact", "starts")
     return states
 
 

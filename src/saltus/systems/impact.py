@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import settle_number
+from saltus.checks import settle_numbers
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 
@@ -33,7 +33,7 @@ class VelocityReduction(ImpactLaw):
     e: float = 1.0
 
     def __post_init__(self) -> None:
-        settle_number(self, "e", label="VelocityReduction.e", at_least=0.0, at_most=1.0)
+        settle_numbers(self, "e", at_least=0.0, at_most=1.0)
 
     def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
         """e v-."""
@@ -52,7 +52,7 @@ class EnergyRestitution(ImpactLaw):
     r: float
 
     def __post_init__(self) -> None:
-        settle_number(self, "r", label="EnergyRestitution.r", above=0.0)
+        settle_numbers(self, "r", above=0.0)
 
     def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
         """The root v+ of a v^2 + b v + c = r T(v-); NaN where there is none."""

@@ -67,10 +67,11 @@ class Load:
         if frequency is not None:
             check_number("load.frequency", frequency, above=0.0)
             frequency = float(frequency)
-            check_number("the forcing period 2 pi / load.frequency", 2.0 * math.pi / frequency, above=0.0, below=1e300)
+            if not 2.0 * math.pi / frequency < 1e300:
+                raise ParameterError(f"load.frequency must make a finite forcing period, got {frequency!r}", "load.frequency")
         for name, signal in signals.items():
             if signal.periodic and frequency is None:
-                raise ParameterError(f"load.{name} is harmonic, so load.frequency must be given")
+                raise ParameterError(f"load.{name} is harmonic, so load.frequency must be given", f"load.{name}")
             _check_records(name, signal)
         object.__setattr__(self, "frequency", frequency)
         object.__setattr__(self, "channels", signals)
@@ -116,4 +117,4 @@ def _check_records(name: str, signal: Signal) -> None:
     for term in getattr(signal, "terms", (signal,)):
         if isinstance(term, Record) and (term.quantity == "force") == name.startswith("ground_"):
             wanted = "displacement, velocity or acceleration" if name.startswith("ground_") else "force"
-            raise ParameterError(f"load.{name} takes a record of {wanted}, got quantity={term.quantity!r}")
+            raise ParameterError(f"load.{name} takes a record of {wanted}, got quantity={term.quantity!r}", f"load.{name}")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import settle_number
+from saltus.checks import RADIANS, settle_numbers
 from saltus.errors import ParameterError
 from saltus.systems.load import Load
 from saltus.systems.model import Model
@@ -36,7 +36,7 @@ class Metainterface(Model):
     - [(1+h) H - (1+m) zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one of `eomnl`.
     """
 
-    beta0: float  # angle of the undeformed cell, rad, in (0, pi)
+    beta0: float = field(metadata=RADIANS)  # angle of the undeformed cell, in (0, pi)
     damping: float = 0.0  # C, at least 0
     stiffness_ratio: float = 1.0  # k = K1 / K2, above 0
     mass_ratio: float = 0.0  # m = M1 / M2, at least 0
@@ -54,24 +54,25 @@ class Metainterface(Model):
     )
 
     def __post_init__(self) -> None:
-        settle_number(self, "beta0", above=0.0, below=math.pi, unit="rad")
-        settle_number(self, "damping", at_least=0.0)
-        settle_number(self, "stiffness_ratio", above=0.0)
-        settle_number(self, "mass_ratio", at_least=0.0)
-        settle_number(self, "dissipation_ratio", at_least=0.0)
+        settle_numbers(self, "beta0", above=0.0, below=math.pi)
+        settle_numbers(self, "stiffness_ratio", above=0.0)
+        settle_numbers(self, "damping", "mass_ratio", "dissipation_ratio", at_least=0.0)
         if self.smoothing is not None:
-            settle_number(self, "smoothing", above=0.0)
+            settle_numbers(self, "smoothing", above=0.0)
             if (self.stiffness_ratio, self.mass_ratio, self.dissipation_ratio) != (1.0, 0.0, 1.0):
                 raise ParameterError(
                     "smoothing is for symmetric layers only (stiffness_ratio 1, mass_ratio 0, dissipation_ratio 1); "
-                    "drop it to compute the exact motion of unequal ones"
+                    "drop it to compute the exact motion of unequal ones",
+                    "smoothing",
                 )
 
     def check_load(self, load: Load) -> None:
         """With a smoothed sign there is no lower layer to load on its own (errata 18)."""
         for name in ("lower_horizontal", "lower_vertical"):
             if self.smoothing is not None and not vanishes(load.channels.get(name, Constant(0.0))):
-                raise ParameterError(f"load.{name} cannot act with smoothing, which is for symmetric systems; drop one of them")
+                raise ParameterError(
+                    f"load.{name} cannot act with smoothing, which is for symmetric systems; drop one of them", f"load.{name}"
+                )
 
     @property
     def sides(self) -> tuple[int, ...]:

@@ -55,7 +55,8 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
         head, _, rest = str(path).partition(".")
         if head not in parts and not (isinstance(node, Load) and head.isidentifier() and not rest):
             raise ParameterError(
-                f"no parameter {where + str(path)!r}: {type(node).__name__} has no {head!r}; {near(head, children(node))}"
+                f"no parameter {where + str(path)!r}: {type(node).__name__} has no {head!r}; {near(head, children(node))}",
+                where + str(path),
             )
         if rest:
             below[head][rest] = value
@@ -67,7 +68,10 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
         return Load(**parts)
     if isinstance(node, Sum):
         return Sum(tuple(as_signal(part, f"{where}{name}") for name, part in parts.items()))
-    return dataclasses.replace(node, **parts)
+    try:
+        return dataclasses.replace(node, **parts)
+    except ParameterError as error:
+        raise (error.inside(where[:-1]) if where else error) from None
 
 
 def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -> Any:

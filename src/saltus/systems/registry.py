@@ -41,12 +41,12 @@ def register(cls: T) -> T:
 def find_model(name: str) -> type[Model]:
     """The model class called `name`."""
     if name not in MODELS:
-        raise ParameterError(f"model.type {name!r} is not a known model; {near(name, MODELS)}")
+        raise ParameterError(f"model.type {name!r} is not a known model; {near(name, MODELS)}", "model.type")
     return MODELS[name]
 
 
 def find_impact(name: str) -> type[ImpactLaw]:
     """The impact law called `name`."""
     if name not in IMPACTS:
-        raise ParameterError(f"impact.type {name!r} is not a known impact law; {near(name, IMPACTS)}")
+        raise ParameterError(f"impact.type {name!r} is not a known impact law; {near(name, IMPACTS)}", "impact.type")
     return IMPACTS[name]

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from saltus.checks import settle_number
+from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
 from saltus.systems.impact import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
@@ -34,7 +34,7 @@ class VelocityGain(ImpactLaw):
     e: float = 1.0
 
     def __post_init__(self) -> None:
-        settle_number(self, "e", label="VelocityGain.e", above=0.0, at_most=1.0)
+        settle_numbers(self, "e", above=0.0, at_most=1.0)
 
     def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
         """v- / e."""
@@ -56,7 +56,7 @@ def reversed_system(system: System) -> System:
         raise ParameterError(f"reversed_system takes a System(model=..., load=..., impact=...), got {system!r}")
     impact = system.impact
     if not isinstance(impact, VelocityReduction) or impact.e <= 0.0:
-        raise ParameterError(f"{impact!r} cannot be followed backward; only VelocityReduction(e) with e > 0 can")
+        raise ParameterError(f"{impact!r} cannot be followed backward; only VelocityReduction(e) with e > 0 can", "impact")
     backward = VelocityReduction(1.0) if impact.e == 1.0 else VelocityGain(impact.e)
     result = System(model=reversed_model(system.model), load=reversed_load(system.load), impact=backward)
     _check_resets(system, result)

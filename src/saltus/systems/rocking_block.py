@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import settle_number
+from saltus.checks import RADIANS, settle_numbers
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 from saltus.systems.signals import scaled
@@ -26,14 +26,14 @@ class RockingBlock(Model):
     A motion stops, `overturned`, when the block lies on its side: pi/2 - abs(theta) = 0.
     """
 
-    alpha: float  # slenderness angle, rad, in (0, pi/2)
+    alpha: float = field(metadata=RADIANS)  # slenderness angle, in (0, pi/2)
 
     units: ClassVar[tuple[str, ...]] = ("rad",)
     channels: ClassVar[tuple[str, ...]] = ("ground_horizontal", "ground_vertical")
     stops: ClassVar[tuple[str, ...]] = ("overturned",)
 
     def __post_init__(self) -> None:
-        settle_number(self, "alpha", above=0.0, below=math.pi / 2, unit="rad")
+        settle_numbers(self, "alpha", above=0.0, below=math.pi / 2)
 
     def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
         """theta'' of `EOM&Rock` in the time p t."""

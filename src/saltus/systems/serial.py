@@ -32,16 +32,16 @@ def to_dict(part: Any) -> Any:
 def from_dict(kind: str, data: Any) -> Any:
     """The inverse of `to_dict` for `kind` one of model, load, impact."""
     if not isinstance(data, Mapping):
-        raise ParameterError(f"{kind} must be a table of keys and values, got {data!r}")
+        raise ParameterError(f"{kind} must be a table of keys and values, got {data!r}", kind)
     if kind == "load":
         channels = {name: read_signal(value, f"load.{name}") for name, value in data.items() if name != "frequency"}
         return Load(frequency=data.get("frequency"), **channels)
     fields = dict(data)
     if "type" not in fields:
-        raise ParameterError(f"{kind}.type is missing: it names the {kind}, such as 'Metainterface' or 'VelocityReduction'")
+        raise ParameterError(f"{kind}.type is missing: it names the {kind}, such as 'Metainterface' or 'VelocityReduction'", kind)
     name = fields.pop("type")
     if not isinstance(name, str):
-        raise ParameterError(f"{kind}.type must be a name in quotes, got {name!r}")
+        raise ParameterError(f"{kind}.type must be a name in quotes, got {name!r}", f"{kind}.type")
     cls: Any = find_model(name) if kind == "model" else find_impact(name)
     return build(cls, fields, kind)
 
@@ -61,9 +61,12 @@ def build(cls: type, fields: dict[str, Any], where: str) -> Any:
     known = {f.name: f for f in dataclasses.fields(cls)}
     for name in fields:
         if name not in known:
-            raise ParameterError(f"unknown key {where}.{name} of {cls.__name__}; {near(name, known)}")
+            raise ParameterError(f"unknown key {where}.{name} of {cls.__name__}; {near(name, known)}", f"{where}.{name}")
     for name, f in known.items():
         needed = f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
         if needed and name not in fields:
-            raise ParameterError(f"{where}.{name} is missing; {cls.__name__} needs it")
-    return cls(**fields)
+            raise ParameterError(f"{where}.{name} is missing; {cls.__name__} needs it", where)
+    try:
+        return cls(**fields)
+    except ParameterError as error:
+        raise error.inside(where) from None

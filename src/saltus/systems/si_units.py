@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from saltus.checks import settle_number
+from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
@@ -39,14 +39,13 @@ class PhysicalCell:
         for name, twin in (("lower_stiffness", "upper_stiffness"), ("lower_damping", "upper_damping")):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, getattr(self, twin))
-        for name in ("length", "upper_mass", "upper_stiffness", "lower_stiffness"):
-            settle_number(self, name, label=f"PhysicalCell.{name}", above=0.0)
-        for name in ("lower_mass", "upper_damping", "lower_damping"):
-            settle_number(self, name, label=f"PhysicalCell.{name}", at_least=0.0)
+        settle_numbers(self, "length", "upper_mass", "upper_stiffness", "lower_stiffness", above=0.0)
+        settle_numbers(self, "lower_mass", "upper_damping", "lower_damping", at_least=0.0)
         if self.upper_damping == 0.0 and self.lower_damping != 0.0:
             raise ParameterError(
-                f"PhysicalCell.lower_damping is {self.lower_damping!r} but upper_damping is 0, so the ratio C1 / C2 has no "
-                "value; give the upper hinge a small damping"
+                f"lower_damping is {self.lower_damping!r} but upper_damping is 0, so the ratio C1 / C2 has no value; "
+                "give the upper hinge a small damping",
+                "lower_damping",
             )
 
     @classmethod

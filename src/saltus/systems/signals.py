@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import check_number, settle_number
+from saltus.checks import RADIANS, check_number, settle_numbers
 from saltus.errors import ParameterError
 
 
@@ -45,7 +45,7 @@ class Constant(Signal):
     value: float
 
     def __post_init__(self) -> None:
-        settle_number(self, "value", label="a constant load")
+        settle_numbers(self, "value")
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
         """`value`, or 0 for a derivative."""
@@ -61,19 +61,18 @@ class Harmonic(Signal):
 
     amplitude: float
     mean: float = 0.0
-    phase: float = 0.0  # rad
+    phase: float = field(default=0.0, metadata=RADIANS)
     order: int = 1
     periodic: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        for name in ("amplitude", "mean", "phase"):
-            settle_number(self, name, label=f"Harmonic.{name}")
+        settle_numbers(self, "amplitude", "mean", "phase")
         try:
             whole = not isinstance(self.order, bool) and self.order == int(self.order) >= 1
         except (TypeError, ValueError, OverflowError):
             whole = False
         if not whole:
-            raise ParameterError(f"Harmonic.order must be a whole number of at least 1, got {self.order!r}")
+            raise ParameterError(f"order must be a whole number of at least 1, got {self.order!r}", "order")
         object.__setattr__(self, "order", int(self.order))
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
@@ -135,8 +134,8 @@ class Record(Signal):
 
     def __post_init__(self) -> None:
         if self.quantity not in QUANTITIES:
-            raise ParameterError(f"Record.quantity must be one of {', '.join(QUANTITIES)}, got {self.quantity!r}")
-        settle_number(self, "scale", label="Record.scale")
+            raise ParameterError(f"quantity must be one of {', '.join(QUANTITIES)}, got {self.quantity!r}", "quantity")
+        settle_numbers(self, "scale")
         where = f"record {self.source!r}" if self.source else "record"
         try:
             time, value = (np.array(a, dtype=float) for a in (self.time, self.value))

@@ -34,14 +34,18 @@ class System:
     def __post_init__(self) -> None:
         for name, kind in (("model", Model), ("load", Load), ("impact", ImpactLaw)):
             if not isinstance(getattr(self, name), kind):
-                raise ParameterError(f"System.{name} must be a {kind.__name__}, got {getattr(self, name)!r}")
+                raise ParameterError(f"System.{name} must be a {kind.__name__}, got {getattr(self, name)!r}", name)
         for channel in self.load.channels:
             if channel not in self.model.channels:
                 known = [*self.model.channels, "frequency"]
-                raise ParameterError(f"{type(self.model).__name__} does not read load.{channel}; {near(channel, known)}")
+                raise ParameterError(
+                    f"{type(self.model).__name__} does not read load.{channel}; {near(channel, known)}", f"load.{channel}"
+                )
         self.model.check_load(self.load)
         if not self.model.sides and self.impact != VelocityReduction():
-            raise ParameterError(f"this {type(self.model).__name__} has no impacts, so {self.impact!r} cannot act; leave it out")
+            raise ParameterError(
+                f"this {type(self.model).__name__} has no impacts, so {self.impact!r} cannot act; leave it out", "impact"
+            )
 
     def with_(self, changes: Mapping[str, Any] | None = None, **more: Any) -> System:
         """A copy with the parts at the given dotted paths replaced: `system.with_({"load.frequency": 1.1})`.
@@ -58,7 +62,7 @@ class System:
         for name in path.split("."):
             parts = children(node)
             if name not in parts:
-                raise ParameterError(f"no parameter {path!r}; {near(path, self.parameters)}")
+                raise ParameterError(f"no parameter {path!r}; {near(path, self.parameters)}", path)
             node = parts[name]
         return node.value if type(node).__name__ == "Constant" else node
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import settle_number
+from saltus.checks import RADIANS, settle_numbers
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model
@@ -31,7 +31,7 @@ class TwoLayer(Model):
     arrays. Energies are per K2. The load channels are those of `Metainterface`.
     """
 
-    beta0: float  # angle of the undeformed cell, rad, in (0, pi)
+    beta0: float = field(metadata=RADIANS)  # angle of the undeformed cell, in (0, pi)
     damping: float = 0.0  # C, at least 0
     stiffness_ratio: float = 1.0  # k = K1 / K2, above 0
     mass_ratio: float = 0.0  # m = M1 / M2, at least 0
@@ -43,11 +43,9 @@ class TwoLayer(Model):
     stops: ClassVar[tuple[str, ...]] = ("lower_contact", "upper_contact")
 
     def __post_init__(self) -> None:
-        settle_number(self, "beta0", above=0.0, below=math.pi, unit="rad")
-        settle_number(self, "damping", at_least=0.0)
-        settle_number(self, "stiffness_ratio", above=0.0)
-        settle_number(self, "mass_ratio", at_least=0.0)
-        settle_number(self, "dissipation_ratio", at_least=0.0)
+        settle_numbers(self, "beta0", above=0.0, below=math.pi)
+        settle_numbers(self, "stiffness_ratio", above=0.0)
+        settle_numbers(self, "damping", "mass_ratio", "dissipation_ratio", at_least=0.0)
 
     @property
     def sides(self) -> tuple[int, ...]:

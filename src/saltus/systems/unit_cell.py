@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from saltus.checks import settle_number
+from saltus.checks import RADIANS, settle_numbers
 from saltus.errors import ParameterError
 from saltus.systems.cell_layout import CellLayout
 from saltus.systems.metainterface import Metainterface
@@ -36,13 +36,12 @@ class UnitCell:
         ParameterError: angles outside alpha0 > 0, 0 < beta0 < pi, alpha0 + beta0 < pi (`restangle`).
     """
 
-    alpha0: float  # rad
-    beta0: float  # rad
+    alpha0: float = field(metadata=RADIANS)
+    beta0: float = field(metadata=RADIANS)
     physical: PhysicalCell | None = None
 
     def __post_init__(self) -> None:
-        settle_number(self, "beta0", above=0.0, below=math.pi, unit="rad")
-        settle_number(self, "alpha0", above=0.0, below=math.pi, unit="rad")
+        settle_numbers(self, "beta0", "alpha0", above=0.0, below=math.pi)
         if self.alpha0 + self.beta0 >= math.pi:
             raise ParameterError(f"alpha0 + beta0 must lie below pi rad, got {self.alpha0!r} + {self.beta0!r}")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from saltus.checks import settle_number
+from saltus.checks import settle_numbers
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 
@@ -25,9 +25,8 @@ class WallOscillator(Model):
     channels: ClassVar[tuple[str, ...]] = ("force",)
 
     def __post_init__(self) -> None:
-        settle_number(self, "stiffness", at_least=0.0)
-        settle_number(self, "damping", at_least=0.0)
-        settle_number(self, "wall")
+        settle_numbers(self, "stiffness", "damping", at_least=0.0)
+        settle_numbers(self, "wall")
 
     @property
     def sides(self) -> tuple[int, ...]:

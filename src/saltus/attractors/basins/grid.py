@@ -185,7 +185,7 @@ def _check_curves(system: System, grid: Grid) -> None:
     """Refuse, before cells are computed, what has no curves: a grid that is a line, impacts that cannot be undone."""
     for name, values in zip(("velocity", system.model.coordinates[0]), grid, strict=True):
         if len(values) < 2:
-            raise ParameterError(f"{name} must be at least two numbers where the curves between basins are asked for")
+            raise ParameterError(f"{name} must be at least two numbers where the curves between basins are asked for", name)
     reversed_system(system)
 
 
@@ -227,7 +227,9 @@ def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: 
     name = system.model.coordinates[0]
     for other in coordinates:
         if other != name:
-            raise ParameterError(f"{type(system.model).__name__} has no coordinate {other!r}; give {name}=... and velocity=...")
+            raise ParameterError(
+                f"{type(system.model).__name__} has no coordinate {other!r}; give {name}=... and velocity=...", other
+            )
     widths = REGION if found is None else found.region
     place, _ = _middle(system)
     along = place + widths[0] * np.linspace(-1.0, 1.0, 201)
@@ -242,7 +244,7 @@ def _axis(name: str, values: Any, default: np.ndarray) -> np.ndarray:
     except (TypeError, ValueError):
         array = np.empty(0)
     if array.ndim != 1 or not array.size or not np.isfinite(array).all() or not (np.diff(array) > 0).all():
-        raise ParameterError(f"{name} must be increasing numbers, the grid's along that axis, got {values!r}")
+        raise ParameterError(f"{name} must be increasing numbers, the grid's along that axis, got {values!r}", name)
     return array
 
 

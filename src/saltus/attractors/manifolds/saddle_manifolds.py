@@ -137,7 +137,7 @@ def check_window(window: Any, step: float) -> Window:
     except (TypeError, ValueError):
         bounds = np.empty(0)
     if bounds.shape != (2, 2) or not np.isfinite(bounds).all() or not (bounds[:, 0] < bounds[:, 1]).all():
-        raise ParameterError(f"window must be ((least, largest coordinate), (least, largest velocity)), got {window!r}")
+        raise ParameterError(f"window must be ((least, largest coordinate), (least, largest velocity)), got {window!r}", "window")
     return Window(bounds.mean(axis=1), 0.5 * np.diff(bounds, axis=1)[:, 0], step)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count, check_number
+from saltus.checks import check_along, check_count, check_number, check_path
 from saltus.errors import ParameterError
 from saltus.orbits import REGION, check_region
 from saltus.studies.chart.cells import MOTIONS
@@ -163,18 +163,15 @@ def check_options(system: Any, paths: Any, axes: dict[str, np.ndarray], **option
     if len(system.model.coordinates) > 1:
         raise ParameterError("stability_chart works on models with one coordinate")
     if isinstance(paths, str) or len(paths) != 2 or paths[0] == paths[1]:
-        raise ParameterError(f"paths must be two parameters, (along horizontal, along vertical), got {paths!r}")
+        raise ParameterError(f"paths must be two parameters, (along horizontal, along vertical), got {paths!r}", "paths")
     for path, values in zip(paths, (axes["horizontal"], axes["vertical"]), strict=True):
-        if path not in system.parameters:
-            system.get(path)  # refuses what leads nowhere, with the near ones
-            raise ParameterError(f"{path} is not a number of the system, so it cannot be an axis")
-        for end in (values.min(), values.max()):
-            system.with_({path: float(end)})
+        check_path(system, path, "paths")
+        check_along(system, path, (values.min(), values.max()), "paths")
     for name in ("max_period", "starts", "periods", "rows"):
         check_count(name, options[name], 1)
     check_count("seed", options["seed"], 0)
     if options["max_period"] > 16:
-        raise ParameterError(f"max_period must be at most 16 forcing periods, got {options['max_period']}")
+        raise ParameterError(f"max_period must be at most 16 forcing periods, got {options['max_period']}", "max_period")
     check_number("least", options["least"], above=0.0)
     check_number("tol", options["tol"], at_least=1e-15, at_most=1e-6)
     check_region(options["region"])
@@ -187,7 +184,7 @@ def _axis(name: str, values: Any) -> np.ndarray:
     except (TypeError, ValueError):
         axis = np.empty(0)
     if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all() or (np.diff(axis) <= 0).any():
-        raise ParameterError(f"{name} must be rising numbers, got {values!r:.80}")
+        raise ParameterError(f"{name} must be rising numbers, got {values!r:.80}", name)
     return axis
 
 

@@ -141,8 +141,10 @@ def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.n
     except (TypeError, ValueError):
         grid = np.empty(0)
     if not grid.size:
-        raise ParameterError(f"values must be numbers at which to search, got {values!r}")
+        raise ParameterError(f"values must be numbers at which to search, got {values!r}", "values")
     outside = grid[~((grid >= bounds[0]) & (grid <= bounds[1]))]
     if outside.size:
-        raise ParameterError(f"values must lie within the bounds {bounds}, got {outside[0]:g}; widen the bounds or leave it out")
+        raise ParameterError(
+            f"values must lie within the bounds {bounds}, got {outside[0]:g}; widen the bounds or leave it out", "values"
+        )
     return grid
