@@ -30,8 +30,8 @@ chart = saltus.simulate_many(
 names = chart.stop.attrs["flag_meanings"].split()
 for code, count in zip(*np.unique(chart.stop, return_counts=True), strict=True):
     print(f"{count:5d} of {chart.stop.size} ended as {names[code]}")
-cycles = np.unique(chart.cycle.values[chart.cycle.values > 0])
-print(f"motions that repeat themselves do so every {', '.join(map(str, cycles))} forcing periods")
+periods = np.unique(chart.recurrence_period.values[chart.recurrence_period.values > 0])
+print(f"motions that repeat themselves do so every {', '.join(map(str, periods))} forcing periods")
 print(f"impacts in the last forcing period: at most {int(chart.period_impact_count.max())}")
 
 border = H.where(chart.impact_count > 0).min("H")  # the least force that lifts it off, for each V

@@ -418,11 +418,6 @@ FAMILIES: dict[str, Callable[[Any, int], Cases]] = {
 # --- what an ensemble says ---------------------------------------------------------------------------------------------------
 
 
-def stop_names(ensemble):
-    """Why each trajectory ended, by name."""
-    return np.array(ensemble.stop.flag_meanings.split())[ensemble.stop.values]
-
-
 def end_state(ensemble, system):
     """(n, 2 degrees of freedom)."""
     names = system.model.coordinates

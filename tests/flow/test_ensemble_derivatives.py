@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from lane_cases import stop_names
 
 import saltus
+from saltus.flow import stop_names
 from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
 
 pytestmark = pytest.mark.thorough  # many structures of their own

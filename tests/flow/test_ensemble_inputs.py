@@ -8,10 +8,11 @@ import xarray
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import mutually_broadcastable_shapes
-from lane_cases import Duffing, stop_names
+from lane_cases import Duffing
 
 import saltus
 from saltus.errors import ParameterError, SaltusError
+from saltus.flow import stop_names
 from saltus.systems import Harmonic, Load, Metainterface, Record, System, WallOscillator
 
 SYSTEM = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=1.0, horizontal=Harmonic(0.3), vertical=-0.5))
@@ -62,10 +63,10 @@ def test_numbers_alone_give_a_dataset_without_dimensions():
 def test_no_trajectories_are_an_ensemble_too(shape, options):
     everything = ("state", "extrema", "impact_count", "speed")
     fractions = []
-    ensemble = run(theta=np.zeros(shape), sample=everything, progress=fractions.append, **options)
+    ensemble = run(theta=np.zeros(shape), sample=everything, progress=lambda done, _: fractions.append(done), **options)
     assert ensemble.theta.shape == shape
     assert ensemble.sampled_theta.shape[: len(shape)] == shape
-    assert fractions == [1.0]
+    assert fractions == [0.0, 1.0]
 
 
 def test_lists_and_whole_numbers_are_arrays():

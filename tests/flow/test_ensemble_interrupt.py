@@ -9,9 +9,9 @@ import time
 
 import numpy as np
 import pytest
-from lane_cases import stop_names
 
 import saltus
+from saltus.flow import stop_names
 from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface, System
 
 SYSTEM = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=1.0, horizontal=Harmonic(0.5), vertical=-0.5))
@@ -40,7 +40,7 @@ else:
     [
         (200_000, 10_000, "dict()"),
         (16, 10**9, "dict()"),  # one chunk that never ends
-        (16, 10**9, "dict(threads=1, progress=lambda fraction: None)"),
+        (16, 10**9, "dict(threads=1, progress=lambda fraction, what: None)"),
     ],
 )
 def test_ctrl_c_ends_an_ensemble_at_once(n, periods, options):
@@ -64,7 +64,7 @@ def test_ctrl_c_ends_an_ensemble_at_once(n, periods, options):
 
 
 def test_an_error_in_the_progress_ends_the_ensemble():
-    def fail(fraction):
+    def fail(fraction, what):
         raise ZeroDivisionError
 
     begin = time.monotonic()
@@ -82,7 +82,7 @@ def test_impacts_that_never_end_do_not_hang():
     )
     begin = time.monotonic()
 
-    def patience(fraction):
+    def patience(fraction, what):
         if time.monotonic() - begin > 100.0:
             raise TimeoutError
 
@@ -93,7 +93,9 @@ def test_impacts_that_never_end_do_not_hang():
 
 def test_progress_grows_to_one():
     fractions = []
-    saltus.simulate_many(SYSTEM, theta=np.linspace(-1, 1, 3000), periods=100, progress=fractions.append, threads=1)
+    saltus.simulate_many(
+        SYSTEM, theta=np.linspace(-1, 1, 3000), periods=100, progress=lambda done, _: fractions.append(done), threads=1
+    )
     assert fractions[-1] == 1.0
     assert len(fractions) >= 2
     assert (np.diff(fractions) >= 0).all()
@@ -104,7 +106,7 @@ def test_progress_grows_to_one():
 def test_progress_counts_a_load_without_periods_too():
     system = System(model=Metainterface(beta0=1.4), load=Load(vertical=-0.5))
     fractions = []
-    saltus.simulate_many(system, theta=np.linspace(0.1, 1, 50), duration=2.0, progress=fractions.append)
+    saltus.simulate_many(system, theta=np.linspace(0.1, 1, 50), duration=2.0, progress=lambda done, _: fractions.append(done))
     assert fractions[-1] == 1.0
 
 

@@ -5,9 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from lane_cases import FAMILIES, Cases, Duffing, stop_names
+from lane_cases import FAMILIES, Cases, Duffing
 
 import saltus
+from saltus.flow import stop_names
 from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
 
 KINDS = ("state", "extrema", "impact_count", "speed")
@@ -196,14 +197,14 @@ def test_cycles_that_are_found_go_on_repeating_themselves(e):
     ensemble = cases.in_lanes(until="settled", last=2, tol=1e-13)
     settled = np.flatnonzero(stop_names(ensemble) == "settled")
     assert settled.size >= 10
-    assert (ensemble.cycle.values[settled] > 0).all()
-    assert not ensemble.cycle.values[np.setdiff1d(np.arange(60), settled)].any()
+    assert (ensemble.recurrence_period.values[settled] > 0).all()
+    assert not ensemble.recurrence_period.values[np.setdiff1d(np.arange(60), settled)].any()
     for i in settled[:25]:
         system, _ = cases.one(i)
         state = {"theta": float(ensemble.theta[i]), "velocity": float(ensemble.velocity[i])}
         if float(ensemble.chatter_speed[i]) > 0:
             continue  # its phase is not known
-        cycle = int(ensemble.cycle[i])
+        cycle = int(ensemble.recurrence_period[i])
         after = saltus.simulate(system, **state, periods=cycle, tol=1e-14, dense=False)
         assert abs(after.theta - state["theta"]) + abs(after.velocity - state["velocity"]) < 1e-8
 
@@ -211,9 +212,12 @@ def test_cycles_that_are_found_go_on_repeating_themselves(e):
 def test_the_shortest_cycle_is_reported():
     cases, longer = attracted(60, 1.0), []
     ensemble = cases.in_lanes(until="settled", tol=1e-13)
-    for i in np.flatnonzero(ensemble.cycle.values > 1):
+    for i in np.flatnonzero(ensemble.recurrence_period.values > 1):
         system, _ = cases.one(i)
-        state, cycle = {"theta": float(ensemble.theta[i]), "velocity": float(ensemble.velocity[i])}, int(ensemble.cycle[i])
+        state, cycle = (
+            {"theta": float(ensemble.theta[i]), "velocity": float(ensemble.velocity[i])},
+            int(ensemble.recurrence_period[i]),
+        )
         for shorter in (q for q in range(1, cycle) if cycle % q == 0):
             other = saltus.simulate(system, **state, periods=shorter, tol=1e-14, dense=False)
             if abs(other.theta - state["theta"]) + abs(other.velocity - state["velocity"]) < 1e-6:

@@ -14,10 +14,10 @@ import os
 
 import numpy as np
 import pytest
-from lane_cases import FAMILIES, amplification, end_state, motion_state, stop_names
+from lane_cases import FAMILIES, amplification, end_state, motion_state
 
 import saltus
-from saltus.flow import EventKind
+from saltus.flow import EventKind, stop_names
 
 CASES = int(os.environ.get("SALTUS_CASES", "4000")) // len(FAMILIES)
 BATCH = 250

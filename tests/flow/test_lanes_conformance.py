@@ -6,9 +6,10 @@ import re
 
 import numpy as np
 import pytest
-from lane_cases import Curved, Duffing, end_state, motion_state, stop_names
+from lane_cases import Curved, Duffing, end_state, motion_state
 
 import saltus
+from saltus.flow import stop_names
 from saltus.systems import Harmonic, Load, System
 from saltus.systems.registry import IMPACTS, MODELS
 

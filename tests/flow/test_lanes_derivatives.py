@@ -9,9 +9,10 @@ import os
 
 import numpy as np
 import pytest
-from lane_cases import FAMILIES, Cases, stop_names
+from lane_cases import FAMILIES, Cases
 
 import saltus
+from saltus.flow import stop_names
 
 CASES = int(os.environ.get("SALTUS_CASES", "1500"))
 pytestmark = pytest.mark.thorough  # a tangent of its own for each family

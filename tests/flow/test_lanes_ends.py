@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 from flow_references import driven
-from lane_cases import stop_names
 
 import saltus
 from saltus.errors import MotionError
-from saltus.flow import EventKind
+from saltus.flow import EventKind, stop_names
 from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface, System, WallOscillator
 
 

@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 from flow_references import driven
-from lane_cases import stop_names
 from numba import njit
 from test_ensemble_samples import KINDS, extrema
 
 import saltus
+from saltus.flow import stop_names
 from saltus.flow.ensemble.scalar_fallback import turning_range
 from saltus.systems import Harmonic, Load, Record
 from saltus.taylor.private_numba import OPTIONS

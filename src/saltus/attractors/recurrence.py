@@ -10,6 +10,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow import load_releases, simulate_many
+from saltus.progress import silent
 from saltus.systems import Load, System
 
 if TYPE_CHECKING:
@@ -67,12 +68,13 @@ def settle(
     """Follow motions from states (n, 2) at phase 0 for at most so many forcing periods, keeping the last `kept` (or all)."""
     kept = periods if kept is None else min(kept, periods)
     until = ("rest", "settled")
-    result = ensemble(system, states, periods=periods, until=until, last=kept, tol=tol, progress=progress)
+    follow = silent if progress is None else lambda done, _: progress(done)
+    result = ensemble(system, states, periods=periods, until=until, last=kept, tol=tol, progress=follow)
     stop = stop_names(result)
     at_contact = (result["side"].values == 0) & np.isin(stop, ("horizon", "rest"))
     rest = (stop == "captured") | (at_contact & (not load_releases(system)))
     ended = ~rest & ~np.isin(stop, ("horizon", "rest", "settled"))
-    cycle = np.where(rest, 0, result["cycle"].values)
+    cycle = np.where(rest, 0, result["recurrence_period"].values)
     return Ends(rest, cycle, ended, result["periods"].values, sampled(system, result))
 
 

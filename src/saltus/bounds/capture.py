@@ -14,8 +14,7 @@ from saltus.bounds.energy_barrier import WIDEST, climb
 from saltus.bounds.gap_equation import SPEED, Leaves, Opening, reads
 from saltus.bounds.intervals import SLACK, Interval, enclose
 from saltus.errors import ParameterError
-from saltus.flow import broadcast, check_parameters, numeric, parameter_table
-from saltus.systems import System
+from saltus.systems import System, broadcast_arrays, check_parameters, finite_array, parameter_table
 from saltus.taylor import Expr, Trace, differentiate, number, record_table, substitute, trace
 
 CELLS = 16  # of the forcing period
@@ -62,8 +61,8 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     """
     if not isinstance(system, System):
         raise ParameterError(f"capture_speed takes a System(model=..., load=..., impact=...), got {system!r}")
-    arrays = {path: numeric(path, given) for path, given in parameter_table(system, parameters).items()}
-    dims, shape, coords, columns = broadcast(arrays)
+    arrays = {path: finite_array(path, given) for path, given in parameter_table(system, parameters).items()}
+    dims, shape, coords, columns = broadcast_arrays(arrays)
     check_parameters(system, columns)
     speeds = proved_speeds(system, columns).reshape(shape)
     if all(not hasattr(a, "dims") or not a.ndim for a in arrays.values()):

@@ -36,7 +36,7 @@ def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
         task = progress.add_task("", total=1.0)
         tell = _teller(messages, progress, task)
         tell(f"computing {path}")
-        motion = study.run(progress=lambda done: progress.update(task, completed=done), samples=long_samples(study))
+        motion = study.run(progress=lambda done, _: progress.update(task, completed=done), samples=long_samples(study))
         tell(f"writing to {output}")
         files = write_motion(motion, study, output, plot)
     print_summary(motion, console)

@@ -1,8 +1,9 @@
 from .compiled import load_segments
 from .ensemble.compiled_lanes import load_advance, load_driver, load_helpers
+from .ensemble.dataset_reading import stop_names, stroboscopic
 from .ensemble.ensemble import compiled_lanes, simulate_many
 from .ensemble.ensemble_dataset import Wanted
-from .ensemble.inputs import Inputs, broadcast, check_parameters, numeric, parameter_table, read_inputs
+from .ensemble.inputs import Inputs, read_inputs
 from .ensemble.lane_layout import FIRST_PLACE, NEW_SIDE, NEW_TIME, NOW, ORIGIN, SIDE_NOW, STRIDE
 from .ensemble.threads import Jobs, Lanes, available_cores
 from .kernel_layout import (
@@ -20,9 +21,10 @@ from .kernel_layout import (
     STATE,
 )
 from .load_release import Release, contact_pull, load_releases, peak_near
-from .motion import DenseOutput, Event, EventKind, Impacts, Motion, Stop
+from .motion import DenseOutput, Event, EventKind, Impacts, Motion
 from .sensitivity import Sensitivities, sensitivities
 from .simulation import limits_of, program, simulate, taylor_order
+from .stops import Stop
 from .validity import Validity
 
 __all__ = [
@@ -59,8 +61,6 @@ __all__ = [
     "Validity",
     "Wanted",
     "available_cores",
-    "broadcast",
-    "check_parameters",
     "compiled_lanes",
     "contact_pull",
     "limits_of",
@@ -69,13 +69,13 @@ __all__ = [
     "load_helpers",
     "load_releases",
     "load_segments",
-    "numeric",
-    "parameter_table",
     "peak_near",
     "program",
     "read_inputs",
     "sensitivities",
     "simulate",
     "simulate_many",
+    "stop_names",
+    "stroboscopic",
     "taylor_order",
 ]

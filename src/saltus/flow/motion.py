@@ -11,6 +11,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow.dense_output import DenseOutput
+from saltus.flow.stops import Stop
 from saltus.flow.validity import Validity, ValidityCheck
 from saltus.systems import System
 
@@ -18,14 +19,6 @@ if TYPE_CHECKING:
     import xarray
 
     from saltus.flow.recorder import Events
-
-
-class Stop(StrEnum):
-    """Why a motion ended."""
-
-    HORIZON = "horizon"  # the time asked for
-    REST = "rest"  # the time asked for, at rest
-    LIMIT = "limit"  # a margin of the model reached zero
 
 
 class EventKind(StrEnum):

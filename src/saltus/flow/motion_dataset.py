@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.provenance import provenance
+
 if TYPE_CHECKING:
     import xarray
 
@@ -15,10 +17,8 @@ SAMPLES = 200  # a forcing period
 
 
 def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
-    """The sampled states over `time`, the impacts over `crossing`, and in the attributes all that repeats the motion."""
+    """The sampled states over `time`, the impacts over `impact`, and in the attributes all that repeats the motion."""
     import xarray
-
-    from saltus import __version__
 
     period = motion.system.load.period
     if times is None and motion.samples is not None:
@@ -29,19 +29,17 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
     names = motion.system.model.coordinates
     dataset = xarray.Dataset(coords={"time": ("time", times, {"units": "1", "long_name": "dimensionless time tau"})})
     for i, name in enumerate(names):
-        unit = "rad" if name.startswith("theta") else "1"
+        unit = motion.system.model.unit_of(name)
         rate = "velocity" if len(names) == 1 else f"{name}_velocity"
         dataset[name] = ("time", position[i], {"units": unit})
         dataset[rate] = ("time", velocity[i], {"units": unit, "long_name": f"d {name} / d tau"})
     dataset["side"] = ("time", side.astype(np.int8), {"units": "1", "long_name": "side, 0 at rest"})
     impacts = motion.impacts
     for name in ("time", "velocity_before", "velocity_after"):
-        dataset[f"impact_{name}"] = ("impact", getattr(impacts, name), {"units": "1"})
-    dataset.attrs = {
-        "title": "motion computed by saltus",
-        "saltus_version": __version__,
-        "system": motion.system.to_json(),
-        "tol": motion.tol,
+        unit = "1" if name == "time" else motion.system.model.unit_of(names[0])
+        dataset[f"impact_{name}"] = ("impact", getattr(impacts, name), {"units": unit})
+    dataset.attrs = {"title": "motion computed by saltus"} | provenance(motion.system, tol=motion.tol)
+    dataset.attrs |= {
         "stop": motion.stop.value + (f" ({motion.limit})" if motion.limit else ""),
         "end_time": motion.time,
         "phase_known": str(motion.phase_known),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +11,10 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow import kernel_layout as k
-from saltus.flow.motion import EventKind, Motion, Stop
+from saltus.flow.motion import EventKind, Motion
 from saltus.flow.simulation import Followed, follow
+from saltus.flow.stops import Stop
+from saltus.progress import Progress, silent
 from saltus.systems import System
 from saltus.taylor import FREQUENCY
 
@@ -62,7 +64,7 @@ def sensitivities(
     side: int | None = None,
     stop_at: Iterable[str] = (),
     dense: bool = True,
-    progress: Callable[[float], object] | None = None,
+    progress: Progress = silent,
     **coordinates: float,
 ) -> Sensitivities:
     """The derivatives of an exact motion to its initial state and to parameters, with the saltation of every event.

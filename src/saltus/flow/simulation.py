@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,11 +14,14 @@ from saltus.errors import MotionError, ParameterError, near
 from saltus.flow import kernel_layout as k
 from saltus.flow.compiled import Structure, load_kernel, load_structure
 from saltus.flow.forcing_time import clock
-from saltus.flow.motion import Motion, Stop
+from saltus.flow.motion import Motion
 from saltus.flow.recorder import Recorder
+from saltus.flow.stops import Stop
+from saltus.progress import Progress, silent
 from saltus.systems import Model, Record, System, children, is_number, numbers
 from saltus.taylor import Trace, record_table, trace
 
+WHAT = "following the motion"  # for the progress
 MOST_EVENTS = 20_000_000  # that are kept
 MOST_IMPACTS = 1_000_000  # of a unit of time: beyond them an accumulation of impacts is not being resolved but endured
 
@@ -76,7 +79,7 @@ def simulate(
     stop_at: Iterable[str] = (),
     dense: bool = True,
     samples: Any = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Progress = silent,
     **coordinates: float,
 ) -> Motion:
     """The exact motion of a system from a state, event by event, by Taylor series.
@@ -91,7 +94,7 @@ def simulate(
         stop_at: margins of the model that end the motion, such as "kinematic_limit"; its own `stops` always do.
         dense: keep the motion between the events; False keeps the events alone.
         samples: times at which to keep the states instead, for a motion too long to be kept whole.
-        progress: called with the fraction done, now and then.
+        progress: called with the fraction done and what is being done, now and then.
         coordinates: the state at the start by the model's names: theta=0.3, or x=0.0 for a wall oscillator.
 
     Raises:
@@ -138,7 +141,7 @@ def follow(
     stop_at: Iterable[str],
     dense: bool,
     samples: Any,
-    progress: Callable[[float], object] | None,
+    progress: Progress,
     coordinates: dict[str, float],
 ) -> Followed:
     """`simulate`, and its tangent if `sensitivities` is not None."""
@@ -287,18 +290,19 @@ def _advance(
     state: np.ndarray,
     settings: np.ndarray,
     recorder: Recorder,
-    progress: Callable[[float], object] | None,
+    progress: Progress,
 ) -> int:
     """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended."""
     advance, begin = load_kernel(), _global_time(where, state, settings)
     end = where[k.LAST] * settings[k.LENGTH] + settings[k.END]
     looked_at, counted, unit = begin, 0, min(settings[k.LENGTH] or 1.0, 1.0)
+    progress(0.0, WHAT)
     while True:
         status = advance(where, state, settings, run.env, run.model, recorder.steps, recorder.events)
         recorder.take(where)
         time = _global_time(where, state, settings)
-        if progress is not None and end > begin:
-            progress((time - begin) / (end - begin))
+        if end > begin:
+            progress((time - begin) / (end - begin), WHAT)
         if status not in (k.FULL, k.PAUSED):
             _refuse(system, status, where, state, settings)
             return status

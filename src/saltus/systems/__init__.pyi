@@ -3,6 +3,7 @@ from .impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduc
 from .load import Channel, Load
 from .metainterface import Metainterface
 from .model import Model
+from .parameter_tables import broadcast_arrays, check_parameters, finite_array, parameter_table
 from .parameters import children, is_number, numbers, substitute
 from .registry import IMPACTS, MODELS, register
 from .reversed import reversed_system
@@ -42,11 +43,15 @@ __all__ = [
     "UnitCell",
     "VelocityReduction",
     "WallOscillator",
+    "broadcast_arrays",
+    "check_parameters",
     "children",
+    "finite_array",
     "is_number",
     "name_impact",
     "numbers",
     "other_impulse",
+    "parameter_table",
     "register",
     "reversed_system",
     "substitute",

@@ -114,7 +114,7 @@ class _Many:
         found = np.zeros(len(states), dtype=int)
         here = np.flatnonzero(np.isfinite(states).all(axis=1))
         if here.size and self.system.load.frequency is not None:
-            found[here] = self._follow(states, LOOK_BACK, ("settled",), here)["cycle"].values
+            found[here] = self._follow(states, LOOK_BACK, ("settled",), here)["recurrence_period"].values
         return found
 
     @property

@@ -113,7 +113,7 @@ class _Follower:
         numbers, labels = np.zeros((here.size, 4)), np.zeros((here.size, 4), dtype=np.int64)
         numbers[:, 0], numbers[:, 1], numbers[:, 2] = j * span, self._lengths[here], (j + 1) * span
         jobs = Jobs(self._rows[here], numbers, labels, {c: values[here] for c, values in self._columns.items()})
-        ends = self._lanes.run(jobs, 1, None, 0.0)
+        ends = self._lanes.run(jobs, 1)
         rows, growth = _orthonormal(ends.states)
         sound = (ends.labels[:, 0] == k.DONE) & np.isfinite(rows).all(axis=1) & (ends.labels[:, 2] != k.CHATTER)
         self._rows[here] = rows

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from saltus.flow.ensemble.inputs import Inputs, read_inputs
 from saltus.flow.ensemble.threads import Jobs, Lanes, available_cores
 from saltus.flow.forcing_time import Clock, clock
 from saltus.flow.simulation import Program, check_gap, limits_of, program
+from saltus.progress import Progress, silent
 from saltus.systems import System, numbers
 from saltus.taylor import Emitter
 
@@ -43,7 +44,7 @@ def simulate_many(
     until: Iterable[str] = (),
     sensitivities: Iterable[str] | None = None,
     threads: int | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Progress = silent,
     **coordinates: Any,
 ) -> xarray.Dataset:
     """Exact trajectories from many states and with many parameters, as `simulate` follows each, and many times as fast.
@@ -72,7 +73,7 @@ def simulate_many(
             at the start is fixed, and at the end too, but that n periods asked for end at time + n 2 pi / W, which moves with
             "load.frequency" W, also where a trajectory has settled; and that a margin's end moves with it.
         threads: how many cores to use; by default all.
-        progress: called with the fraction done, ten times a second.
+        progress: called with the fraction done and what is being done, ten times a second.
         coordinates: the state at the start by the model's names: theta=..., or x=... for a wall oscillator.
 
     Returns:

@@ -10,6 +10,8 @@ import numpy as np
 
 from saltus.flow import kernel_layout as k
 from saltus.flow.ensemble import lane_layout as at
+from saltus.flow.stops import Stop
+from saltus.provenance import provenance
 from saltus.taylor import FREQUENCY
 
 if TYPE_CHECKING:
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 
     from saltus.flow.ensemble.inputs import Inputs
     from saltus.flow.ensemble.threads import Ends, Jobs
-    from saltus.systems import System
+    from saltus.systems import Model, System
 
 # Which columns of the driver's samples a name of `sample` keeps, for so many coordinates.
 KEPT: dict[str, Callable[[int], list[int]]] = {
@@ -26,38 +28,22 @@ KEPT: dict[str, Callable[[int], list[int]]] = {
     "speed": lambda own: [2 * own + 2],
     "impact_count": lambda own: [2 * own + 3],
 }
-# Why a trajectory ended: the driver's reason, and its name.
 STOPS = {
-    k.DONE: "horizon",
-    -1: "rest",  # the time asked for, at rest
-    k.LIMITED: "limit",
-    at.CAPTURED: "captured",
-    at.SETTLED: "settled",
-    k.NOT_UNIQUE: "not_unique",
-    k.NO_IMPACT: "no_impact",
-    k.NOT_FINITE: "not_finite",
-    k.STALLED: "stalled",
-    at.OUTSIDE: "outside",
-    at.UNRESOLVED: "unresolved",
-}
-MEANINGS = {
-    "horizon": "the time asked for",
-    "rest": "the time asked for, at rest",
-    "limit": "a margin of the model reached zero",
-    "captured": "proved to be captured at rest for all later loads",
-    "settled": "repeats itself every `cycle` forcing periods",
-    "not_unique": "the motion from rest at contact is not unique",
-    "no_impact": "the impact law has no velocity after the impact",
-    "not_finite": "the motion leaves the range of numbers",
-    "stalled": "the acceleration is singular",
-    "outside": "the state at the start lies beyond the contact",
-    "unresolved": "impacts accumulate too slowly to be followed: more than a million in a unit of time",
-}
-
+    k.DONE: Stop.HORIZON,
+    k.LIMITED: Stop.LIMIT,
+    at.CAPTURED: Stop.CAPTURED,
+    at.SETTLED: Stop.SETTLED,
+    k.NOT_UNIQUE: Stop.NOT_UNIQUE,
+    k.NO_IMPACT: Stop.NO_IMPACT,
+    k.NOT_FINITE: Stop.NOT_FINITE,
+    k.STALLED: Stop.STALLED,
+    at.OUTSIDE: Stop.OUTSIDE,
+    at.UNRESOLVED: Stop.UNRESOLVED,
+}  # by the driver's reason; a motion that is DONE at rest ends with Stop.REST
 
 # What a dataset has besides the coordinates and velocities of the model and what is called after those.
 FIXED = (
-    *("time", "side", "stop", "limit", "cycle", "impact_count", "grazings", "periods", "chatter_speed", "derivative"),
+    *("time", "side", "stop", "limit", "recurrence_period", "impact_count", "grazings", "periods", "chatter_speed", "derivative"),
     *("least_speed", "overall_least_speed", "period_impact_count", "start_time"),
 )
 DIMENSIONS = ("period", "state", "column")
@@ -97,21 +83,13 @@ def to_dataset(system: System, inputs: Inputs, wanted: Wanted, jobs: Jobs, ends:
     """The ends of all trajectories and what was sampled of them."""
     import xarray
 
-    from saltus import __version__
-
-    writer = _Writer(system.model.coordinates, inputs)
+    writer = _Writer(system.model, inputs)
     _add_ends(writer, jobs, ends)
     _add_stops(writer, ends, wanted)
     _add_samples(writer, ends, wanted.sample)
     if wanted.paths is not None:
         _add_derivatives(writer, jobs, ends, wanted.paths, wanted.periods)
-    attributes: dict[str, Any] = {
-        "title": "ensemble computed by saltus",
-        "saltus_version": __version__,
-        "system": system.to_json(),
-        "tol": wanted.tol,
-        "Conventions": "CF-1.8",
-    }
+    attributes = {"title": "ensemble computed by saltus"} | provenance(system, tol=wanted.tol, Conventions="CF-1.8")
     attributes |= _add_inputs(writer, inputs)
     return xarray.Dataset(writer.variables, writer.coords, attributes)
 
@@ -119,8 +97,10 @@ def to_dataset(system: System, inputs: Inputs, wanted: Wanted, jobs: Jobs, ends:
 class _Writer:
     """Collects variables over the dimensions of an ensemble."""
 
-    def __init__(self, names: tuple[str, ...], inputs: Inputs) -> None:
-        self.names, self.rates = names, tuple(rate_name(name, names) for name in names)
+    def __init__(self, model: Model, inputs: Inputs) -> None:
+        self.names = names = model.coordinates
+        self.rates = tuple(rate_name(name, names) for name in names)
+        self.units = dict(zip((*names, *self.rates), 2 * [model.unit_of(name) for name in names], strict=True))
         self.dims, self.shape, self.coords = inputs.dims, inputs.shape, dict(inputs.coords)
         self.variables: dict[str, Any] = {}
 
@@ -138,7 +118,7 @@ def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends) -> None:
     """The states at the end, and what happened until then."""
     rows = jobs.states.shape[1] // 2
     for i, (name, rate) in enumerate(zip(writer.names, writer.rates, strict=True)):
-        unit = _unit(name)
+        unit = writer.units[name]
         writer.add(name, ends.states[:, i], unit, f"{name} at the end")
         writer.add(rate, ends.states[:, rows + i], unit, f"d {name} / d tau at the end")
     lengths, legs = jobs.numbers[:, 1], ends.labels[:, 4] - jobs.labels[:, 0]  # legs that were ended
@@ -163,9 +143,7 @@ def _add_inputs(writer: _Writer, inputs: Inputs) -> dict[str, float]:
         if not np.ndim(values):
             single[where] = float(values)
         elif not _is_coordinate(name if parameter else f"initial_{name}", values, inputs):
-            writer.add(
-                where, values, "1" if parameter else _unit(name), f"parameter {name}" if parameter else f"{name} at the start"
-            )
+            writer.add(where, values, writer.units.get(name, "1"), f"parameter {name}" if parameter else f"{name} at the start")
     return single
 
 
@@ -177,25 +155,21 @@ def _is_coordinate(name: str, values: np.ndarray, inputs: Inputs) -> bool:
     return bool(np.array_equal(whole.values.reshape(-1), values))
 
 
-def _unit(name: str) -> str:
-    return "rad" if name.startswith("theta") else "1"
-
-
 def _add_stops(writer: _Writer, ends: Ends, wanted: Wanted) -> None:
     """Why each trajectory ended."""
-    reasons = ends.labels[:, 0].copy()
-    reasons[(reasons == k.DONE) & (ends.labels[:, 2] == k.REST)] = -1
+    reasons, members = ends.labels[:, 0], tuple(Stop)
     codes = np.full(reasons.shape, -1, dtype=np.int8)
-    for code, reason in enumerate(STOPS):
-        codes[reasons == reason] = code
-    comment = "; ".join(f"{name}: {MEANINGS[name]}" for name in STOPS.values())
-    writer.add("stop", codes, "1", "why it ended", **_flags(tuple(STOPS.values())), comment=comment)
+    for reason, stop in STOPS.items():
+        codes[reasons == reason] = members.index(stop)
+    codes[(reasons == k.DONE) & (ends.labels[:, 2] == k.REST)] = members.index(Stop.REST)
+    comment = "; ".join(f"{stop}: {stop.meaning}" for stop in Stop)
+    writer.add("stop", codes, "1", "why it ended", **_flags(members), comment=comment)
     if wanted.limits:
         which = np.where(reasons == k.LIMITED, ends.labels[:, 1], -1).astype(np.int8)
         writer.add("limit", which, "1", "the margin that ended it, -1 for none", **_flags(wanted.limits))
     if "settled" in wanted.until:
-        cycle = np.where(reasons == at.SETTLED, ends.labels[:, 1], 0)
-        writer.add("cycle", cycle, "1", "forcing periods after which it repeats itself, 0 where it has not settled")
+        period = np.where(reasons == at.SETTLED, ends.labels[:, 1], 0)
+        writer.add("recurrence_period", period, "1", "forcing periods after which it repeats itself, 0 where it has not settled")
 
 
 def _flags(names: tuple[str, ...]) -> dict[str, Any]:
@@ -212,23 +186,28 @@ def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
     samples[missing] = np.nan
     first, column = writer.names[0], 0
     slowest = "the least speed before an impact, inf without impacts"
-    texts = {
-        "state": [(f"sampled_{name}", f"{name} at the end of the forcing period") for name in (*writer.names, *writer.rates)],
-        "extrema": [(f"{which}_{first}", f"the {which} {first} in the forcing period") for which in ("largest", "smallest")],
-        "speed": [("least_speed", f"{slowest}, in the forcing period")],
-        "impact_count": [("period_impact_count", "impacts in the forcing period")],
+    unit = writer.units[first]
+    variables = {
+        "state": [
+            (f"sampled_{n}", writer.units[n], f"{n} at the end of the forcing period") for n in (*writer.names, *writer.rates)
+        ],
+        "extrema": [
+            (f"{which}_{first}", unit, f"the {which} {first} in the forcing period") for which in ("largest", "smallest")
+        ],
+        "speed": [("least_speed", unit, f"{slowest}, in the forcing period")],
+        "impact_count": [("period_impact_count", "1", "impacts in the forcing period")],
     }
     for name in KEPT:
         if name in sample:
-            for variable, text in texts[name]:
-                writer.add(variable, np.ascontiguousarray(samples[:, :, column]), "1", text, "period")
+            for variable, its_unit, text in variables[name]:
+                writer.add(variable, np.ascontiguousarray(samples[:, :, column]), its_unit, text, "period")
                 column += 1
     if "extrema" in sample:
         for i, which in enumerate(("largest", "smallest")):
             text = f"the {which} {first} from the start to the end"
-            writer.add(f"overall_{which}_{first}", ends.numbers[:, 2 + i], _unit(first), text)
+            writer.add(f"overall_{which}_{first}", ends.numbers[:, 2 + i], unit, text)
     if "speed" in sample:
-        writer.add("overall_least_speed", ends.numbers[:, 4], "1", f"{slowest}, from the start to the end")
+        writer.add("overall_least_speed", ends.numbers[:, 4], unit, f"{slowest}, from the start to the end")
 
 
 def _add_derivatives(writer: _Writer, jobs: Jobs, ends: Ends, paths: tuple[str, ...], periods: float | None) -> None:

@@ -10,9 +10,7 @@ import numpy as np
 
 from saltus.errors import ParameterError, near
 from saltus.flow.ensemble.ensemble_dataset import rate_name, result_names
-from saltus.systems import System, numbers
-
-MOST_CHECKED = 200  # rows of parameters; of more, those with a least or largest value and as many more, evenly
+from saltus.systems import System, broadcast_arrays, check_parameters, finite_array, numbers, parameter_table
 
 
 @dataclass(frozen=True)
@@ -44,52 +42,11 @@ def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coord
             that the system refuses, dimensions and coordinates with the name of a result.
     """
     given = parameter_table(system, parameters)
-    arrays = {name: numeric(name, value) for name, value in (_starts(system, velocity, time, coordinates) | given).items()}
-    dims, shape, coords, together = broadcast(arrays)
-    check_parameters(system, broadcast({path: arrays[path] for path in given})[3])
+    arrays = {name: finite_array(name, value) for name, value in (_starts(system, velocity, time, coordinates) | given).items()}
+    dims, shape, coords, together = broadcast_arrays(arrays)
+    check_parameters(system, broadcast_arrays({path: arrays[path] for path in given})[3])
     _check_names(system, dims, coords, arrays, given)
     return Inputs(dims, shape, coords, together, tuple(given))
-
-
-def parameter_table(system: System, parameters: Any) -> dict[str, Any]:
-    """The parameters as given, by path; each path leads to a number of the system.
-
-    Raises:
-        ParameterError: no mapping, or a path that leads elsewhere.
-    """
-    if parameters is None:
-        return {}
-    if not isinstance(parameters, Mapping):
-        raise ParameterError(f"parameters must be arrays by dotted path, such as {{'load.frequency': ...}}, got {parameters!r}")
-    known = [path for path, _ in numbers(system)]
-    for path in parameters:
-        if path not in known:
-            system.get(str(path))  # refuses what leads nowhere
-            raise ParameterError(f"{path} is not a number, so it cannot be varied; {near(str(path), known)}")
-    return dict(parameters)
-
-
-def check_parameters(system: System, columns: Mapping[str, np.ndarray]) -> None:
-    """Refuse values that the system refuses, row by row.
-
-    Raises:
-        ParameterError: of the system; or orders of harmonics that are not whole.
-    """
-    for path, values in columns.items():
-        if path.endswith(".order") and not np.equal(values, np.round(values)).all():
-            raise ParameterError(f"{path} must be whole numbers")
-    if columns and all(a.size for a in columns.values()):
-        rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(a) for a in columns.values())), axis=1)
-        for i in _chosen(rows):
-            system.with_(dict(zip(columns, rows[i].tolist(), strict=True)))
-
-
-def _chosen(rows: np.ndarray) -> Iterable[int]:
-    """All rows, or where they are many the extreme ones and some between."""
-    if len(rows) <= MOST_CHECKED:
-        return range(len(rows))
-    even = np.linspace(0, len(rows) - 1, MOST_CHECKED).astype(int)
-    return np.unique(np.concatenate([rows.argmin(axis=0), rows.argmax(axis=0), even])).tolist()
 
 
 def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, Any]) -> dict[str, Any]:
@@ -107,78 +64,6 @@ def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, 
     starts = {name: coordinates[name] for name in names}
     starts |= {rate_name(name, names): speed for name, speed in zip(names, speeds, strict=True)}
     return starts | {"time": time}
-
-
-def numeric(name: str, given: Any) -> Any:
-    """A DataArray or an array of finite numbers."""
-    import xarray
-
-    try:
-        if np.iscomplexobj(given):
-            raise TypeError
-        array = given.astype(float) if isinstance(given, xarray.DataArray) else np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} must be a number or an array of numbers, got {given!r}") from None
-    if not np.isfinite(array).all():
-        raise ParameterError(f"{name} must be finite; it holds nan or inf")
-    return array
-
-
-def broadcast(arrays: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int, ...], dict[str, Any], dict[str, np.ndarray]]:
-    """The dimensions of arrays together, the shape, the coordinates, and each array flat or as one number."""
-    import xarray
-
-    named = {name: a for name, a in arrays.items() if isinstance(a, xarray.DataArray) and a.ndim}
-    plain = {name: np.asarray(a) for name, a in arrays.items() if name not in named}
-    many = [name for name, a in plain.items() if a.ndim]
-    if named and many:
-        raise ParameterError(f"{min(named)} has named dimensions and {many[0]} has not; give DataArrays or arrays, not both")
-    if named:
-        together = _aligned(named)
-        dims, shape = next((tuple(str(d) for d in a.dims), a.shape) for a in together.values())
-        flat = {name: a.values.reshape(-1) for name, a in together.items()} | plain
-        return dims, shape, _coords(named, dims), {name: flat[name] for name in arrays}
-    try:
-        shape = np.broadcast_shapes(*(a.shape for a in plain.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {plain[name].shape}" for name in many)
-        raise ParameterError(f"the arrays do not broadcast together: {shapes}") from None
-    dims = ("trajectory",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
-    return dims, shape, {}, {name: np.broadcast_to(a, shape).reshape(-1) if a.ndim else a for name, a in plain.items()}
-
-
-def _aligned(named: dict[str, Any]) -> dict[str, Any]:
-    """DataArrays over all of their dimensions, in one order."""
-    import xarray
-
-    try:
-        together = xarray.broadcast(*xarray.align(*named.values(), join="exact"))
-    except ValueError:
-        raise ParameterError(
-            f"the DataArrays ({', '.join(named)}) have dimensions of the same name with other lengths or coordinates; "
-            "give such dimensions different names"
-        ) from None
-    return dict(zip(named, together, strict=True))
-
-
-def _coords(named: dict[str, Any], dims: tuple[str, ...]) -> dict[str, Any]:
-    """The coordinates of DataArrays; an array along a dimension of its own name is the dimension's coordinate.
-
-    As in xarray's arithmetic, those on which two arrays do not agree are left out.
-    """
-    coords: dict[str, Any] = {}
-    unlike = set()
-    for array in named.values():
-        for name, values in array.coords.items():
-            if name in dims and name not in array.dims:
-                continue  # one value of what is a dimension here
-            if name in coords and not coords[name].variable.equals(values.variable):
-                unlike.add(name)
-            coords[str(name)] = values
-    for name, array in named.items():
-        if array.dims in ((name,), (f"initial_{name}",)):
-            coords.setdefault(str(array.dims[0]), array.copy().assign_coords({array.dims[0]: array.values}))
-    return {name: values.reset_coords(drop=True) for name, values in coords.items() if name not in unlike}
 
 
 def _check_names(

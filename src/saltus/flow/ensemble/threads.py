@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Any
@@ -17,9 +17,11 @@ from saltus.flow.compiled import Pointer
 from saltus.flow.ensemble import lane_layout as at
 from saltus.flow.ensemble.compiled_lanes import load_advance, load_driver, load_helpers
 from saltus.flow.simulation import Program, taylor_order
+from saltus.progress import Progress, silent
 from saltus.taylor import CACHE_LINE, WIDTH, Slots
 
 CHUNK = 1024  # trajectories that one call of the driver runs: some milliseconds a forcing period
+WHAT = "following the motions"  # for the progress
 PATIENCE = 0.1  # seconds between looks at Ctrl-C and at the progress
 
 
@@ -68,7 +70,7 @@ class Lanes:
     watch: bool  # whether extrema are recorded
     settle: bool  # whether a trajectory ends when it has settled on a cycle
 
-    def run(self, jobs: Jobs, threads: int, progress: Callable[[float], object] | None, total: float) -> Ends:
+    def run(self, jobs: Jobs, threads: int, progress: Progress = silent, total: float = 0.0) -> Ends:
         """Run all jobs; `total` is how many forcing periods they are, for the progress.
 
         Raises:
@@ -84,20 +86,20 @@ class Lanes:
         controls = [np.zeros(2, dtype=np.int64) for _ in range(threads)]
         chunks, lock = iter(range(0, n, CHUNK)), threading.Lock()
         load_driver(), load_helpers(), load_advance()  # compiled here, not by each thread
+        progress(0.0, WHAT)
         with ThreadPoolExecutor(threads) as pool:
             try:  # an interrupt while they are begun must stop them too, or the pool would wait for their end
                 workers = [pool.submit(self._work, jobs, ends, chunks, lock, control) for control in controls]
                 while wait(workers, PATIENCE).not_done:
-                    if progress is not None and total > 0:
-                        progress(min(1.0, sum(int(c[1]) for c in controls) / total))
+                    if total > 0:
+                        progress(min(1.0, sum(int(c[1]) for c in controls) / total), WHAT)
             except BaseException:
                 for control in controls:
                     control[0] = 1
                 raise
             for worker in workers:
                 worker.result()
-        if progress is not None:
-            progress(1.0)
+        progress(1.0, WHAT)
         return ends
 
     @property

@@ -144,8 +144,8 @@ def _follow(task: Task, tracks: Tracks, periods: int, motions: list[np.ndarray])
     ends = _simulate(task, tracks, periods)
     name, stops = task.system.model.coordinates[0], ends.stop.attrs["flag_meanings"].split()
     captured = np.isin(ends["stop"].values, [stops.index("captured"), stops.index("rest")])
-    settled = (ends["cycle"].values > 0) & (ends["cycle"].values <= task.max_period) & ~captured
-    kept = np.where(settled, ends["cycle"].values, task.max_period)  # of the last forcing periods
+    settled = (ends["recurrence_period"].values > 0) & (ends["recurrence_period"].values <= task.max_period) & ~captured
+    kept = np.where(settled, ends["recurrence_period"].values, task.max_period)  # of the last forcing periods
     window = np.arange(ends.sizes["period"])[::-1] < kept[:, None]
     extremes = [np.nanmax(np.where(window, side, np.nan), axis=1, initial=-np.inf) for side in (
         ends[f"largest_{name}"].values, -ends[f"smallest_{name}"].values)]  # fmt: skip

@@ -13,6 +13,7 @@ from saltus.attractors import largest_exponents
 from saltus.checks import check_count
 from saltus.flow import simulate_many
 from saltus.orbits import REGION, check_region, initial_states
+from saltus.progress import silent
 from saltus.studies.checks import check_diagram
 from saltus.systems import System
 
@@ -213,13 +214,13 @@ class _Search:
             sample=("state", "extrema"),
             last=KEPT,
             tol=TOLERANCE,
-            progress=progress,
+            progress=silent if progress is None else lambda done, _: progress(done),
         )
         stop = np.array(result["stop"].attrs["flag_meanings"].split())[result["stop"].values]
         strobes = np.stack([result[f"sampled_{name}"].values, result["sampled_velocity"].values], axis=-1)
         peaks = np.maximum(np.abs(result[f"largest_{name}"].values), np.abs(result[f"smallest_{name}"].values))
         moving = (stop == "horizon") & (result["side"].values != 0)
-        shown = np.where(moving, KEPT, np.maximum(result["cycle"].values, 1))  # of what has settled its cycle alone
+        shown = np.where(moving, KEPT, np.maximum(result["recurrence_period"].values, 1))  # of what has settled its cycle alone
         early = np.arange(strobes.shape[2]) < strobes.shape[2] - shown[..., None]
         strobes[early], peaks[early] = np.nan, np.nan
         return _Ends(moving, strobes, peaks)
