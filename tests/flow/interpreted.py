@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 
-from saltus.flow.compiled import MARKER
 from saltus.systems.parameters import numbers
 from saltus.taylor import records
+from saltus.taylor.cache import MARKER
 from saltus.taylor.scalar_source import Emitter
 from saltus.taylor.tracing import record_table, trace
 

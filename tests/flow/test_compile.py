@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from saltus.flow import compiled as compilation
-from saltus.flow.compiled import cache_directory, load_kernel, load_structure
+from saltus.flow.compiled import load_kernel, load_structure
 from saltus.systems import Harmonic, Load, System, WallOscillator
+from saltus.taylor.cache import cache_directory
 from saltus.taylor.tracing import trace
 
 SYSTEM = System(model=WallOscillator(damping=0.1), load=Load(force=-0.125))
@@ -103,7 +104,7 @@ def sources(monkeypatch):
     """The texts handed to the compiler, without compiling them."""
     texts = []
 
-    def keep(kind, text, header):
+    def keep(kind, text):
         texts.append(text)
         raise LookupError
 

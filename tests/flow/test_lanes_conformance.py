@@ -151,7 +151,7 @@ def test_every_impact_law_runs_in_lanes_where_the_model_takes_it(model, impact):
 
 
 def test_numbers_that_change_compile_nothing(ready):
-    from saltus.flow.compiled import cache_directory
+    from saltus.taylor.cache import cache_directory
 
     system, states, velocity = ready
     saltus.simulate_many(system, **states, velocity=velocity, periods=0.1)

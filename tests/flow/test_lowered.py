@@ -10,9 +10,10 @@ import pytest
 from interpreted import Interpreted
 from test_emit import LAYERS, LOAD, OPERATIONS, SYSTEMS
 
-from saltus.flow.compiled import HEADER, MARKER
+from saltus.flow.compiled import HEADER
 from saltus.systems import Load, Metainterface, Model, Record, System
 from saltus.taylor import records
+from saltus.taylor.cache import MARKER
 
 PYTHON = """
 from saltus.taylor.llvm_lowering import lowered_jit as _lowered_jit

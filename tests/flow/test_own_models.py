@@ -9,10 +9,10 @@ import pytest
 
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.flow.compiled import cache_directory
 from saltus.flow.simulation import _structures
 from saltus.systems import Harmonic, Load, Model, System, VelocityReduction, WallOscillator
 from saltus.systems.registry import MODELS, register
+from saltus.taylor.cache import cache_directory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

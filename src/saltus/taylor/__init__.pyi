@@ -1,6 +1,7 @@
+from .cache import cache_directory, compiled_part, digest, is_compiled, load_module, module_name
 from .derivatives import FREQUENCY
 from .graph import Expr, differentiate, number, ordered, substitute
-from .private_numba import ADVANCE, IMPACT_EQUATIONS, SEGMENTS, inline_jit, jit, lean_jit, not_here
+from .private_numba import ADVANCE, IMPACT_EQUATIONS, SEGMENTS, Pointer, inline_jit, jit, lean_jit, not_here
 from .records import anchor, expand_record
 from .scalar_source import Emitter
 from .tracing import Trace, record_table, trace
@@ -39,23 +40,30 @@ __all__ = [
     "WIDTH",
     "Emitter",
     "Expr",
+    "Pointer",
     "Slots",
     "Trace",
     "absolute",
     "anchor",
     "bits",
+    "cache_directory",
+    "compiled_part",
     "differentiate",
+    "digest",
     "expand_record",
     "first_lane",
     "fma",
     "inline_jit",
+    "is_compiled",
     "jit",
     "lane_count",
     "lean_jit",
     "load",
+    "load_module",
     "mask",
     "maximum",
     "minimum",
+    "module_name",
     "not_here",
     "number",
     "ordered",

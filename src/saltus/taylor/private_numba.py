@@ -59,6 +59,22 @@ def pointed_jit(signature: Any, fused: bool = True, python: bool = False) -> Cal
     return _kept(signature, {"_nrt": False, "no_cpython_wrapper": not python, **OPTIONS} | ({} if fused else {"fastmath": False}))
 
 
+class Pointer(types.WrapperAddressProtocol):
+    """A compiled function as an argument for another one; its address is looked up once, not at every call."""
+
+    def __init__(self, function: Any) -> None:
+        (self._signature,) = function.nopython_signatures
+        result = function.get_compile_result(self._signature)
+        self._address = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
+
+    def __wrapper_address__(self) -> int:
+        return int(self._address)
+
+    def signature(self) -> Any:
+        """The function's numba signature."""
+        return self._signature
+
+
 def not_here(signature: Any, **options: Any) -> Callable[[Any], Any]:
     """Stands for `cached_jit` where a text is only read or imported for its constants, and compiled elsewhere."""
     return lambda function: function

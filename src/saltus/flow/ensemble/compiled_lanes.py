@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import subprocess
 import sys
 from collections.abc import Callable
@@ -9,7 +10,6 @@ from functools import cache
 
 from saltus.flow import kernel_layout as scalar_layout
 from saltus.flow import roots
-from saltus.flow.compiled import Pointer, body, is_compiled, load_module, module_name
 from saltus.flow.ensemble import driver
 from saltus.flow.ensemble import forcing_periods as legs
 from saltus.flow.ensemble import lane_layout as layout
@@ -17,7 +17,19 @@ from saltus.flow.ensemble import lane_steps as steps
 from saltus.flow.ensemble import sampling as observe
 from saltus.flow.ensemble import scalar_fallback as alone
 from saltus.flow.ensemble import scalar_handoff as visits
-from saltus.taylor import Emitter, Slots, Trace, records, series
+from saltus.taylor import (
+    Emitter,
+    Pointer,
+    Slots,
+    Trace,
+    compiled_part,
+    digest,
+    is_compiled,
+    load_module,
+    module_name,
+    records,
+    series,
+)
 from saltus.taylor import rules as recurrences
 from saltus.taylor import vector_code as writer
 from saltus.taylor import vector_functions as emit
@@ -40,19 +52,19 @@ from saltus.taylor.vectors import *
 @cache
 def load_driver() -> Callable[..., None]:
     """The driver of all lanes, `run_lanes` of `driver.py`; it works without Python's lock."""
-    run = load_module("lanes", _driver_text(), _header()).run_lanes
+    run = load_module("lanes", _driver_text()).run_lanes
     (result,) = run.overloads.values()
     entry: Callable[..., None] = result.entry_point
     return entry
 
 
 def _driver_text() -> str:
-    return "".join(body(text) for text in (scalar_layout, layout, records, steps, observe, legs, driver))
+    return _header() + "".join(compiled_part(text) for text in (scalar_layout, layout, records, steps, observe, legs, driver))
 
 
 def compile_driver_aside() -> subprocess.Popen[bytes] | None:
     """Where the driver is not on disk yet, a process that compiles it, as this one has much else to compile; else None."""
-    if load_driver.cache_info().currsize or is_compiled(module_name("lanes", _driver_text(), _header())):
+    if load_driver.cache_info().currsize or is_compiled(module_name("lanes", _driver_text())):
         return None
     try:
         found = f"import sys; sys.path[:] = {sys.path!r}; "  # as this process has come to know it
@@ -65,23 +77,20 @@ def compile_driver_aside() -> subprocess.Popen[bytes] | None:
 def load_helpers() -> tuple[Pointer, ...]:
     """What the driver calls for one lane: `lane_root`, `turning_range` and `visit`."""
     texts = (scalar_layout, layout, roots, alone, visits)
-    module = load_module("visits", "".join(body(text) for text in texts), _header())
+    module = load_module("visits", _header() + "".join(compiled_part(text) for text in texts))
     return tuple(Pointer(getattr(module, name)) for name in ("lane_root", "turning_range", "visit"))
 
 
 def load_lane_functions(trace: Trace, emitter: Emitter) -> tuple[Slots, tuple[Pointer, ...]]:
     """A structure's memory and its functions for lanes; `emitter` has written its scalar ones."""
-    module = load_module("lane", emit.source(trace, emitter), _header())
+    module = load_module("lane", _header() + emit.source(trace, emitter))
     return module.SLOTS, tuple(Pointer(getattr(module, f"lane_{name}")) for name in ("series", "impact", "field"))
 
 
 def _header() -> str:
     """The generated file's first lines; it changes with what writes the code that the file only names."""
-    import hashlib
-    import inspect
-
     written_by = "".join(inspect.getsource(module) for module in (vector, writer, series, recurrences, emit, layout))
-    return HEADER + f"# {vector.WIDTH} lanes, written by {hashlib.sha256(written_by.encode()).hexdigest()[:20]}\n"
+    return HEADER + f"# {vector.WIDTH} lanes, written by {digest(written_by)}\n"
 
 
 @cache
