@@ -1,6 +1,18 @@
 from .cache import cache_directory, compiled_part, digest, is_compiled, load_module, module_name
 from .derivatives import FREQUENCY
 from .graph import Expr, differentiate, number, ordered, substitute
+from .memory_layout import (
+    FIRST_PART,
+    HIGHEST_ORDER,
+    LOWEST_ORDER,
+    SERIES_LENGTH,
+    EventCode,
+    LanePart,
+    LaneSlot,
+    ReleaseDetail,
+    RestDetail,
+    StatePlace,
+)
 from .private_numba import ADVANCE, IMPACT_EQUATIONS, SEGMENTS, Pointer, inline_jit, jit, lean_jit, not_here
 from .records import anchor, expand_record
 from .scalar_source import Emitter
@@ -34,14 +46,24 @@ __all__ = [
     "ADVANCE",
     "ALL",
     "CACHE_LINE",
+    "FIRST_PART",
     "FREQUENCY",
+    "HIGHEST_ORDER",
     "IMPACT_EQUATIONS",
+    "LOWEST_ORDER",
     "SEGMENTS",
+    "SERIES_LENGTH",
     "WIDTH",
     "Emitter",
+    "EventCode",
     "Expr",
+    "LanePart",
+    "LaneSlot",
     "Pointer",
+    "ReleaseDetail",
+    "RestDetail",
     "Slots",
+    "StatePlace",
     "Trace",
     "absolute",
     "anchor",

@@ -10,8 +10,10 @@ import hashlib
 import importlib.util
 import inspect
 import os
+import re
 import sys
 import tempfile
+from enum import IntEnum
 from pathlib import Path
 from types import ModuleType
 
@@ -37,8 +39,15 @@ def cache_directory() -> Path:
 
 
 def compiled_part(module: ModuleType) -> str:
-    """The compiled part of a source file: what stands below its marker."""
-    return "\n" + inspect.getsource(module).split(MARKER, 1)[1].split("\n", 1)[1]
+    """The compiled part of a source file: what stands below its marker, with members of `IntEnum`s written as their numbers."""
+    numbers = {
+        f"{name}.{member.name}": str(int(member))
+        for name, kind in vars(module).items()
+        if isinstance(kind, type) and issubclass(kind, IntEnum)
+        for member in kind
+    }
+    text = "\n" + inspect.getsource(module).split(MARKER, 1)[1].split("\n", 1)[1]
+    return re.sub(r"\b[A-Z]\w*\.[A-Z_]+\b", lambda found: numbers.get(found[0], found[0]), text)
 
 
 def digest(*texts: str) -> str:

@@ -5,22 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from saltus.flow import (
-    AFTER_IMPACTS,
-    AT_A_JUMP,
-    AT_A_ROOT,
-    AT_NONE,
-    AT_ONCE,
-    IMPACT,
-    LIMIT,
-    NEVER_AGAIN,
-    RELEASE,
-    RESET_SLOPES,
-    RESTING,
-    STATE,
-)
 from saltus.taylor import derivatives as tangent
 from saltus.taylor.graph import Expr, differentiate, number
+from saltus.taylor.memory_layout import EventCode, ReleaseDetail, RestDetail, StatePlace
 
 if TYPE_CHECKING:
     from saltus.taylor.scalar_source import Emitter
@@ -46,9 +33,9 @@ def tangent_source(emitter: Emitter) -> str:
     return "\n".join([*lines, "    return", "", ""])
 
 
-def _events(trace: Trace) -> list[tuple[int, int, dict[Expr, Expr]]]:
+def _events(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]]]:
     """(kind, detail, what becomes of the places in the state) of every event that the structure can have."""
-    events = [(LIMIT, i, _shifts(tangent.margin_shift(trace, name))) for i, name in enumerate(trace.margins)]
+    events = [(EventCode.LIMIT, i, _shifts(tangent.margin_shift(trace, name))) for i, name in enumerate(trace.margins)]
     if trace.gap is None:
         return events
     jump = tangent.saltation(trace)
@@ -63,14 +50,14 @@ def _events(trace: Trace) -> list[tuple[int, int, dict[Expr, Expr]]]:
     still, unknown = [number(0.0)] * trace.columns, [NONE] * trace.columns
     return [
         *events,
-        (IMPACT, 0, after),
-        (RESET_SLOPES, 0, _reset_slopes(trace)),
-        (RESTING, AFTER_IMPACTS, at_rest | _shifts(tangent.rest_shift(trace))),
-        (RESTING, AT_ONCE, at_rest),
-        (RESTING, NEVER_AGAIN, none),
-        (RELEASE, AT_A_ROOT, _shifts(tangent.release_shift(trace))),
-        (RELEASE, AT_A_JUMP, _shifts(still)),
-        (RELEASE, AT_NONE, _shifts(unknown)),
+        (EventCode.IMPACT, 0, after),
+        (EventCode.RESET_SLOPES, 0, _reset_slopes(trace)),
+        (EventCode.RESTING, RestDetail.AFTER_IMPACTS, at_rest | _shifts(tangent.rest_shift(trace))),
+        (EventCode.RESTING, RestDetail.AT_ONCE, at_rest),
+        (EventCode.RESTING, RestDetail.NEVER_AGAIN, none),
+        (EventCode.RELEASE, ReleaseDetail.AT_A_ROOT, _shifts(tangent.release_shift(trace))),
+        (EventCode.RELEASE, ReleaseDetail.AT_A_JUMP, _shifts(still)),
+        (EventCode.RELEASE, ReleaseDetail.AT_NONE, _shifts(unknown)),
     ]
 
 
@@ -93,5 +80,9 @@ def _shifts(values: list[Expr]) -> dict[Expr, Expr]:
 def _place(trace: Trace, node: Expr) -> str:
     """Where the kernel's state keeps a coordinate, a velocity or a shift."""
     count = len(trace.acceleration)
-    starts = {"coordinate": STATE, "velocity": STATE + count, "shift": STATE + 2 * count}
+    starts = {
+        "coordinate": StatePlace.COORDINATES,
+        "velocity": StatePlace.COORDINATES + count,
+        "shift": StatePlace.COORDINATES + 2 * count,
+    }
     return f"state[{starts[node.op] + node.value}]"

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from llvmlite import ir
 from numba.core import cgutils
 
-from saltus.flow import NOW, STRIDE
+from saltus.taylor.memory_layout import SERIES_LENGTH, LaneSlot
 from saltus.taylor.tracing import RECORD_WIDTH
 from saltus.taylor.vector_code import Tape, Writer, add, dot, multiply, subtract
 from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, VECTOR, WIDTH, Vec, everywhere
@@ -52,7 +52,7 @@ class Series(Writer):
     def __init__(self, slots: Slots, context: Any, builder: Any, array_type: Any, array: Any) -> None:
         super().__init__(slots, context, builder, array_type, array)
         self.positions, self.velocities = (
-            [Row(None, True, place=self.pointer(self.at[f"{name}_series"] + row * STRIDE)) for row in range(slots.rows)]
+            [Row(None, True, place=self.pointer(self.at[f"{name}_series"] + row * SERIES_LENGTH)) for row in range(slots.rows)]
             for name in ("position", "velocity")
         )
         for name, rows in (("position", self.positions), ("velocity", self.velocities)):
@@ -75,7 +75,7 @@ class Series(Writer):
             self.rows.append(self._row(node))
         highest = max((row.degree for row in self.rows if row.degree is not None), default=0)
         self.written_out = 2 * (highest // 2 + 1)  # how many orders are
-        self._tables = {sign: self._table([sign / max(k, 1) for k in range(STRIDE + 2)]) for sign in (1.0, -1.0)}
+        self._tables = {sign: self._table([sign / max(k, 1) for k in range(SERIES_LENGTH + 2)]) for sign in (1.0, -1.0)}
 
     def _table(self, numbers: list[float]) -> Any:
         constant = ir.Constant(ir.ArrayType(DOUBLE, len(numbers)), numbers)
@@ -150,7 +150,7 @@ class Series(Writer):
     def _leaf(self, node: tuple[Any, ...]) -> Coefficient:
         k = self.order
         if node[0] == "time":
-            return self.load(NOW) if k == 0 else 1.0 if k == 1 else None
+            return self.load(LaneSlot.NOW) if k == 0 else 1.0 if k == 1 else None
         if node[0] == "record":
             return self.load(self.at["records"] + node[1] * RECORD_WIDTH + k) if k < RECORD_WIDTH else None
         return self.known(node) if k == 0 else None
@@ -296,7 +296,7 @@ class Series(Writer):
         """A coefficient from memory, where the series is from now on."""
         if row.place is None:
             with self.builder.goto_entry_block():
-                row.place = self.builder.alloca(VECTOR, STRIDE)
+                row.place = self.builder.alloca(VECTOR, SERIES_LENGTH)
             row.place.align = min(CACHE_LINE, 8 * WIDTH)
             self._kept.append(row)
         loaded = self.builder.load(self.builder.gep(row.place, [index]))
@@ -312,7 +312,7 @@ class Series(Writer):
 
     def _keep(self, row: Row, first: Any) -> None:
         """Have a series in memory: the first orders from the block `first` on, the orders of a pair from here on."""
-        ended = [None] * (STRIDE - len(row.first)) if row.degree is not None else []
+        ended = [None] * (SERIES_LENGTH - len(row.first)) if row.degree is not None else []
         with self.builder.goto_block(first):
             for j, value in enumerate([*row.first, *ended]):
                 self._put(row.place, LONG(j), value)

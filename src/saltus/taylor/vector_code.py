@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from llvmlite import ir
 
-from saltus.flow import NEW_TIME, NOW, ORIGIN, SIDE_NOW
+from saltus.taylor.memory_layout import LaneSlot
 from saltus.taylor.tracing import RECORD_WIDTH
 from saltus.taylor.vectors import LONG, VECTOR, WIDTH, Vec, slot_pointer
 
@@ -45,7 +45,7 @@ class Writer:
             return float(node[1])
         if node[0] in ("parameter", "constant"):
             return self.load(self.at[f"{node[0]}s"] + node[1])
-        return {"side": self.load, "origin": self.load}[node[0]](SIDE_NOW if node[0] == "side" else ORIGIN)
+        return {"side": self.load, "origin": self.load}[node[0]](LaneSlot.SIDE if node[0] == "side" else LaneSlot.ORIGIN)
 
     def instant(self, nodes: Tape) -> list[Any]:
         """The values of all nodes at the new time, with the new positions and velocities."""
@@ -53,7 +53,7 @@ class Writer:
         for node in nodes:
             op, where = node[0], node[1] if len(node) > 1 else 0
             if op == "time":
-                values.append(self.load(NEW_TIME))
+                values.append(self.load(LaneSlot.NEW_TIME))
             elif op in ("coordinate", "velocity"):
                 name = "new_position" if op == "coordinate" else "new_velocity"
                 values.append(self.load(self.at[name] + where))
@@ -72,7 +72,7 @@ class Writer:
     def _record(self, row: int) -> Vec:
         """A record's piece at the new time, from its expansion at the start of the step."""
         first = self.at["records"] + row * RECORD_WIDTH
-        since, value = self.load(NEW_TIME) - self.load(NOW), self.load(first + RECORD_WIDTH - 1)
+        since, value = self.load(LaneSlot.NEW_TIME) - self.load(LaneSlot.NOW), self.load(first + RECORD_WIDTH - 1)
         for power in range(RECORD_WIDTH - 2, -1, -1):
             value = value.fma(since, self.load(first + power))
         return value

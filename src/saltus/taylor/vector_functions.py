@@ -13,9 +13,9 @@ from typing import Any
 from numba import types
 from numba.extending import intrinsic
 
-from saltus.flow import FIRST_PLACE, NEW_SIDE, STRIDE
 from saltus.taylor.derivatives import saltation
 from saltus.taylor.graph import Expr, substitute
+from saltus.taylor.memory_layout import FIRST_PART, SERIES_LENGTH, LaneSlot
 from saltus.taylor.rules import RULES
 from saltus.taylor.scalar_source import Emitter
 from saltus.taylor.series import Series
@@ -50,12 +50,12 @@ class Slots:
             "parameters": self.parameters,
             "constants": self.constants,
             "records": self.records * RECORD_WIDTH,
-            "position_series": self.rows * STRIDE,
-            "velocity_series": self.rows * STRIDE,
-            "acceleration_series": self.own * STRIDE,
-            "margin_series": self.stops * STRIDE,
+            "position_series": self.rows * SERIES_LENGTH,
+            "velocity_series": self.rows * SERIES_LENGTH,
+            "acceleration_series": self.own * SERIES_LENGTH,
+            "margin_series": self.stops * SERIES_LENGTH,
         }
-        places, slot = {}, FIRST_PLACE
+        places, slot = {}, FIRST_PART
         for name, size in sizes.items():
             places[name], slot = slot, slot + size
         return {**places, "end": slot}
@@ -166,10 +166,10 @@ def _write_orders(w: Series, slots: Slots, nodes: Tape, roots: list[int], order:
     w.read(nodes, RULES)
     for name in ("position", "velocity"):
         for row in range(slots.rows):
-            w.store(w.at[f"{name}_series"] + row * STRIDE, w.load(w.at[name] + row))
+            w.store(w.at[f"{name}_series"] + row * SERIES_LENGTH, w.load(w.at[name] + row))
     pulls = [w.rows[root] for root in roots[: slots.rows]]
-    accelerations = [w.pointer(w.at["acceleration_series"] + row * STRIDE) for row in range(slots.own)]
-    margins = [w.pointer(w.at["margin_series"] + row * STRIDE) for row in range(slots.stops)]
+    accelerations = [w.pointer(w.at["acceleration_series"] + row * SERIES_LENGTH) for row in range(slots.own)]
+    margins = [w.pointer(w.at["margin_series"] + row * SERIES_LENGTH) for row in range(slots.stops)]
     for _ in w.each_order(order):
         w.advance()
         for position, velocity, pull in zip(w.positions, w.velocities, pulls, strict=True):
@@ -185,7 +185,7 @@ def write_impact(slots: Slots, nodes: Tape, roots: list[int]) -> Any:
     """Compiled code for `lane_impact(m)`: the side, positions and velocities after an impact at the new state."""
     places = slots.places
     targets = [
-        NEW_SIDE,
+        LaneSlot.NEW_SIDE,
         *range(places["after_position"], places["after_position"] + slots.rows),
         *range(places["after_velocity"], places["after_velocity"] + slots.rows),
     ]

@@ -17,7 +17,6 @@ WALL = 23  # the time that no step goes beyond; it may go beyond the end of a le
 LEG, LEG_START, LEG_LENGTH, LEGS_DONE = 24, 25, 26, 27  # which forcing period, from what local time on, how long; how many ended
 FREE_LEGS = 28  # legs below this one are ended for all lanes at once
 NEXT_LOOK, LAST_LOOK = 29, 30  # at this many impacts of a leg the clock is looked at, as it was at that time
-FIRST_PLACE = 31
 # Then, from the slots that `at` lists, as many as the structure needs.
 POSITION, VELOCITY, NEW_POSITION, NEW_VELOCITY, AFTER_POSITION, AFTER_VELOCITY = 0, 1, 2, 3, 4, 5
 ENDED_POSITION, ENDED_VELOCITY = 6, 7
