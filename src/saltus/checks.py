@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import inspect
 import math
 import sys
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
 from saltus.errors import ParameterError
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
 
@@ -90,6 +95,21 @@ def check_bounds(bounds: Any) -> tuple[float, float]:
     return low, high
 
 
+def check_axis(name: str, values: Any) -> np.ndarray:
+    """The numbers along an axis of a grid.
+
+    Raises:
+        ParameterError: with the name, for what is no list of finite numbers that rise.
+    """
+    try:
+        axis = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):
+        axis = np.empty(0)
+    if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all() or not (np.diff(axis) > 0).all():
+        raise ParameterError(f"{name} must be numbers that rise, each above the one before, got {values!r:.80}", name)
+    return axis
+
+
 def check_path(system: Any, path: Any, name: str = "path") -> None:
     """Refuse what is not the dotted path of a number of the system.
 
@@ -131,6 +151,42 @@ def check_states(name: str, states: Any) -> np.ndarray:
     if not np.isfinite(array).all():
         raise ParameterError(f"{name} must be states (coordinate, velocity), an array (n, 2), got {states!r}", name)
     return array
+
+
+def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """A decorator by which a function refuses arguments without meaning before it begins; `function.check(...)` does that alone.
+
+    `check` is called with every argument of the function by its name, defaults included.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        signature = inspect.signature(function)
+        open_ended = [p.name for p in signature.parameters.values() if p.kind is p.VAR_KEYWORD]
+
+        def refuse(*given: Any, **named: Any) -> None:
+            bound = signature.bind(*given, **named)
+            bound.apply_defaults()
+            arguments = dict(bound.arguments)
+            for name in open_ended:
+                arguments |= arguments.pop(name)
+            check(**arguments)
+
+        @functools.wraps(function)
+        def call(*given: Any, **named: Any) -> R:
+            given = tuple(_kept(value) for value in given)
+            named = {name: _kept(value) for name, value in named.items()}
+            refuse(*given, **named)
+            return function(*given, **named)
+
+        vars(call)["check"] = refuse
+        return call
+
+    return decorate
+
+
+def _kept(value: Any) -> Any:
+    """The value, or a tuple of what an iterator yields, which could otherwise be looked at only once."""
+    return tuple(value) if isinstance(value, Iterator) else value
 
 
 def settle_numbers(owner: Any, *names: str, **bounds: Any) -> None:

@@ -25,7 +25,7 @@ def test_the_parts_are_listed(saltus):
 )
 def test_the_options_reach_the_paper(saltus, monkeypatch, arguments, names, output, force):
     calls = []
-    monkeypatch.setattr("saltus.paper.reproduce", lambda *given: calls.append(given))
+    monkeypatch.setattr("saltus.paper.reproduce", lambda *given: calls.append(given) or [])
     assert saltus("reproduce", *arguments).exit_code == 0
     assert calls[0][:3] == (names, output, force)
 
@@ -44,7 +44,7 @@ def test_an_unwritable_folder_is_refused(refused, tmp_path):
 def test_an_interrupt_leaves_whole_files_only(started, tmp_path):
     command = [sys.executable, "-m", "saltus", "reproduce", "fig02", "fig04", "-o", tmp_path]
     process = started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    while not process.stdout.readline().lstrip().startswith("fig02"):
+    while process.stderr.readline() != "paper: fig04\n":
         assert process.poll() is None
     process.send_signal(signal.SIGINT)  # while fig04, which takes seconds, is being made
     _, err = process.communicate(timeout=120)

@@ -147,7 +147,7 @@ def test_an_interrupt_ends_with_status_130_and_leaves_nothing(started, study, tm
     path = study(SHORT + "periods = 100000000\n")
     command = [sys.executable, "-m", "saltus", "simulate", path, "-o", tmp_path / "out"]
     process = started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    assert process.stderr.readline() == f"computing {path}\n"
+    assert process.stderr.readline() == f"motion of {path}: computing\n"
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130

@@ -1,5 +1,6 @@
 """Basins as a sweep: the same numbers, kept, and gone on with."""
 
+import inspect
 import numpy as np
 import pytest
 from study_cases import forced
@@ -29,9 +30,11 @@ def test_what_is_kept_is_gone_on_with(tmp_path, monkeypatch):
     for name in ("label", "time"):
         files.chunk_file(tmp_path / "store", name, (2, 0), 0).unlink()
     assert status(tmp_path / "store").done == 3
-    seen, cells = [], basins_of_attraction.__globals__["cells"]
+    seen, cells = [], inspect.unwrap(basins_of_attraction).__globals__["cells"]
     monkeypatch.setitem(
-        basins_of_attraction.__globals__, "cells", lambda arguments, block: seen.append(block) or cells(arguments, block)
+        inspect.unwrap(basins_of_attraction).__globals__,
+        "cells",
+        lambda arguments, block: seen.append(block) or cells(arguments, block),
     )
     assert basin_sweep(SYSTEM, **GRID, rows=2, store=tmp_path / "store").identical(whole)
     assert len(seen) == 1

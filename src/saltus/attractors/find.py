@@ -11,7 +11,7 @@ import numpy as np
 from saltus.attractors.attractor import REST, UNDECIDED, Attractors
 from saltus.attractors.recurrence import Ends, clocked, settle
 from saltus.attractors.registry import FAILED, OPEN, Collection
-from saltus.checks import check_count, check_number, check_states
+from saltus.checks import check_count, check_number, check_states, checked_by
 from saltus.errors import ParameterError
 from saltus.orbits import REGION, Branch, PeriodicOrbit, check_region, initial_states
 from saltus.systems import System
@@ -21,6 +21,20 @@ KEPT = 256  # strobes of them that are kept
 MOST_VERDICTS = 8  # of motions that never settle: each takes seconds
 
 
+def _check(
+    system: System, region: Any, starts: int, max_period: int, seed: int, known: Any, also: Any, tol: float, progress: object
+) -> None:
+    clocked(system)
+    check_states("also", also)
+    check_count("starts", starts, 1)
+    check_count("max_period", max_period, 1, 16)
+    check_number("tol", tol, at_least=1e-15, at_most=1e-6)
+    check_region(region)
+    check_count("seed", seed, 0)
+    _known(system, known)
+
+
+@checked_by(_check)
 def find_attractors(
     system: System,
     *,
@@ -56,12 +70,8 @@ def find_attractors(
         ParameterError: several coordinates, a load that never repeats, known orbits of another system, numbers without meaning.
     """
     clock, further = clocked(system), check_states("also", also)
-    check_count("starts", starts, 1)
-    check_count("max_period", max_period, 1, 16)
-    check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     widths = check_region(region)
     given = _known(system, known)
-    check_count("seed", seed, 0)
     say = progress or (lambda _: None)
     say(0.0)
     states = initial_states(clock, starts, widths, seed)

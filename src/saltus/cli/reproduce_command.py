@@ -10,10 +10,18 @@ from rich.table import Table
 
 
 def reproduce_paper(names: Sequence[str], output: Path, force: bool) -> None:
-    """Reproduce the named parts of the paper, or all, into `output`; it says itself where the results are."""
-    from saltus.paper import reproduce
+    """Reproduce the named parts of the paper, or all, into `output`; print what was made and what became of the claims."""
+    from saltus.cli.progress_bar import progress_bar
+    from saltus.paper import FIGURES, reproduce, tally
 
-    reproduce(names, output, force, Console())
+    with progress_bar("paper") as progress:
+        results = reproduce(names, output, force, progress)
+    console, table = Console(highlight=False), Table(box=None, show_header=False)
+    for result in results:
+        table.add_row(result.name, f"made in {result.seconds:.1f} s" if result.made else "up to date", FIGURES[result.name].title)
+    console.print(table)
+    console.print(tally([claim for result in results for claim in result.claims]), markup=False, soft_wrap=True)
+    console.print(f"Results are in {output}: open {output / 'index.html'}", markup=False, soft_wrap=True)
 
 
 def list_parts() -> None:

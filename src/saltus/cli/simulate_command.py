@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 if TYPE_CHECKING:
     from saltus.config import Study
@@ -22,7 +21,8 @@ def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
     Raises:
         SaltusError: a bad study, a folder that cannot be written to (before anything is computed), a motion that cannot go on.
     """
-    from saltus.cli.summary import print_summary
+    from saltus.cli.motion_summary import print_summary
+    from saltus.cli.progress_bar import progress_bar
     from saltus.config import load_study
     from saltus.files import check_writable
 
@@ -30,28 +30,13 @@ def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
     study.settings()
     output = Path("results") / study.name if output is None else output
     check_writable(output)
-    console, messages = Console(highlight=False), Console(stderr=True, highlight=False)
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn())
-    with Progress(*columns, console=messages, transient=True, disable=not messages.is_terminal) as progress:
-        task = progress.add_task("", total=1.0)
-        tell = _teller(messages, progress, task)
-        tell(f"computing {path}")
-        motion = study.run(progress=lambda done, _: progress.update(task, completed=done), samples=long_samples(study))
-        tell(f"writing to {output}")
+    with progress_bar(f"motion of {path}") as progress:
+        motion = study.run(progress=progress, samples=long_samples(study))
+        progress(1.0, "writing")
         files = write_motion(motion, study, output, plot)
+    console = Console(highlight=False)
     print_summary(motion, console)
     console.print(f"Results are in {output}: {', '.join(file.name for file in files)}", markup=False, soft_wrap=True)
-
-
-def _teller(console: Console, progress: Progress, task: Any) -> Any:
-    """Say what goes on: beside the clock on a terminal, line by line elsewhere."""
-
-    def tell(what: str) -> None:
-        progress.update(task, description=what.replace("[", r"\["))
-        if not console.is_terminal:
-            print(what, file=console.file, flush=True)
-
-    return tell
 
 
 def write_motion(motion: Motion, study: Study, output: Path, plot: bool) -> list[Path]:

@@ -1,22 +1,36 @@
-"""What a study asks for besides a motion: a table for each question, whose keys are the arguments of its function."""
+"""What a study asks besides a motion: a table for each question, whose keys are the arguments of the functions that answer it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import inspect
+import sys
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any
+from importlib import import_module
+from types import SimpleNamespace
+from typing import Annotated, Any, get_args, get_type_hints
 
 import numpy as np
 from pydantic import BeforeValidator, create_model
 
-from saltus.config.fields import Number, Switch, Table, Text, Whole, check_table, read_angle, read_whole, show
+from saltus.config.fields import KINDS, Table, check_table, read_angle, read_whole, show
 from saltus.config.source import Source
 from saltus.errors import near
 from saltus.systems import System
 
+QUESTIONS: dict[str, tuple[str, ...]] = {
+    "phase_portrait": ("studies:phase_portrait",),
+    "response_spectrum": ("studies:response_spectrum", "studies:orbit_diagram"),
+    "bifurcation_diagram": ("studies:bifurcation_diagram", "studies:orbit_diagram"),
+    "attractors": ("attractors:find_attractors",),
+    "basins": ("studies:basin_sweep", "attractors:basins_of_attraction"),
+    "stability_chart": ("studies:bordered_chart", "studies:stability_chart"),
+}  # the function that answers each question, then the one to which it hands its further options
+NOT_IN_FILES = ("system", "store", "workers", "scheduler")  # they are given by the rest of the file or on the command line
+
 SPACED = ("from", "to", "count")
 EXAMPLE = "{ from = 0, to = 0.5, count = 101 }"
-MOST = 100_000  # points along an axis
+MAX_COUNT = 100_000  # A longer axis is a slip of the pen: a chart of that width takes years.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,14 +51,6 @@ def read_values(value: Any) -> np.ndarray:
     raise ValueError(f"must be a list of numbers or a table such as {EXAMPLE}, got {given}")
 
 
-def read_grid(value: Any) -> np.ndarray:
-    """The same, for numbers that rise."""
-    values = read_values(value)
-    if (np.diff(values) <= 0).any():
-        raise ValueError("must be numbers that rise, each above the one before")
-    return values
-
-
 def _spaced(table: dict[str, Any]) -> np.ndarray:
     """`count` numbers evenly spaced between the two ends in a table."""
     unknown = [name for name in table if name not in SPACED]
@@ -54,8 +60,8 @@ def _spaced(table: dict[str, Any]) -> np.ndarray:
     if missing:
         raise ValueError(f"needs from, to and count, such as {EXAMPLE}, and has no {' and no '.join(missing)}")
     low, high, count = _part(table, "from", read_angle), _part(table, "to", read_angle), _part(table, "count", read_whole)
-    if not 2 <= count <= MOST:
-        raise ValueError(f"needs a count from 2 to {MOST}, got {show(table['count'])}")
+    if not 2 <= count <= MAX_COUNT:
+        raise ValueError(f"needs a count from 2 to {MAX_COUNT}, got {show(table['count'])}")
     if low >= high:
         raise ValueError(f"must go from the smaller number to the larger one, got from = {low:g}, to = {high:g}")
     return np.linspace(low, high, count)
@@ -69,17 +75,17 @@ def _part(table: dict[str, Any], name: str, read: Callable[[Any], Any]) -> Any:
 
 
 def read_pair(value: Any) -> tuple[float, float]:
-    """Two numbers."""
+    """Two numbers (or angles)."""
     if not isinstance(value, list) or len(value) != 2:
         raise ValueError(f"must be a list of two numbers, got {show(value)}")
     return read_angle(value[0]), read_angle(value[1])
 
 
-def read_pairs(value: Any) -> list[tuple[float, float]]:
-    """A list of pairs of numbers."""
+def read_pairs(value: Any) -> tuple[tuple[float, float], ...]:
+    """Pairs of numbers (or angles)."""
     if not isinstance(value, list) or not value:
         raise ValueError(f"must be a list of pairs of numbers, got {show(value)}")
-    return [read_pair(item) for item in value]
+    return tuple(read_pair(item) for item in value)
 
 
 def read_paths(value: Any) -> tuple[str, str]:
@@ -89,46 +95,40 @@ def read_paths(value: Any) -> tuple[str, str]:
     return value[0], value[1]
 
 
-Values = Annotated[Any, BeforeValidator(read_values)]
-Grid = Annotated[Any, BeforeValidator(read_grid)]
-Pair = Annotated[Any, BeforeValidator(read_pair)]
-Pairs = Annotated[Any, BeforeValidator(read_pairs)]
-Paths = Annotated[Any, BeforeValidator(read_paths)]
+Pair = tuple[float, float]
+READABLE = KINDS | {
+    Pair: Annotated[Any, BeforeValidator(read_pair)],
+    tuple[Pair, Pair]: Annotated[Any, BeforeValidator(read_pairs)],
+    Iterable[Pair]: Annotated[Any, BeforeValidator(read_pairs)],
+    Iterable[float]: Annotated[Any, BeforeValidator(read_values)],
+    tuple[str, str]: Annotated[Any, BeforeValidator(read_paths)],
+}  # how a file gives an argument of each type; an argument of another type is for Python alone
 
-DIAGRAM: dict[str, Any] = {
-    "path": Text,
-    "bounds": Pair,
-    "max_period": Whole,
-    "values": Values,
-    "starts": Whole,
-    "region": Pair,
-    "seed": Whole,
-    "repelling": Whole,
-    "switch": Switch,
-    "step": Number,
-    "bands": Whole,
-}
-ASKS: dict[str, dict[str, Any]] = {
-    "phase_portrait": {"window": Pairs, "starts": Pairs, "duration": Number, "samples": Whole, "seed": Whole},
-    "response_spectrum": DIAGRAM,
-    "bifurcation_diagram": DIAGRAM,
-    "attractors": {"region": Pair, "starts": Whole, "max_period": Whole, "seed": Whole, "tol": Number},
-    "basins": {"velocity": Grid, "periods": Whole, "within": Number, "curves": Switch, "tol": Number, "rows": Whole},
-    "stability_chart": {
-        "horizontal": Grid,
-        "vertical": Grid,
-        "paths": Paths,
-        "max_period": Whole,
-        "starts": Whole,
-        "region": Pair,
-        "least": Number,
-        "periods": Whole,
-        "tol": Number,
-        "seed": Whole,
-        "rows": Whole,
-        "curves": Whole,
-    },
-}
+
+def keys_of(kind: str, coordinates: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The keys that the table of a question may have, each with the pydantic type that reads it.
+
+    Args:
+        coordinates: the names of the coordinates, which stand for an open-ended argument that holds one array for each.
+    """
+    keys: dict[str, Any] = {}
+    for place in QUESTIONS[kind]:
+        room, name = place.split(":")
+        for argument, hint in _arguments(getattr(import_module(f"saltus.{room}"), name)):
+            for key in coordinates if argument.kind is argument.VAR_KEYWORD else (argument.name,):
+                if hint in READABLE and key not in NOT_IN_FILES:
+                    keys[key] = READABLE[hint]
+    return keys
+
+
+def _arguments(function: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, Any]]:
+    """The arguments of a function with their types; that of X | None, which may be left out, is X."""
+    arguments = inspect.signature(function).parameters
+    annotated = SimpleNamespace(__annotations__={name: argument.annotation for name, argument in arguments.items()})
+    hints = get_type_hints(annotated, globalns=vars(sys.modules[function.__module__]))
+    for name, argument in arguments.items():
+        kinds = [kind for kind in get_args(hints[name]) if kind is not type(None)]
+        yield argument, kinds[0] if len(kinds) == 1 and type(None) in get_args(hints[name]) else hints[name]
 
 
 def read_ask(source: Source, system: System, kind: str, data: Any) -> Ask:
@@ -137,9 +137,5 @@ def read_ask(source: Source, system: System, kind: str, data: Any) -> Ask:
     Raises:
         ParameterError: with the place of what is wrong.
     """
-    fields = dict(ASKS[kind])
-    if kind == "basins":
-        fields |= dict.fromkeys(system.model.coordinates, Grid)
-    entries: dict[str, Any] = {name: (value, None) for name, value in fields.items()}
-    table = create_model(kind, __base__=Table, **entries)
-    return Ask(kind=kind, options=check_table(source, (kind,), data, table))
+    entries: dict[str, Any] = {name: (reader, None) for name, reader in keys_of(kind, system.model.coordinates).items()}
+    return Ask(kind=kind, options=check_table(source, (kind,), data, create_model(kind, __base__=Table, **entries)))

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from saltus.config.loads import read_load
-from saltus.config.questions import ASKS, Ask, read_ask
+from saltus.config.questions import QUESTIONS, Ask, read_ask
 from saltus.config.settings import Settings, read_settings
 from saltus.config.source import Source, read_source
 from saltus.config.types import read_part
 from saltus.errors import MotionError, ParameterError, SweepError, TraceError, near
 from saltus.systems import Load, System, VelocityReduction
 
-PARTS = ("model", "load", "impact", "simulate", *ASKS)
+PARTS = ("model", "load", "impact", "simulate", *QUESTIONS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,5 +89,5 @@ def load_study(path: Path | str) -> Study:
     except ParameterError as error:
         source.refuse_error(error)
     settings = read_settings(source, system, tables["simulate"]) if "simulate" in tables else None
-    asks = tuple(read_ask(source, system, name, tables[name]) for name in tables if name in ASKS)
+    asks = tuple(read_ask(source, system, name, tables[name]) for name in tables if name in QUESTIONS)
     return Study(name=source.path.stem, system=system, simulate=settings, asks=asks, source=source)

@@ -4,7 +4,7 @@
 """
 
 from saltus.paper.claims import statements
-from saltus.paper.claims.claim import Claim, Verdict
+from saltus.paper.claims.claim import Claim, Verdict, tally
 from saltus.paper.figures import (
     appendix,
     fig01c,
@@ -38,4 +38,4 @@ FIGURES: dict[str, PaperFigure] = {
     )
 }
 
-__all__ = ["FIGURES", "Claim", "PaperFigure", "Result", "Verdict", "reproduce"]
+__all__ = ["FIGURES", "Claim", "PaperFigure", "Result", "Verdict", "reproduce", "tally"]

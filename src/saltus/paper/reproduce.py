@@ -7,18 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from saltus.errors import ParameterError, near
 from saltus.files import check_writable, write_atomically, write_dataset, write_text
 from saltus.paper import report
 from saltus.paper import up_to_date as state
-from saltus.paper.claims.claim import Claim, tally
+from saltus.paper.claims.claim import Claim
 from saltus.paper.figures.figure import PaperFigure
 from saltus.plots import style
-
-if TYPE_CHECKING:
-    from rich.console import Console
+from saltus.progress import Progress, silent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +31,7 @@ class Result:
 
 
 def reproduce(
-    names: Sequence[str] = (), output: Path | str = Path("results"), force: bool = False, console: Console | None = None
+    names: Sequence[str] = (), output: Path | str = Path("results"), force: bool = False, progress: Progress = silent
 ) -> list[Result]:
     """Compute and draw the named parts of the paper (all where none is named) into `output`, and write the report.
 
@@ -50,30 +48,12 @@ def reproduce(
     output = Path(output)
     check_writable(output)
     chosen = [figure for name, figure in FIGURES.items() if not names or name in names]
-    results = _make_all(chosen, output, force, console)
-    claims = report.write(FIGURES.values(), output, {result.name: result.claims for result in results})
-    if console is not None:
-        console.print(tally(claims))
-        console.print(f"Results are in {output}: open {output / 'index.html'}", soft_wrap=True, highlight=False)
-    return results
-
-
-def _make_all(figures: list[PaperFigure], output: Path, force: bool, console: Console | None) -> list[Result]:
-    if console is None:
-        return [_make(figure, output, force) for figure in figures]
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(bar_width=24), MofNCompleteColumn(), TimeElapsedColumn())
     results = []
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("", total=len(figures))
-        for figure in figures:
-            progress.update(task, description=f"{figure.name}: {figure.title}")
-            result = _make(figure, output, force)
-            done = f"made in {result.seconds:.1f} s" if result.made else "up to date"
-            progress.console.print(f"  {figure.name:<9} {done:<15} {figure.title}", highlight=False, soft_wrap=True)
-            progress.advance(task)
-            results.append(result)
+    for i, figure in enumerate(chosen):
+        progress(i / len(chosen), f"{figure.name}, {figure.title}")
+        results.append(_make(figure, output, force))
+    progress(1.0, "writing the report")
+    report.write(FIGURES.values(), output, {result.name: result.claims for result in results})
     return results
 
 

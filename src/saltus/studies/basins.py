@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import basins_of_attraction
-from saltus.checks import check_count
+from saltus.checks import check_count, checked_by
 from saltus.errors import ParameterError
 from saltus.systems import System
 
@@ -23,6 +23,14 @@ ROWS = 25  # of the grid in one chunk
 CELLS = "saltus.attractors.basins.grid:cells"
 
 
+def _check(system: System, rows: int, store: Any, workers: object, scheduler: object, progress: object, **options: Any) -> None:
+    check_count("rows", rows, 1)
+    if store is not None and Path(store).exists():
+        _check_store(Path(store), system)
+    basins_of_attraction.check(system, **options)  # type: ignore[attr-defined]
+
+
+@checked_by(_check)
 def basin_sweep(
     system: System,
     *,
@@ -51,9 +59,6 @@ def basin_sweep(
     """
     from saltus.sweep import run
 
-    check_count("rows", rows, 1)
-    if store is not None and Path(store).exists():
-        _check_store(Path(store), system)
     say = progress or (lambda *_: None)
 
     def computed(arguments: dict[str, Any], axes: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

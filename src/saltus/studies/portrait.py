@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import Equilibrium, Separatrix, equilibria, separatrices
-from saltus.checks import check_count, check_number
+from saltus.checks import check_count, check_number, checked_by
 from saltus.errors import ParameterError
 from saltus.flow import simulate
 from saltus.orbits import EVEN
@@ -25,6 +25,17 @@ BESIDE = (0.35, 0.75)  # and from beside each stable equilibrium, at these share
 TRIED = 100  # times as many places are tried where a wall takes a part of the window
 
 
+def _check(
+    system: System, window: Bounds, starts: Any, duration: float, samples: int, seed: int, progress: object = None
+) -> None:
+    check_number("duration", duration, above=0.0)
+    check_count("samples", samples, 2)
+    check_count("seed", seed, 0)
+    points = equilibria(system, window)  # which refuses what has no phase plane
+    _ = _spread(system, window, points, seed) if starts is None else _states(system, starts)
+
+
+@checked_by(_check)
 def phase_portrait(
     system: System,
     *,
@@ -58,10 +69,7 @@ def phase_portrait(
         ParameterError: a load that varies, several coordinates, numbers, a window or starts without meaning.
         MotionError: a motion that cannot be continued.
     """
-    check_number("duration", duration, above=0.0)
-    check_count("samples", samples, 2)
-    check_count("seed", seed, 0)
-    points = equilibria(system, window)  # which refuses what has no phase plane
+    points = equilibria(system, window)
     states = _spread(system, window, points, seed) if starts is None else _states(system, starts)
     say = progress or (lambda _: None)
     say(0.0)

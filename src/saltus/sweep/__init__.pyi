@@ -2,7 +2,19 @@ from .chunk import Failure
 from .cluster import on_cluster
 from .execution import SweepInterrupted, run
 from .plan import Plan, Variable
-from .store import open_store
+from .store import check_store, open_store
 from .store_status import Status, read_plan, status
 
-__all__ = ["Failure", "Plan", "Status", "SweepInterrupted", "Variable", "on_cluster", "open_store", "read_plan", "run", "status"]
+__all__ = [
+    "Failure",
+    "Plan",
+    "Status",
+    "SweepInterrupted",
+    "Variable",
+    "check_store",
+    "on_cluster",
+    "open_store",
+    "read_plan",
+    "run",
+    "status",
+]

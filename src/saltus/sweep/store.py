@@ -89,19 +89,33 @@ def opened(plan: Plan, path: Path) -> Iterator[Store]:
         ParameterError: there is something else at `path`, or the store of another plan.
         SweepError: it cannot be made, or another run is writing to it.
     """
+    check_store(plan, path)
     if not (path / files.METADATA).is_file():
         _create(plan, path)
-    there = read_plan(path)
-    differ = list(differences(there, plan.describe()))
-    if differ:
-        more = f"; and {len(differ) - 3} more" if len(differ) > 3 else ""
-        raise ParameterError(f"{path} is the store of another plan: {'; '.join(differ[:3])}{more}; name another store")
     with files.locked(path) as got:
         if got is False:
             raise SweepError(f"another run is writing to {path}; wait for it, or stop it, and run again")
         if got:
             files.sweep_up(path)
         yield Store(plan, path)
+
+
+def check_store(plan: Plan, path: Path) -> None:
+    """Refuse a path at which there is something else than the store of `plan`.
+
+    Raises:
+        ParameterError: with what is there.
+    """
+    if (path / files.METADATA).is_file():
+        differ = list(differences(read_plan(path), plan.describe()))
+        if differ:
+            more = f"; and {len(differ) - 3} more" if len(differ) > 3 else ""
+            raise ParameterError(
+                f"{path} is the store of another plan: {'; '.join(differ[:3])}{more}; name another store", "store"
+            )
+    elif path.is_file() or (path.is_dir() and any(path.iterdir())):
+        kind = "a file" if path.is_file() else "a folder with something else in it"
+        raise ParameterError(f"{path} is {kind}; name a store that does not exist yet, or one of this plan", "store")
 
 
 def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
@@ -137,9 +151,6 @@ def _dataset(store: Any) -> xarray.Dataset:
 
 def _create(plan: Plan, path: Path) -> None:
     """Make the store of `plan`, without any chunk, at `path`, in one step."""
-    if path.is_file() or (path.is_dir() and any(path.iterdir())):
-        kind = "a file" if path.is_file() else "a folder with something else in it"
-        raise ParameterError(f"{path} is {kind}; name a store that does not exist yet, or one of this plan")
     try:
         part = files.begin(path)
         try:

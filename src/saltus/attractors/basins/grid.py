@@ -14,7 +14,7 @@ from saltus.attractors.attractors_dataset import attractor_table, coordinate, la
 from saltus.attractors.basins.labelling import label_states
 from saltus.attractors.find import find_attractors
 from saltus.attractors.recurrence import clocked
-from saltus.checks import check_count, check_number
+from saltus.checks import check_axis, check_count, check_number, checked_by
 from saltus.errors import ParameterError
 from saltus.orbits import REGION
 from saltus.systems import System, reversed_system
@@ -30,10 +30,33 @@ ROUNDS = 3
 Grid = tuple[np.ndarray, np.ndarray]  # velocities, coordinates
 
 
+def _check(
+    system: System,
+    velocity: Any,
+    found: Attractors | None,
+    periods: int,
+    within: float,
+    curves: bool,
+    tol: float,
+    compute: object,
+    progress: object,
+    **coordinates: Any,
+) -> None:
+    grid = _grid(clocked(system), velocity, coordinates, found)
+    check_count("periods", periods, 32)
+    check_number("within", within, above=0.0)
+    check_number("tol", tol, at_least=1e-15, at_most=1e-6)
+    if found is not None and found.system != system:
+        raise ParameterError("found holds the attractors of another system; leave it out, or compute it for this one", "found")
+    if curves:
+        _check_curves(system, grid)
+
+
+@checked_by(_check)
 def basins_of_attraction(
     system: System,
     *,
-    velocity: Any = None,
+    velocity: Iterable[float] | None = None,
     found: Attractors | None = None,
     periods: int = PERIODS,
     within: float = WITHIN,
@@ -41,7 +64,7 @@ def basins_of_attraction(
     tol: float = 1e-11,
     compute: Callable[[dict[str, Any], dict[str, np.ndarray]], tuple[np.ndarray, np.ndarray]] | None = None,
     progress: Callable[[float], object] | None = None,
-    **coordinates: Any,
+    **coordinates: Iterable[float],
 ) -> xarray.Dataset:
     """The attractor on which the motion from each state (coordinate, velocity) of a grid at phase 0 ends, and the time it takes.
 
@@ -73,13 +96,6 @@ def basins_of_attraction(
     """
     clock = clocked(system)
     grid = _grid(clock, velocity, coordinates, found)
-    check_count("periods", periods, 32)
-    check_number("within", within, above=0.0)
-    check_number("tol", tol, at_least=1e-15, at_most=1e-6)
-    if found is not None and found.system != system:
-        raise ParameterError("found holds the attractors of another system; leave it out, or compute it for this one")
-    if curves:
-        _check_curves(system, grid)
     say = progress or (lambda _: None)
     say(0.0)
     if found is None:
@@ -235,17 +251,8 @@ def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: 
     along = place + widths[0] * np.linspace(-1.0, 1.0, 201)
     if system.model.sides:
         along = along[np.max([np.asarray(system.model.gap(along, s)) for s in system.model.sides], axis=0) >= 0.0]
-    return _axis("velocity", velocity, widths[1] * np.linspace(-1.0, 1.0, 201)), _axis(name, coordinates.get(name), along)
-
-
-def _axis(name: str, values: Any, default: np.ndarray) -> np.ndarray:
-    try:
-        array = default if values is None else np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.ndim != 1 or not array.size or not np.isfinite(array).all() or not (np.diff(array) > 0).all():
-        raise ParameterError(f"{name} must be increasing numbers, the grid's along that axis, got {values!r}", name)
-    return array
+    speeds = widths[1] * np.linspace(-1.0, 1.0, 201) if velocity is None else velocity
+    return check_axis("velocity", speeds), check_axis(name, coordinates.get(name, along))
 
 
 def _dataset(

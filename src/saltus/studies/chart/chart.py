@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_along, check_count, check_number, check_path
+from saltus.checks import check_along, check_axis, check_count, check_number, check_path, checked_by
 from saltus.errors import ParameterError
 from saltus.orbits import REGION, check_region
 from saltus.studies.chart.cells import MOTIONS
@@ -29,11 +30,29 @@ ROWS = 101  # of the chart in one chunk: more chunks keep more of a run that is 
 CELLS = "saltus.studies.chart.cells:cells"
 
 
+def _check(
+    system: System, store: Any, workers: object, scheduler: object, progress: object, periods: int | None, **options: Any
+) -> None:
+    from saltus.sweep import check_store
+
+    axes = [_default_axis(name, options.pop(name)) for name in ("horizontal", "vertical")]
+    work = plan(system, *axes, periods=settling(system) if periods is None else periods, **options)
+    if store is not None:
+        check_store(work, Path(store))
+
+
+def _default_axis(name: str, values: Any) -> Any:
+    if values is not None:
+        return values
+    return np.linspace(0.0, 0.5, 101) if name == "horizontal" else np.linspace(-2.0, 0.0, 101)
+
+
+@checked_by(_check)
 def stability_chart(
     system: System,
     *,
-    horizontal: Any = None,
-    vertical: Any = None,
+    horizontal: Iterable[float] | None = None,
+    vertical: Iterable[float] | None = None,
     paths: tuple[str, str] = ("load.horizontal.amplitude", "load.vertical"),
     max_period: int = LONGEST,
     starts: int = STARTS,
@@ -86,8 +105,8 @@ def stability_chart(
 
     work = plan(
         system,
-        np.linspace(0.0, 0.5, 101) if horizontal is None else horizontal,
-        np.linspace(-2.0, 0.0, 101) if vertical is None else vertical,
+        _default_axis("horizontal", horizontal),
+        _default_axis("vertical", vertical),
         paths=paths,
         max_period=max_period,
         starts=starts,
@@ -115,7 +134,7 @@ def plan(system: System, horizontal: Any, vertical: Any, *, paths: tuple[str, st
     from saltus import __version__
     from saltus.sweep import Plan
 
-    axes = {"vertical": _axis("vertical", vertical), "horizontal": _axis("horizontal", horizontal)}
+    axes = {"vertical": check_axis("vertical", vertical), "horizontal": check_axis("horizontal", horizontal)}
     check_options(system, paths, axes, rows=rows, **options)
     named = {"vertical": paths[1], "horizontal": paths[0]}
     arguments = {"system": system.to_json(), "paths": named, **options, "region": list(options["region"]), "threads": None}
@@ -175,17 +194,6 @@ def check_options(system: Any, paths: Any, axes: dict[str, np.ndarray], **option
     check_number("least", options["least"], above=0.0)
     check_number("tol", options["tol"], at_least=1e-15, at_most=1e-6)
     check_region(options["region"])
-
-
-def _axis(name: str, values: Any) -> np.ndarray:
-    """Rising numbers."""
-    try:
-        axis = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        axis = np.empty(0)
-    if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all() or (np.diff(axis) <= 0).any():
-        raise ParameterError(f"{name} must be rising numbers, got {values!r:.80}", name)
-    return axis
 
 
 def monostable(chart: xarray.Dataset) -> xarray.DataArray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count
+from saltus.checks import check_count, checked_by
 from saltus.studies.chart.borders import disagreements, with_borders
 from saltus.studies.chart.chart import stability_chart
 from saltus.systems import Harmonic, Load, Metainterface, System
@@ -19,6 +19,12 @@ CURVES = 12  # on which motions end, at most
 LOADS = ("load.horizontal.amplitude", "load.vertical")  # the axes on which the quasi-static border is known
 
 
+def _check(system: System, curves: int, progress: object, exploring: object, **options: Any) -> None:
+    check_count("curves", curves, 0)
+    stability_chart.check(system, **options)  # type: ignore[attr-defined]
+
+
+@checked_by(_check)
 def bordered_chart(
     system: System,
     *,
@@ -45,7 +51,6 @@ def bordered_chart(
     """
     import xarray as xr
 
-    check_count("curves", curves, 0)
     chart, borders = with_borders(
         system, stability_chart(system, progress=progress, **options), most=int(curves), progress=exploring
     )

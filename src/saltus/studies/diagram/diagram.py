@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import check_bounds, check_number, checked_by
 from saltus.errors import ParameterError
 from saltus.orbits import REGION, STEP, check_region, search_orbits
 from saltus.studies.checks import check_diagram
@@ -25,33 +25,19 @@ BANDS = 121  # values at which chaos is looked for
 SEARCHED, FOLLOWED, CONFIRMED = 0.3, 0.7, 0.9  # shares of the work done after the search, the branches, the bands
 
 
-def response_spectrum(
-    system: System,
-    path: str = "load.frequency",
-    bounds: tuple[float, float] = (0.1, 3.0),
-    **options: Any,
-) -> xarray.DataTree:
-    """All branches of periodic orbits along the forcing frequency that a search finds: `diagram` says how.
-
-    The paper's Figs. 9 and 10. Options are those of `diagram`.
-    """
-    return diagram(system, path, bounds, **options)
+def _check(
+    system: System, path: str, bounds: Any, values: Any, region: Any, step: float, switch: bool, progress: object, **efforts: int
+) -> None:
+    bounds = check_diagram(system, path, bounds, **efforts)
+    check_number("step", step, above=0.0)
+    _values(bounds, values)
+    check_region(region)
+    if not (progress is None or callable(progress)):
+        raise ParameterError(f"progress must be a function of the fraction done and of what is being done, got {progress!r}")
 
 
-def bifurcation_diagram(
-    system: System,
-    path: str = "load.horizontal.amplitude",
-    bounds: tuple[float, float] = (0.0, 3.0),
-    **options: Any,
-) -> xarray.DataTree:
-    """All branches of periodic orbits along a load's amplitude that a search finds: `diagram` says how.
-
-    The paper's Figs. 11 to 13. Options are those of `diagram`.
-    """
-    return diagram(system, path, bounds, **options)
-
-
-def diagram(
+@checked_by(_check)
+def orbit_diagram(
     system: System,
     path: str,
     bounds: tuple[float, float],
@@ -99,13 +85,8 @@ def diagram(
     Raises:
         ParameterError: an argument without meaning.
     """
-    low, high = check_diagram(
-        system, path, bounds, max_period=max_period, starts=starts, seed=seed, repelling=repelling, bands=bands
-    )
-    check_number("step", step, above=0.0)
+    low, high = check_bounds(bounds)
     grid, region = _values((low, high), values), check_region(region)
-    if not (progress is None or callable(progress)):
-        raise ParameterError(f"progress must be a function of the fraction done and of what is being done, got {progress!r}")
     say = progress or (lambda share, what: None)
     say(0.0, "searching")
     found = search_orbits(
@@ -130,6 +111,34 @@ def diagram(
     tree = diagram_tree(system, atlas.branches, found, (low, high), chaos, max_period=max_period, left=atlas.left)
     say(1.0, "done")
     return tree
+
+
+@checked_by(orbit_diagram.check)  # type: ignore[attr-defined]
+def response_spectrum(
+    system: System,
+    path: str = "load.frequency",
+    bounds: tuple[float, float] = (0.1, 3.0),
+    **options: Any,
+) -> xarray.DataTree:
+    """All branches of periodic orbits along the forcing frequency that a search finds: `orbit_diagram` says how.
+
+    The paper's Figs. 9 and 10. Options are those of `orbit_diagram`.
+    """
+    return orbit_diagram(system, path, bounds, **options)
+
+
+@checked_by(orbit_diagram.check)  # type: ignore[attr-defined]
+def bifurcation_diagram(
+    system: System,
+    path: str = "load.horizontal.amplitude",
+    bounds: tuple[float, float] = (0.0, 3.0),
+    **options: Any,
+) -> xarray.DataTree:
+    """All branches of periodic orbits along a load's amplitude that a search finds: `orbit_diagram` says how.
+
+    The paper's Figs. 11 to 13. Options are those of `orbit_diagram`.
+    """
+    return orbit_diagram(system, path, bounds, **options)
 
 
 def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.ndarray:

@@ -21,7 +21,7 @@ INSTANTS = 64
 def diagram_tree(
     system: System, branches: list[Branch], found: Search, bounds: tuple[float, float], chaos: Bands | None, **facts: Any
 ) -> xarray.DataTree:
-    """The DataTree that `diagram` returns; `facts` are further attributes."""
+    """The DataTree that `orbit_diagram` returns; `facts` are further attributes."""
     import xarray
 
     import saltus

@@ -1,0 +1,91 @@
+"""What the answer to a study's question comes to, in a few lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+MOST_KINDS = 8  # Special points of a branch that are named; the rest are counted.
+
+
+def summarise(kind: str, data: Any) -> Iterator[str]:
+    """The lines that `saltus run` prints of the answer to a question of this kind."""
+    return SUMMARIES[kind](data)
+
+
+def _portrait(data: Any) -> Iterator[str]:
+    stable = int(data["stable"].sum())
+    unstable = data.sizes["equilibrium"] - stable
+    why = data.attrs["separatrices"].removeprefix("none: ")
+    yield f"{data.sizes['motion']} motions, {stable} stable and {unstable} unstable equilibria, " + (
+        f"{data.sizes['separatrix']} separatrices." if why == "computed" else f"no separatrices ({why})."
+    )
+
+
+def _chart(data: Any) -> Iterator[str]:
+    if "chart" in getattr(data, "children", ()):
+        yield from _chart(data["chart"].to_dataset())
+        yield from _borders(data)
+        return
+    moving, wild = int((data["count"] > 0).sum()), int((data["unsettled"] > 0).sum())
+    text = f"Stable motions beside rest in {moving} of {data['count'].size} cells"
+    yield text + (f", the largest amplitude is {float(data['amplitude'].max()):.4g} rad." if moving else ".")
+    if wild:
+        yield f"In {wild} cells some motion does not settle."
+
+
+def _borders(tree: Any) -> Iterator[str]:
+    """What is known of the changes between neighbouring cells."""
+    from saltus.plots import curves_of
+
+    left, kinds = tree["disagreements"].to_dataset(), [str(curve.attrs["kind"]) for curve in curves_of(tree)]
+    curves = ", ".join(f"{kinds.count(kind)} {kind}" for kind in sorted(set(kinds))) or "none"
+    total, looked = int(left.attrs["changes"]), int(left["looked_into"].sum())
+    on, harmless, unexplained = int(left.attrs["on_curves"]), int(left.attrs["harmless"]), left.sizes["change"]
+    added = int(tree["chart"].attrs["added_by_continuation"])
+    yield (
+        f"Exact borders: {curves} as curves. Of {total} ends of motions between neighbouring cells "
+        f"{on} lie on them, {total - on - harmless - unexplained} at other special points, {harmless} are none, as the same "
+        f"motion goes on, {looked} are not explained and {unexplained - looked} were not looked into."
+    )
+    if added:
+        yield f"{added} motions of cells, to which no start leads, are known from their neighbours by continuation."
+
+
+def _diagram(tree: Any) -> Iterator[str]:
+    path = tree.attrs["path"]
+    for name in sorted(tree.children):
+        if name.startswith("branch_"):
+            branch = tree[name]
+            special = [branch[key].values for key in ("kind", "special_parameter") if key in branch]  # a branch may have none
+            kinds = [f"{kind} {value:.6g}" for kind, value in zip(*special, strict=True)]
+            more = f" and {len(kinds) - MOST_KINDS} more" if len(kinds) > MOST_KINDS else ""
+            x, listed = branch["parameter"].values, ", ".join(kinds[:MOST_KINDS]) or "no special points"
+            yield (
+                f"{name}: period {int(branch['period'][0])}, {path} {x.min():.6g} to {x.max():.6g}, "
+                f"{int(branch['stable'].sum())} of {x.size} points stable; {listed}{more}"
+            )
+    for low, high, rate in zip(*(tree["bands"][name].values for name in ("low", "high", "exponent")), strict=True):
+        yield f"chaos: {path} {low:.6g} to {high:.6g}, largest exponent {rate:.3g}"
+
+
+def _attractors(data: Any) -> Iterator[str]:
+    share, of = ("cells", "cells") if "cells" in data else ("fraction", "starts")
+    for i, label in enumerate(data["attractor"].values):
+        periods = int(data["attractor_period"][i])
+        kind = str(data["attractor_kind"].values[i]) + (f", period {periods}" if periods else "")
+        part, size = 100 * float(data[share][i]), float(data["amplitude"][i])
+        yield f"{int(label)}: {kind}, amplitude {size:.4g}, {part:.3g} % of the {of}"
+    left = float(data.attrs.get("undecided", 0.0))
+    if left:
+        yield f"undecided: {100 * left:.3g} % of the {of}"
+
+
+SUMMARIES: dict[str, Callable[[Any], Iterator[str]]] = {
+    "phase_portrait": _portrait,
+    "response_spectrum": _diagram,
+    "bifurcation_diagram": _diagram,
+    "attractors": _attractors,
+    "basins": _attractors,
+    "stability_chart": _chart,
+}
