@@ -292,7 +292,7 @@ RECORD = saltus.Record([0.0, 1.0], [0.0, 1.0])
         ({"periods": 40.5}, "periods must be a whole number"),
         ({"transient": -1}, "transient must"),
         ({"system": "a system"}, "takes a System"),
-        ({"system": saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(horizontal=RECORD))}, "is a record"),
+        ({"system": saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(horizontal=RECORD))}, "is a Record"),
         ({"theta": math.nan}, "theta must be"),
         ({"phi": 0.3}, "no coordinate 'phi'"),
         ({"tol": 1.0}, "tol must"),

@@ -128,7 +128,7 @@ def test_the_contraction_that_it_states_holds_for_every_motion():
 
 def test_it_refuses_records_and_what_is_no_system():
     record = saltus.Record(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
-    with pytest.raises(ParameterError, match="is a record"):
+    with pytest.raises(ParameterError, match="is a Record"):
         excludes_tori(loaded(horizontal=record))
     with pytest.raises(ParameterError, match="takes a System"):
         excludes_tori("a system")

@@ -10,8 +10,8 @@ import saltus
 from saltus import ParameterError
 from saltus.attractors import classify, excludes_tori
 from saltus.attractors.orbit_certificate import certify
-from saltus.attractors.recurrence import settle
 from saltus.attractors.verdict.verdict import KINDS
+from saltus.flow import find_recurrence
 from saltus.theory import equilibria
 
 
@@ -44,7 +44,7 @@ def test_a_longer_period_is_counted_in_forcing_periods():
     longer = [v for v in found if v.period == 3]
     assert longer
     for verdict in longer:
-        strobes = settle(verdict.system, np.array([list(verdict.state.values())]), 3).strobes[0]
+        strobes = find_recurrence(verdict.system, np.array([list(verdict.state.values())]), 3).states[0]
         np.testing.assert_allclose(strobes[-1], list(verdict.state.values()), rtol=0, atol=1e-7)
         assert np.abs(strobes[0] - strobes[-1]).max() > 1e-3
 
@@ -86,8 +86,8 @@ MORE = [pytest.param(amplitude, marks=pytest.mark.thorough) for amplitude in (7.
 def settled_late(system, count, periods):
     """Random starts, and how many forcing periods they take to settle; nan for those that do not within `periods`."""
     starts = np.random.default_rng(1).uniform(-2.0, 2.0, (count, 2))
-    ends = settle(system, starts, periods, kept=1, tol=1e-12)
-    return starts, np.where(ends.cycle > 0, ends.periods, np.nan), ends.cycle
+    ends = find_recurrence(system, starts, periods, kept=1, tol=1e-12)
+    return starts, np.where(ends.period > 0, ends.periods, np.nan), ends.period
 
 
 @pytest.mark.parametrize("amplitude", [7.2, 7.3, *MORE])
@@ -224,19 +224,9 @@ def test_a_motion_that_ends_is_undecided():
     assert "not unique" in torn.reason
 
 
-def test_a_longest_period_may_be_longer_than_what_settling_looks_for():
-    """A cycle of q periods is the smallest shift that maps the last states onto themselves."""
-    from saltus.attractors.verdict.verdict import _long_cycle
-
-    states = np.tile(np.arange(20.0), 6)[:, None] * [1.0, -2.0]
-    assert _long_cycle(states, 32) == 20
-    assert _long_cycle(states, 19) == 0
-    assert _long_cycle(states + np.arange(120)[:, None] * 1e-6, 32) == 0
-
-
 def test_a_certificate_says_what_is_wrong():
     system = under_force(1.6, 3.0)
-    state = settle(system, np.array([[0.3, 0.0]]), 300, kept=1).strobes[0, -1]
+    state = find_recurrence(system, np.array([[0.3, 0.0]]), 300, kept=1).states[0, -1]
     found = certify(system, state, 1)
     assert not found.sound
     assert found.doubt

@@ -162,7 +162,7 @@ REFUSED = {
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_question_without_meaning_is_refused_before_anything_is_computed(name, refused, study, tmp_path, monkeypatch):
     text, place, problem = REFUSED[name]
-    for module in ("flow.simulation.simulate", "studies.portrait.simulate", "attractors.recurrence.simulate_many"):
+    for module in ("flow.simulation.simulate", "studies.portrait.simulate", "flow.recurrence.simulate_many"):
         monkeypatch.setattr(f"saltus.{module}", lambda *args, **options: pytest.fail("it began to compute"))
     path = study(text)
     sentence = refused("run", path, "-o", tmp_path / "out")

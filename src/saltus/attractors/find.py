@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors.attractor import REST, UNDECIDED, Attractors
-from saltus.attractors.recurrence import Ends, clocked, settle
 from saltus.attractors.registry import FAILED, OPEN, Collection
+from saltus.attractors.stroboscopic_section import with_clock
 from saltus.checks import check_count, check_number, check_states, checked_by
 from saltus.errors import ParameterError
+from saltus.flow import find_recurrence
 from saltus.orbits import REGION, Branch, PeriodicOrbit, check_region, initial_states
 from saltus.systems import System
 
@@ -24,7 +25,7 @@ MOST_VERDICTS = 8  # of motions that never settle: each takes seconds
 def _check(
     system: System, region: Any, starts: int, max_period: int, seed: int, known: Any, also: Any, tol: float, progress: object
 ) -> None:
-    clocked(system)
+    with_clock(system)
     check_states("also", also)
     check_count("starts", starts, 1)
     check_count("max_period", max_period, 1, 16)
@@ -69,7 +70,7 @@ def find_attractors(
     Raises:
         ParameterError: several coordinates, a load that never repeats, known orbits of another system, numbers without meaning.
     """
-    clock, further = clocked(system), check_states("also", also)
+    clock, further = with_clock(system), check_states("also", also)
     widths = check_region(region)
     given = _known(system, known)
     say = progress or (lambda _: None)
@@ -92,14 +93,15 @@ def _places(
     collection: Collection, states: np.ndarray, max_period: int, tol: float, say: Callable[[float], object]
 ) -> np.ndarray:
     """The place in the collection of the attractor on which each motion ends; below 0 where that is undecided."""
-    ends = settle(collection.system, states, FIRST, kept=KEPT, tol=tol, progress=lambda done: say(0.3 * done))
-    places = collection.take(_up_to(ends, max_period))
+    options: dict[str, Any] = {"max_period": max_period, "kept": KEPT, "tol": tol}
+    ends = find_recurrence(collection.system, states, FIRST, **options, progress=lambda done, _: say(0.3 * done))
+    places = collection.take(ends)
     left = np.flatnonzero(places == OPEN)
     if not left.size:
         return places
-    last = ends.strobes[left, -1]
-    ends = settle(collection.system, last, SECOND, kept=KEPT, tol=tol, progress=lambda done: say(0.3 + 0.4 * done))
-    later = collection.take(_up_to(ends, max_period))
+    last = ends.states[left, -1]
+    ends = find_recurrence(collection.system, last, SECOND, **options, progress=lambda done, _: say(0.3 + 0.4 * done))
+    later = collection.take(ends)
     collection.belonging(ends, later)
     for turn in range(MOST_VERDICTS):
         waiting = np.flatnonzero(later == OPEN)
@@ -112,12 +114,6 @@ def _places(
         collection.reasons.append(f"{int((later == OPEN).sum())} motions do not settle in {FIRST + SECOND} forcing periods")
     places[left] = np.where(later == OPEN, FAILED, later)
     return places
-
-
-def _up_to(ends: Ends, max_period: int) -> Ends:
-    """The same, with cycles longer than `max_period` counted as motions that do not settle."""
-    cycle = np.where(ends.cycle <= max_period, ends.cycle, 0)
-    return Ends(ends.rest, cycle, ends.ended, ends.periods, ends.strobes)
 
 
 def order(collection: Collection) -> dict[int, int]:

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from saltus.attractors.stroboscopic_section import section_states
 from saltus.errors import MotionError
-from saltus.flow import simulate_many
+from saltus.flow import nearest_return
 from saltus.orbits import PeriodicOrbit, Problem, Signature, orbit_from
 from saltus.systems import System
 
@@ -74,8 +75,9 @@ def certify(system: System, state: np.ndarray, period: int | None, max_period: i
     """
     name = system.model.coordinates[0]
     begin = {name: float(state[0]), "velocity": float(state[1])}
-    strobes = np.concatenate([[state], _strobes(system, begin, period or max_period)])
-    q = period or 1 + int(np.argmin(np.abs(strobes[1:] - strobes[0]).max(axis=1)))
+    later = section_states(system, state[None], period or max_period, tol=1e-12)[0]
+    states = np.concatenate([[state], later])
+    q = period or nearest_return(states[::-1], max_period)
     try:
         orbit = orbit_from(Problem(system, Signature((), 1)), begin, q)
     except MotionError:
@@ -83,12 +85,5 @@ def certify(system: System, state: np.ndarray, period: int | None, max_period: i
     within = DEFECT if period else SLOW
     if orbit is None:
         return Certificate(None, np.inf, within)
-    apart = np.abs(strobes[:q] - np.array(orbit.state)).max(axis=1)
+    apart = np.abs(states[:q] - np.array(orbit.state)).max(axis=1)
     return Certificate(orbit, float(apart.min()), within)
-
-
-def _strobes(system: System, begin: dict[str, float], count: int) -> np.ndarray:
-    """The next states at phase 0, (count, 2)."""
-    result = simulate_many(system, **begin, periods=count, sample=("state",), last="all")  # type: ignore[arg-type]
-    name = system.model.coordinates[0]
-    return np.stack([result[f"sampled_{name}"].values, result["sampled_velocity"].values], axis=-1).reshape(count, 2)

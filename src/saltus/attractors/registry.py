@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors.attractor import NEAR, Attractor, Target
-from saltus.attractors.recurrence import Ends, ensemble, sampled
+from saltus.attractors.stroboscopic_section import section_states
 from saltus.errors import MotionError
+from saltus.flow import Recurrence, motions_from, stroboscopic
 from saltus.orbits import PeriodicOrbit, Problem, Signature, is_symmetric, orbit_from
 from saltus.systems import System
 
@@ -32,18 +33,18 @@ class Collection:
     reasons: list[str] = field(default_factory=list)
     mirrors: dict[int, int] = field(default_factory=dict)
 
-    def take(self, ends: Ends) -> np.ndarray:
+    def take(self, ends: Recurrence) -> np.ndarray:
         """The place of the attractor on which each motion ends, or OPEN, or FAILED with a reason, (n,)."""
-        places = np.full(len(ends.cycle), OPEN)
+        places = np.full(len(ends.period), OPEN)
         if ends.rest.any():
             places[ends.rest] = self.add_rest()
         self._say(ends.ended, "are ended by a margin of the model or cannot go on", places)
-        for q in np.unique(ends.cycle[ends.cycle > 0]):
-            rows = np.flatnonzero(ends.cycle == q)
+        for q in np.unique(ends.period[ends.period > 0]):
+            rows = np.flatnonzero(ends.period == q)
             while rows.size:
-                strobes = ends.strobes[rows[0], -q:]
+                strobes = ends.states[rows[0], -q:]
                 place = self._cycle(strobes)
-                here = Target(0, "periodic", strobes).distance(ends.strobes[rows, -1]) < _near(strobes)
+                here = Target(0, "periodic", strobes).distance(ends.states[rows, -1]) < _near(strobes)
                 here[0] = True
                 places[rows[here]] = place
                 rows = rows[~here]
@@ -121,12 +122,12 @@ class Collection:
 
     def strobes_of(self, orbit: PeriodicOrbit) -> np.ndarray:
         """The points of an orbit at phase 0, (periods, 2)."""
-        return strobes_from(self.system, np.array([orbit.state]), orbit.period)[0]
+        return section_states(self.system, np.array([orbit.state]), orbit.period)[0]
 
-    def belonging(self, ends: Ends, places: np.ndarray) -> None:
+    def belonging(self, ends: Recurrence, places: np.ndarray) -> None:
         """Give motions that have not settled to the attractor on which, or within NEAR of which, they move."""
         for i in np.flatnonzero(places == OPEN):
-            last = ends.strobes[i, -SPREAD:]
+            last = ends.states[i, -SPREAD:]
             for place, target in enumerate(self.targets):
                 apart = target.distance(last)
                 if (
@@ -137,11 +138,11 @@ class Collection:
                     places[i] = place
                     break
 
-    def judge(self, ends: Ends, i: int, max_period: int) -> int:
+    def judge(self, ends: Recurrence, i: int, max_period: int) -> int:
         """The place of what motion i, which does not settle, moves on, by its verdict; FAILED if there is none."""
         from saltus.attractors.verdict.classification import classify
 
-        state = ends.strobes[i, -1]
+        state = ends.states[i, -1]
         start: dict[str, Any] = {self.system.model.coordinates[0]: float(state[0]), "velocity": float(state[1])}
         verdict = classify(self.system, **start, periods=VERDICT_PERIODS, max_period=max(max_period, 16))
         if verdict.kind == "rest":
@@ -162,9 +163,9 @@ class Collection:
     def _sampled(self, state: np.ndarray) -> tuple[np.ndarray, tuple[float, float]]:
         name = self.system.model.coordinates[0]
         sample = ("state", "extrema")
-        result = ensemble(self.system, state[None], periods=CLOUD, sample=sample, last="all", tol=1e-10)
+        result = motions_from(self.system, state[None], periods=CLOUD, sample=sample, last="all", tol=1e-10)
         low, high = (float(result[f"overall_{which}_{name}"].values[0]) for which in ("smallest", "largest"))
-        return sampled(self.system, result)[0], (low, high)
+        return stroboscopic(self.system, result)[0], (low, high)
 
     def add_images(self) -> None:
         """Add the mirror image of every attractor of a system with that symmetry: it is an attractor as well."""
@@ -179,7 +180,7 @@ class Collection:
 
     def _image(self, place: int) -> int | None:
         target, (lowest, highest) = self.targets[place], self.ranges[place]
-        strobes = -strobes_from(self.system, target.strobes, 0.5)[:, 0]
+        strobes = -section_states(self.system, target.strobes, 0.5)[:, 0]
         if target.dense:
             for other, known in enumerate(self.targets):
                 if known.dense and np.median(known.distance(strobes)) < known.grain:
@@ -200,11 +201,6 @@ class Collection:
             named = Target(label_of[place], target.kind, target.strobes)
             result.append(Attractor(named, high, low, orbit, int(counts[place]), of, mirror, self.evidence[place]))
         return tuple(sorted(result, key=lambda member: member.label))
-
-
-def strobes_from(system: System, states: np.ndarray, periods: float) -> np.ndarray:
-    """The states at the ends of the following forcing periods, (n, periods, 2); of half a period, at its end."""
-    return sampled(system, ensemble(system, states, periods=periods, last="all", tol=1e-13))
 
 
 def _near(points: np.ndarray) -> float:

@@ -7,12 +7,25 @@ from .ensemble.inputs import Inputs, read_inputs
 from .ensemble.threads import Jobs, Lanes, available_cores
 from .load_release import Release, contact_pull, load_releases, peak_near
 from .motion import DenseOutput, Event, EventKind, Impacts, Motion
+from .recurrence import (
+    RECURRENCE,
+    Outcome,
+    Recurrence,
+    RecurrenceSettings,
+    find_recurrence,
+    last_states,
+    motions_from,
+    nearest_return,
+    return_distances,
+    return_period,
+)
 from .sensitivity import Sensitivities, sensitivities
 from .simulation import limits_of, program, simulate, taylor_order
 from .stops import Stop
 from .validity import Validity
 
 __all__ = [
+    "RECURRENCE",
     "DenseOutput",
     "Event",
     "EventKind",
@@ -21,6 +34,9 @@ __all__ = [
     "Jobs",
     "Lanes",
     "Motion",
+    "Outcome",
+    "Recurrence",
+    "RecurrenceSettings",
     "Release",
     "Sensitivities",
     "Stop",
@@ -29,15 +45,21 @@ __all__ = [
     "available_cores",
     "compiled_lanes",
     "contact_pull",
+    "find_recurrence",
+    "last_states",
     "limits_of",
     "load_advance",
     "load_driver",
     "load_helpers",
     "load_releases",
     "load_segments",
+    "motions_from",
+    "nearest_return",
     "peak_near",
     "program",
     "read_inputs",
+    "return_distances",
+    "return_period",
     "sensitivities",
     "simulate",
     "simulate_many",

@@ -9,7 +9,16 @@ import numpy as np
 
 from saltus.checks import check_count
 from saltus.errors import MotionError, ParameterError
-from saltus.flow import EventKind, Motion, load_releases, simulate
+from saltus.flow import (
+    RECURRENCE,
+    EventKind,
+    Motion,
+    load_releases,
+    nearest_return,
+    return_distances,
+    return_period,
+    simulate,
+)
 from saltus.orbits.newton import solve
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
@@ -19,7 +28,6 @@ from saltus.orbits.symmetry import half, is_symmetric, keeps_symmetry
 from saltus.systems import System
 
 LONGEST = 12  # forcing periods of an orbit that is looked for if none are named
-NEAR = 1e-6  # between states a period apart that have settled: Newton's method does the rest
 ROUNDS = 5  # of settling, each longer than the one before
 
 
@@ -118,30 +126,28 @@ def _vector(system: System, state: dict[str, Any]) -> np.ndarray:
     return np.concatenate([[state[name] for name in system.model.coordinates], np.atleast_1d(state["velocity"])])
 
 
-def _strobes(system: System, state: dict[str, Any], count: int) -> list[np.ndarray]:
-    """The states after 0, 1, ... forcing periods."""
-    strobes = [_vector(system, state)]
+def _stroboscopic_states(system: System, state: dict[str, Any], count: int) -> np.ndarray:
+    """The states after 0, 1, ..., count forcing periods."""
+    states = [_vector(system, state)]
     for _ in range(count):
         state = _after(system, state, 1)
-        strobes.append(_vector(system, state))
-    return strobes
+        states.append(_vector(system, state))
+    return np.array(states)
 
 
 def _returning(system: System, state: dict[str, Any], period: int | None, max_period: int) -> int | None:
     """The fewest forcing periods after which a settled motion returns, or None."""
-    strobes = _strobes(system, state, period or max_period)
-    for q in (period,) if period else range(1, max_period + 1):
-        if np.abs(strobes[q] - strobes[0]).max() < NEAR:
-            return q
-    return None
+    states = _stroboscopic_states(system, state, period or max_period)[::-1]
+    if period is None:
+        return int(return_period(states, max_period)) or None
+    return period if return_distances(states, period)[-1] < RECURRENCE.near_return else None
 
 
 def _period_of(system: System, state: dict[str, Any], period: int | None, max_period: int) -> int:
     """The number of forcing periods after which a motion comes nearest to where it was, if it is not given."""
     if period is not None:
         return period
-    strobes = _strobes(system, state, max_period)
-    return 1 + int(np.argmin([np.abs(strobes[q] - strobes[0]).max() for q in range(1, max_period + 1)]))
+    return nearest_return(_stroboscopic_states(system, state, max_period)[::-1], max_period)
 
 
 def _polish(base: Problem, state: dict[str, Any], periods: int, passed: int | None) -> PeriodicOrbit:

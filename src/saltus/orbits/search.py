@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.checks import check_count
 from saltus.errors import ParameterError
-from saltus.flow import simulate_many
+from saltus.flow import RECURRENCE, Recurrence, find_recurrence
 from saltus.orbits.find import orbit_from
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
@@ -22,7 +22,8 @@ SETTLE = 200  # forcing periods before the motion is taken to have settled
 TRANSIENT = 24  # forcing periods of each motion in which near returns are looked for
 RETURN = 0.15  # distance of a near return from which Newton's method is tried for an orbit that repels
 GUESSES = 12  # the nearest returns that are tried, for each period
-SETTLED = 1e-6
+STILL = 1e-6  # a motion that stays this near to the contact is at rest
+SAME_STATE = 1e-5  # a settled motion this near to a known one is the same
 EVEN = 1.32471795724474602596 ** -np.array([1.0, 2.0])  # steps that cover a square evenly: x^-1, x^-2 of x^3 = x + 1
 
 
@@ -97,20 +98,23 @@ def search_orbits(
     if len(system.model.coordinates) > 1:
         raise ParameterError("search_orbits works on models with one coordinate; use find_orbit from your own states")
     states = initial_states(system, starts, region, seed)
-    early, late, extrema = _strobes(system, path, grid, states, max_period)
+    early, late = _follow(system, path, grid, states, max_period)
+    assert late.extrema is not None
+    excursion = np.abs(late.extrema - _contact(system)[0]).max(axis=(1, 2))
     found: list[PeriodicOrbit] = []
     unsettled, at_rest = np.zeros(len(grid), dtype=int), np.zeros(len(grid), dtype=int)
     settled: list[tuple[float, int, float, float]] = []
     for i, value in enumerate(grid):
         base = Problem(system.with_({path: float(value)}), Signature((), 1), (path,))
-        alive = np.isfinite(late[i]).all(axis=(1, 2))
-        moving = alive & (np.abs(extrema[i] - _contact(system)[0]).max(axis=(1, 2)) > 1e-6)
-        at_rest[i] = int((alive & ~moving).sum())
-        here, seen, unsettled[i] = _attracting(base, late[i][moving], extrema[i][moving], max_period)
+        rows = np.arange(i * starts, (i + 1) * starts)
+        alive = rows[np.isfinite(late.states[rows]).all(axis=(1, 2))]
+        moving = alive[excursion[alive] > STILL]
+        at_rest[i] = len(alive) - len(moving)
+        here, seen, unsettled[i] = _attracting(base, late.only(moving))
         settled += [(float(value), *row) for row in seen]
         reach = max_period if repelling is None else repelling
         if reach > 0:
-            here += _repelling(base, np.concatenate([early[i][moving], late[i][moving]]), reach, here)
+            here += _repelling(base, np.concatenate([early.states[moving], late.states[moving]]), reach, here)
         found += here
         if progress is not None:
             progress((i + 1) / len(grid))
@@ -148,51 +152,31 @@ def _contact(system: System) -> np.ndarray:
     return np.array([float(system.model.contact) if system.model.sides else 0.0, 0.0])
 
 
-def _strobes(
-    system: System, path: str, grid: np.ndarray, states: np.ndarray, max_period: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States at the ends of forcing periods, (values, starts, periods, 2): early ones, those after settling, and the extrema of
-    the first coordinate in the latter."""
-    name, kept = system.model.coordinates[0], max(TRANSIENT, max_period + 1)
-
-    def run(theta: Any, velocity: Any, periods: int) -> tuple[np.ndarray, np.ndarray]:
-        result = simulate_many(
-            system,
-            **{name: theta},
-            velocity=velocity,
-            parameters={path: grid[:, None]},
-            periods=periods,
-            sample=("state", "extrema"),
-            last=kept,
-            tol=1e-11,
-        )
-        states = np.stack([result[f"sampled_{name}"].values, result["sampled_velocity"].values], axis=-1)
-        return states, np.stack([result[f"largest_{name}"].values, result[f"smallest_{name}"].values], axis=-1)
-
-    early, _ = run(states[None, :, 0], states[None, :, 1], kept)
-    last = np.nan_to_num(early[:, :, -1], nan=float(_contact(system)[0]))
-    late, extrema = run(last[:, :, 0], np.where(np.isfinite(early[:, :, -1, 1]), last[:, :, 1], 0.0), SETTLE)
-    return early, late, extrema
+def _follow(system: System, path: str, grid: np.ndarray, states: np.ndarray, max_period: int) -> tuple[Recurrence, Recurrence]:
+    """Motions from the same states at every value, a row for each: their first periods, and how they go on and settle."""
+    kept = max(TRANSIENT, max_period + 1)
+    parameters = {path: np.repeat(grid, len(states))}
+    options: dict[str, Any] = {"parameters": parameters, "max_period": max_period, "kept": kept, "stop_early": False}
+    early = find_recurrence(system, np.tile(states, (len(grid), 1)), kept, **options)
+    begin = np.where(np.isfinite(early.states[:, -1]), early.states[:, -1], _contact(system))
+    return early, find_recurrence(system, begin, SETTLE, extrema=True, **options)
 
 
-def _attracting(
-    base: Problem, late: np.ndarray, extrema: np.ndarray, max_period: int
-) -> tuple[list[PeriodicOrbit], list[tuple[int, float, float]], int]:
+def _attracting(base: Problem, late: Recurrence) -> tuple[list[PeriodicOrbit], list[tuple[int, float, float]], int]:
     """The orbits on which settled motions are, what simulation shows of each, and how many motions have not settled."""
     found: list[PeriodicOrbit] = []
     seen: list[tuple[int, float, float]] = []
     known = np.empty((0, 2))
     unsettled = 0
-    for strobes, range_ in zip(late, extrema, strict=True):
-        if known.size and np.abs(known - strobes[-1]).max(axis=1).min() < 1e-5:
+    for states, period, highest, lowest in zip(late.states, late.period.tolist(), late.highest, late.lowest, strict=True):
+        if known.size and np.abs(known - states[-1]).max(axis=1).min() < SAME_STATE:
             continue
-        period = next((q for q in range(1, max_period + 1) if np.abs(strobes[-1] - strobes[-1 - q]).max() < SETTLED), None)
-        if period is None:
+        if not period:
             unsettled += 1
             continue
-        known = np.concatenate([known, strobes[-period:]])
-        seen.append((period, float(range_[-period:, 0].max()), float(range_[-period:, 1].min())))
-        orbit = _newton(base, strobes[-1], period)
+        known = np.concatenate([known, states[-period:]])
+        seen.append((period, float(highest), float(lowest)))
+        orbit = _newton(base, states[-1], period)
         if orbit is not None:
             _add(found, orbit)
     return found, seen, unsettled
@@ -210,7 +194,7 @@ def _repelling(base: Problem, strobes: np.ndarray, max_period: int, known: list[
         order = np.argsort(distance)
         tried: list[np.ndarray] = []
         for i in order:
-            if not SETTLED < distance[i] < RETURN or len(tried) >= GUESSES:
+            if not RECURRENCE.near_return < distance[i] < RETURN or len(tried) >= GUESSES:
                 if distance[i] >= RETURN or len(tried) >= GUESSES:
                     break
                 continue
@@ -231,7 +215,7 @@ def _newton(base: Problem, state: np.ndarray, period: int) -> PeriodicOrbit | No
         orbit = orbit_from(base, {name: float(state[0]), "velocity": float(state[1])}, period)
     except MotionError:
         return None
-    return orbit if orbit is not None and orbit.admissible and orbit.amplitude > 1e-6 else None
+    return orbit if orbit is not None and orbit.admissible and orbit.amplitude > STILL else None
 
 
 def _add(found: list[PeriodicOrbit], orbit: PeriodicOrbit) -> None:

@@ -16,7 +16,8 @@ from saltus.attractors.attractor import UNDECIDED, Attractors
 from saltus.attractors.attractors_dataset import is_constant
 from saltus.attractors.manifolds.phase_plane import separatrices
 from saltus.attractors.manifolds.saddle_manifolds import HYPERBOLIC, check_window, stable_manifold
-from saltus.attractors.registry import Collection, strobes_from
+from saltus.attractors.registry import Collection
+from saltus.attractors.stroboscopic_section import section_states
 from saltus.orbits import PeriodicOrbit, is_symmetric, same_orbit
 from saltus.systems import System
 
@@ -79,7 +80,7 @@ def edge_saddles(system: System, low: np.ndarray, high: np.ndarray) -> list[Peri
     if not len(low):
         return []
     collection, found = Collection(system), list[PeriodicOrbit]()
-    for track in strobes_from(system, 0.5 * (low + high), TRACKED):
+    for track in section_states(system, 0.5 * (low + high), TRACKED):
         for state, periods in _returns(track):
             orbit = collection.solved(state, periods)
             if orbit is None or not _is_saddle(orbit):
@@ -123,6 +124,6 @@ def _image(collection: Collection, orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
     """The mirror image of an orbit that is not its own."""
     if orbit.symmetric or not is_symmetric(collection.system):
         return []
-    state = -strobes_from(collection.system, np.array([orbit.state]), 0.5)[0, 0]
+    state = -section_states(collection.system, np.array([orbit.state]), 0.5)[0, 0]
     image = collection.solved(state, orbit.period)
     return [] if image is None else [image]

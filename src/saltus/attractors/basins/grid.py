@@ -13,7 +13,7 @@ from saltus.attractors.attractor import NEAR, REST, UNDECIDED, Attractor, Attrac
 from saltus.attractors.attractors_dataset import attractor_table, coordinate, labels, provenance
 from saltus.attractors.basins.labelling import label_states
 from saltus.attractors.find import find_attractors
-from saltus.attractors.recurrence import clocked
+from saltus.attractors.stroboscopic_section import with_clock
 from saltus.checks import check_axis, check_count, check_number, checked_by
 from saltus.errors import ParameterError
 from saltus.orbits import REGION
@@ -42,7 +42,7 @@ def _check(
     progress: object,
     **coordinates: Any,
 ) -> None:
-    grid = _grid(clocked(system), velocity, coordinates, found)
+    grid = _grid(with_clock(system), velocity, coordinates, found)
     check_count("periods", periods, 32)
     check_number("within", within, above=0.0)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
@@ -94,7 +94,7 @@ def basins_of_attraction(
     Raises:
         ParameterError: as for `attractors`; a grid that does not increase; attractors of another system.
     """
-    clock = clocked(system)
+    clock = with_clock(system)
     grid = _grid(clock, velocity, coordinates, found)
     say = progress or (lambda _: None)
     say(0.0)
@@ -129,7 +129,7 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
     targets = [Target.from_dict(item) for item in arguments["attractors"]]
     grid = np.asarray(block["velocity"], dtype=float), np.asarray(block[system.model.coordinates[0]], dtype=float)
     numbers = (int(arguments["periods"]), float(arguments["within"]), float(arguments["tol"]))
-    label, time = _all_cells(clocked(system), targets, grid, *numbers)
+    label, time = _all_cells(with_clock(system), targets, grid, *numbers)
     return {"label": label, "time": time}
 
 
@@ -160,7 +160,7 @@ def _with_new(
 ) -> tuple[tuple[Attractor, ...], np.ndarray, np.ndarray, list[str]]:
     """Attractors that only cells of the grid lead to, and these cells with their labels."""
     members, reasons = list(found.members), list(found.reasons)
-    clock, seen = clocked(system), np.zeros(label.shape, dtype=bool)
+    clock, seen = with_clock(system), np.zeros(label.shape, dtype=bool)
     for _ in range(ROUNDS):
         rows, columns = np.nonzero((label == UNDECIDED) & ~seen)
         if not rows.size:
@@ -185,7 +185,7 @@ def _meeting(found: Attractors, grid: Grid, label: np.ndarray, periods: int, wit
     """The curves at which basins meet, as variables."""
     from saltus.attractors.basins.boundaries import boundaries, clipped
 
-    clock, (name, unit) = clocked(found.system), coordinate(found.system)
+    clock, (name, unit) = with_clock(found.system), coordinate(found.system)
     curves = boundaries(
         found, lambda states: label_states(clock, found.targets, states, periods, within, tol)[0], label, grid[1], grid[0]
     )
@@ -263,7 +263,7 @@ def _dataset(
     name, unit = coordinate(system)
     dims = ("velocity", name)
     share = [float((label == member.label).mean()) for member in members]
-    period = clocked(system).load.period or math.nan
+    period = with_clock(system).load.period or math.nan
     variables: dict[str, Any] = attractor_table(members, system)
     variables |= {
         "label": (dims, label, {"units": "1", "long_name": "attractor on which the motion ends, -1 for undecided"}),

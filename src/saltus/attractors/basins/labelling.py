@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 
 import numpy as np
 
 from saltus.attractors.attractor import NEAR, REST, UNDECIDED, Target
-from saltus.attractors.recurrence import MOST_STATES, Ends, settle
+from saltus.flow import Recurrence, find_recurrence
 from saltus.systems import System
 
+MOST_STATES = 1 << 22  # states at phase 0 kept at once: 67 MB, and as much again for what is made of them
 STAGE = 48  # forcing periods after which motions that have settled are told from those that go on, longer later
 LAST = 64  # strobes of a motion that does not settle which must lie on a sampled set
 
@@ -43,46 +43,44 @@ def _block(
     rows, history, done = np.arange(len(states)), states[:, None], 0
     while rows.size and done < periods:
         span = min(max(STAGE, done // 2), periods - done)
-        stage = settle(system, history[:, -1], span, tol=tol)
-        history = np.concatenate([history, stage.strobes], axis=1)
-        ends = replace(stage, strobes=history, periods=stage.periods + done)
+        ends = find_recurrence(system, history[:, -1], span, tol=tol).after(done, history)
         done += span
         label[rows] = _labelled(targets, ends, sampled=done == periods)
         time[rows] = _times(targets, label[rows], ends, within)
-        on = ends.moving & (label[rows] == UNDECIDED)
-        rows, history = rows[on], history[on]
+        on = ends.unsettled & (label[rows] == UNDECIDED)
+        rows, history = rows[on], ends.states[on]
     return label, time
 
 
-def _labelled(targets: tuple[Target, ...], ends: Ends, sampled: bool) -> np.ndarray:
+def _labelled(targets: tuple[Target, ...], ends: Recurrence, sampled: bool) -> np.ndarray:
     """The labels of motions by their ends; with `sampled`, those that do not settle may lie on a set known by its points."""
-    label = np.full(len(ends.cycle), UNDECIDED, dtype=np.int16)
+    label = np.full(len(ends.period), UNDECIDED, dtype=np.int16)
     for target in targets:
         if target.kind == "rest":
             label[ends.rest] = REST
         elif target.kind == "periodic":
             label[_on_cycle(target, ends)] = target.label
         elif sampled:
-            rows = np.flatnonzero(ends.moving & (label == UNDECIDED))
+            rows = np.flatnonzero(ends.unsettled & (label == UNDECIDED))
             if rows.size:
-                apart = np.median(target.distance(ends.strobes[rows, -LAST:]), axis=1)
+                apart = np.median(target.distance(ends.states[rows, -LAST:]), axis=1)
                 label[rows[apart < target.grain]] = target.label
     return label
 
 
-def _on_cycle(target: Target, ends: Ends) -> np.ndarray:
+def _on_cycle(target: Target, ends: Recurrence) -> np.ndarray:
     """Which motions have settled on a cycle, or were near it for two rounds, and nearer in the second, (n,)."""
-    last, q = ends.strobes[:, -1], len(target.strobes)
+    last, q = ends.states[:, -1], len(target.strobes)
     near = NEAR * np.maximum(1.0, np.abs(last).max(axis=1))
-    here: np.ndarray = (target.distance(last) < near) & ((ends.cycle > 0) | ends.moving)
-    rows = np.flatnonzero(here & ends.moving)
-    rounds = target.distance(ends.strobes[rows, -2 * q :])
+    here: np.ndarray = (target.distance(last) < near) & ((ends.period > 0) | ends.unsettled)
+    rows = np.flatnonzero(here & ends.unsettled)
+    rounds = target.distance(ends.states[rows, -2 * q :])
     before, after = rounds[:, :q].max(axis=1), rounds[:, q:].max(axis=1)
     here[rows] = (before < near[rows]) & (after < before) & (rounds.shape[1] == 2 * q)
     return here
 
 
-def _times(targets: tuple[Target, ...], label: np.ndarray, ends: Ends, within: float) -> np.ndarray:
+def _times(targets: tuple[Target, ...], label: np.ndarray, ends: Recurrence, within: float) -> np.ndarray:
     """Forcing periods after which each motion stays near its attractor, up to its end; nan where undecided.
 
     The strobes begin with the initial state; nan stands for periods that were not needed.
@@ -92,7 +90,7 @@ def _times(targets: tuple[Target, ...], label: np.ndarray, ends: Ends, within: f
         rows = np.flatnonzero(label == target.label)
         if not rows.size:
             continue
-        strobes = ends.strobes[rows]
+        strobes = ends.states[rows]
         known = np.isfinite(strobes[:, :, 0])
         far = known & (target.distance(strobes) > max(within, target.grain))
         last = far.shape[1] - 1 - np.argmax(far[:, ::-1], axis=1)

@@ -10,12 +10,13 @@ import numpy as np
 
 from saltus.attractors.lyapunov.area_contraction import impact_factor
 from saltus.attractors.lyapunov.averages import average, uncertainty
-from saltus.attractors.lyapunov.renormalisation import check_periodic, check_run
+from saltus.attractors.lyapunov.renormalisation import check_run
 from saltus.attractors.lyapunov.spectrum import resolution
 from saltus.attractors.lyapunov.tangent_frames import Stretched, stretch_many
+from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.checks import check_number
 from saltus.errors import ParameterError
-from saltus.flow import Inputs, read_inputs, simulate_many
+from saltus.flow import Inputs, read_inputs, simulate_many, stop_names
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ class _Many:
         if not periods or not len(states):
             return states, captured
         result = self._follow(states, periods, ("rest", "settled"))
-        stop = _words(result)
+        stop = stop_names(result)
         states[:, 0], states[:, 1] = result[self._name].values, result["velocity"].values
         captured = stop == "captured"
         states[~np.isin(stop, ("horizon", "rest", "settled", "captured"))] = np.nan
@@ -129,10 +130,6 @@ class _Many:
         return simulate_many(
             self.system, **begin, velocity=states[rows, 1], parameters=given, until=until, sample=(), tol=self.tol, **length
         )
-
-
-def _words(result: Any) -> np.ndarray:
-    return np.array(result["stop"].attrs["flag_meanings"].split())[result["stop"].values]
 
 
 def _measures(system: System, run: _Many, stretched: Stretched, captured: np.ndarray) -> dict[str, np.ndarray]:

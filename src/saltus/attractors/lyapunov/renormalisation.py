@@ -9,8 +9,7 @@ import numpy as np
 
 from saltus.attractors.lyapunov.averages import BATCHES
 from saltus.checks import check_count
-from saltus.errors import ParameterError
-from saltus.systems import Record, System
+from saltus.systems import System
 
 LONGEST = 6.5  # units of time: a forcing period at Omega = 1, over which derivatives grow and shrink by less than 1e6
 
@@ -33,17 +32,6 @@ def first_frame(size: int) -> np.ndarray:
     """
     frame: np.ndarray = np.linalg.qr(np.random.default_rng(0).standard_normal((size, size)))[0]
     return frame
-
-
-def check_periodic(system: System) -> None:
-    """Refuse loads by records of samples: what goes on for ever under them is not defined.
-
-    Raises:
-        ParameterError: with the channel.
-    """
-    for name, signal in system.load.channels.items():
-        if any(isinstance(term, Record) for term in getattr(signal, "terms", (signal,))):
-            raise ParameterError(f"load.{name} is a record, which ends: attractors and exponents take constant or harmonic loads")
 
 
 def check_run(periods: Any, transient: Any) -> None:

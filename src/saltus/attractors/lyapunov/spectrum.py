@@ -11,8 +11,9 @@ import numpy as np
 
 from saltus.attractors.lyapunov.area_contraction import Contraction
 from saltus.attractors.lyapunov.averages import BATCHES, average, uncertainty
-from saltus.attractors.lyapunov.renormalisation import check_periodic, check_run, first_frame, pieces_of
+from saltus.attractors.lyapunov.renormalisation import check_run, first_frame, pieces_of
 from saltus.attractors.lyapunov.two_trajectory import shadow_growth
+from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.errors import ParameterError
 from saltus.flow import Motion, Stop, sensitivities, simulate
 from saltus.systems import System

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors.manifolds.saddle_manifolds import check_window
-from saltus.attractors.recurrence import clocked
+from saltus.attractors.stroboscopic_section import with_clock
 from saltus.errors import ParameterError
 from saltus.systems import Constant, System
 
@@ -68,7 +68,7 @@ def equilibria(system: System, window: Any = ((-3.0, 3.0), (-3.0, 3.0))) -> tupl
 
 def check_constant(system: System) -> None:
     """Refuse what has no phase plane."""
-    clocked(system)
+    with_clock(system)
     for name, signal in system.load.channels.items():
         if not isinstance(signal, Constant):
             raise ParameterError(

@@ -18,11 +18,10 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors.manifolds.manifold_growth import Level, Window, grow
-from saltus.attractors.recurrence import ensemble
-from saltus.attractors.registry import strobes_from
+from saltus.attractors.stroboscopic_section import section_states
 from saltus.checks import check_count, check_number
 from saltus.errors import MotionError, ParameterError
-from saltus.flow import sensitivities
+from saltus.flow import motions_from, sensitivities
 from saltus.orbits import PeriodicOrbit
 from saltus.systems import System, reversed_system
 
@@ -120,7 +119,7 @@ def _manifold(orbit: PeriodicOrbit, stable: bool, window: Any, periods: int, ste
     system = orbit.system
     moving = reversed_system(system) if stable else system
     q = orbit.period
-    strobes = np.roll(strobes_from(system, np.array([orbit.state]), q)[0], 1, axis=0)
+    strobes = np.roll(section_states(system, np.array([orbit.state]), q)[0], 1, axis=0)
     multiplier, directions = _directions(system, strobes, stable)
     ratio = 1.0 / abs(multiplier) if stable else abs(multiplier)
     curves: list[Curve] = []
@@ -170,7 +169,7 @@ def _flow(system: System, backward: bool) -> Any:
     name, sign = system.model.coordinates[0], -1.0 if backward else 1.0
 
     def flow(points: np.ndarray, periods: int) -> np.ndarray:
-        result = ensemble(system, points * np.array([1.0, sign]), periods=periods, sample=(), tol=TOLERANCE)
+        result = motions_from(system, points * np.array([1.0, sign]), periods=periods, sample=(), tol=TOLERANCE)
         ends = np.stack([result[name].values, sign * result["velocity"].values], axis=1)
         ends[result["periods"].values < periods] = np.nan
         return ends

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors.lyapunov.averages import BATCHES
-from saltus.attractors.recurrence import clocked, settle
+from saltus.attractors.stroboscopic_section import with_clock
 from saltus.attractors.verdict.nonsettling import STAGES, STROBES, wandering
 from saltus.attractors.verdict.verdict import DRIVEN_MAX_PERIOD, Case, Verdict, settled
 from saltus.checks import check_count, check_number
@@ -55,7 +55,7 @@ def classify(
     Raises:
         ParameterError: an argument without meaning.
     """
-    clock, start = clocked(system), _start(system, velocity, coordinates)
+    clock, start = with_clock(system), _start(system, velocity, coordinates)
     for name, value, least in (
         ("periods", periods, STAGES * 2 * BATCHES),
         ("transient", transient, 0),
@@ -63,9 +63,7 @@ def classify(
     ):
         check_count(name, value, least)
     case = Case(system, clock, int(periods), int(max_period), int(seed), float(tol), progress or (lambda done: None))
-    ends = settle(
-        clock, start, int(transient + periods), kept=max(STROBES, 4 * int(max_period)), tol=tol, progress=case.part(0.0, 0.1)
-    )
+    ends = case.follow(start, int(transient + periods), max(STROBES, 4 * int(max_period)), (0.0, 0.1))
     verdict = settled(case, ends, start[0]) or wandering(case, ends)
     case.progress(1.0)
     return verdict

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from saltus.attractors.lyapunov.spectrum import Exponents, lyapunov_spectrum
 from saltus.attractors.orbit_certificate import certify
-from saltus.attractors.recurrence import Ends, settle
 from saltus.attractors.verdict.tori import excludes_tori
 from saltus.attractors.verdict.verdict import Case, Verdict, on_cycle, settled
 from saltus.attractors.verdict.zero_one_test import SHORTEST, ZeroOne, zero_one_test
+from saltus.flow import Recurrence
 
 STAGES = 3  # the first estimate of the exponents takes a third of `periods`, the second one the rest, twice as many
 STROBES = 2000  # states at phase 0 that the 0-1 test looks at
@@ -22,13 +22,13 @@ COMPANIONS = 128  # motions from states beside the last one, to see whether the 
 ASIDE = 1e-6  # how far: a chaotic motion of exponent 0.03 forgets it within 500 units of time
 
 
-def wandering(case: Case, ends: Ends) -> Verdict:
+def wandering(case: Case, ends: Recurrence) -> Verdict:
     """The verdict on a motion that has not settled."""
     if case.system.load.period is None:
         text = "under constant loads it goes on moving: it has not lost its energy, or has none to lose"
         return case.verdict("undecided", text, ends)
-    stages = _stages(case, ends.strobes[0, -1])
-    last, series = stages[-1], ends.strobes[0, :, 0]
+    stages = _stages(case, ends.states[0, -1])
+    last, series = stages[-1], ends.states[0, :, 0]
     series = series[np.isfinite(series)]
     opinion = zero_one_test(series, seed=case.seed) if series.size >= SHORTEST else None
     followed = round(float(ends.periods[0])) + sum(stage.periods for stage in stages if stage.note is None)
@@ -36,8 +36,8 @@ def wandering(case: Case, ends: Ends) -> Verdict:
     given: dict[str, Any] = {"exponents": last, "zero_one": opinion, "state": last.state}
     given |= {"periods": followed, "evidence": evidence}
     later = _beside(case, last.state)
-    evidence |= {"companions": COMPANIONS, "companions_settled": int((~later.moving[1:]).sum())}
-    verdict = settled(case, _only_first(later), _row(case, last.state))
+    evidence |= {"companions": COMPANIONS, "companions_settled": int((~later.unsettled[1:]).sum())}
+    verdict = settled(case, later.only(slice(1)), _row(case, last.state))
     if verdict is not None:
         return _after_all(verdict, given)
     if last.note is not None:
@@ -78,20 +78,15 @@ def _numbers(stages: list[Exponents], opinion: ZeroOne | None) -> dict[str, Any]
     }
 
 
-def _beside(case: Case, state: dict[str, Any]) -> Ends:
+def _beside(case: Case, state: dict[str, Any]) -> Recurrence:
     """How motions end that begin at a state, the first, and beside it."""
     around = np.random.default_rng(case.seed).uniform(-ASIDE, ASIDE, (COMPANIONS, 2))
     states = _row(case, state) + np.concatenate([[[0.0, 0.0]], around])
-    kept = 4 * case.max_period
-    return settle(case.clock, states, max(case.periods, LEAST), kept=kept, tol=case.tol, progress=case.part(0.9, 1.0))
+    return case.follow(states, max(case.periods, LEAST), 4 * case.max_period, (0.9, 1.0))
 
 
 def _row(case: Case, state: dict[str, Any]) -> np.ndarray:
     return np.array([state[case.system.model.coordinates[0]], state["velocity"]])
-
-
-def _only_first(ends: Ends) -> Ends:
-    return Ends(**{part.name: getattr(ends, part.name)[:1] for part in fields(ends)})
 
 
 def _after_all(verdict: Verdict, given: dict[str, Any]) -> Verdict:
@@ -107,7 +102,7 @@ def _after_all(verdict: Verdict, given: dict[str, Any]) -> Verdict:
     )
 
 
-def _chaotic(case: Case, ends: Ends, last: Exponents, opinion: ZeroOne | None, given: dict[str, Any]) -> Verdict:
+def _chaotic(case: Case, ends: Recurrence, last: Exponents, opinion: ZeroOne | None, given: dict[str, Any]) -> Verdict:
     """Chaos, unless it has a way out or the 0-1 test sees order."""
     size = f"{last.values[0]:.4g} +- {last.errors[0]:.1g}"
     left = given["evidence"]["companions_settled"]
@@ -125,7 +120,7 @@ def _chaotic(case: Case, ends: Ends, last: Exponents, opinion: ZeroOne | None, g
     return case.verdict("chaotic", text, ends, **given)
 
 
-def _regular(case: Case, ends: Ends, last: Exponents, opinion: ZeroOne | None, given: dict[str, Any]) -> Verdict:
+def _regular(case: Case, ends: Recurrence, last: Exponents, opinion: ZeroOne | None, given: dict[str, Any]) -> Verdict:
     """A motion that has not settled and whose largest exponent is not surely above 0."""
     top, error = float(last.values[0]), float(last.errors[0] + last.resolution)
     size = f"{top:.4g} +- {float(last.errors[0]):.1g}"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors.lyapunov.renormalisation import check_periodic
+from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.bounds import Interval, Leaves, enclose, reads
 from saltus.errors import ParameterError
 from saltus.systems import System

@@ -10,10 +10,9 @@ import numpy as np
 
 from saltus.attractors.lyapunov.spectrum import Exponents
 from saltus.attractors.orbit_certificate import Certificate, certify
-from saltus.attractors.recurrence import Ends
 from saltus.attractors.verdict.zero_one_test import ZeroOne
 from saltus.errors import MotionError
-from saltus.flow import simulate
+from saltus.flow import Recurrence, find_recurrence, simulate
 from saltus.orbits import PeriodicOrbit
 from saltus.systems import System
 
@@ -73,16 +72,23 @@ class Case:
         """The progress of a part of the work."""
         return lambda done: self.progress(begin + (end - begin) * done)
 
-    def verdict(self, kind: str, reason: str, ends: Ends, **more: Any) -> Verdict:
+    def follow(self, states: np.ndarray, periods: int, kept: int, part: tuple[float, float]) -> Recurrence:
+        """How motions end from states (n, 2) within so many forcing periods; with the part of the work that this is."""
+        done = self.part(*part)
+        return find_recurrence(
+            self.clock, states, periods, max_period=self.max_period, kept=kept, tol=self.tol, progress=lambda x, _: done(x)
+        )
+
+    def verdict(self, kind: str, reason: str, ends: Recurrence, **more: Any) -> Verdict:
         """A verdict on a motion that ended so."""
-        last = ends.strobes[0, -1]
+        last = ends.states[0, -1]
         state = {self.system.model.coordinates[0]: float(last[0]), "velocity": float(last[1])}
         given = {"period": None, "orbit": None, "exponents": None, "zero_one": None, "state": state} | more
         given.setdefault("periods", round(float(ends.periods[0])))
         return Verdict(system=self.system, kind=kind, reason=reason, **given)
 
 
-def settled(case: Case, ends: Ends, start: np.ndarray) -> Verdict | None:
+def settled(case: Case, ends: Recurrence, start: np.ndarray) -> Verdict | None:
     """The verdict on a motion from a state (2,) that has come to rest, ended or repeats itself; None where it wanders on."""
     done = round(float(ends.periods[0]))
     if ends.rest[0]:
@@ -91,10 +97,10 @@ def settled(case: Case, ends: Ends, start: np.ndarray) -> Verdict | None:
         return case.verdict("rest", text, ends, state=point)
     if ends.ended[0]:
         return case.verdict("undecided", _why_ended(case, start, done), ends)
-    cycle = int(ends.cycle[0]) or _long_cycle(ends.strobes[0], case.max_period)
+    cycle = int(ends.period[0])
     if not cycle:
         return None
-    found = certify(case.clock, ends.strobes[0, -1], cycle)
+    found = certify(case.clock, ends.states[0, -1], cycle)
     return on_cycle(case, ends, found, "it repeats itself" + (f" every {cycle} forcing periods" if cycle > 1 else ""))
 
 
@@ -110,15 +116,7 @@ def _why_ended(case: Case, start: np.ndarray, periods: int) -> str:
     return f"the motion cannot be followed beyond some {periods} forcing periods"
 
 
-def _long_cycle(strobes: np.ndarray, max_period: int) -> int:
-    """The cycle, longer than `settle` looks for, on which the last states are; 0 if there is none."""
-    for q in range(DRIVEN_MAX_PERIOD + 1, min(max_period, len(strobes) // 2 - 1) + 1):
-        if np.abs(strobes[-q:] - strobes[-2 * q : -q]).max() < 1e-9:
-            return q
-    return 0
-
-
-def on_cycle(case: Case, ends: Ends, found: Certificate, seen: str, **more: Any) -> Verdict:
+def on_cycle(case: Case, ends: Recurrence, found: Certificate, seen: str, **more: Any) -> Verdict:
     """The verdict on a motion with an orbit under it, certified or not."""
     more["evidence"] = more.get("evidence", {}) | found.evidence
     if found.orbit is None or not found.sound:
@@ -126,5 +124,5 @@ def on_cycle(case: Case, ends: Ends, found: Certificate, seen: str, **more: Any)
     q = found.orbit.period
     text = f"{seen}, on an orbit of period {q} with the largest multiplier {abs(found.orbit.multipliers[0]):.6g}"
     if case.system.load.period is None:
-        text = f"it comes to the equilibrium at {float(ends.strobes[0, -1, 0]):.9g}, which attracts"
+        text = f"it comes to the equilibrium at {float(ends.states[0, -1, 0]):.9g}, which attracts"
     return case.verdict("periodic", text, ends, period=q, orbit=found.orbit, **more)

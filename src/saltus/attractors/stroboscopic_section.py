@@ -1,0 +1,49 @@
+"""The stroboscopic section of a system with one coordinate: its states at phase 0 of the load."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.flow import motions_from, stroboscopic
+from saltus.systems import Load, Record, System
+
+
+def with_clock(system: System) -> System:
+    """The system with a forcing period: that of its load, or under a constant load one of 2 pi, to look at it by.
+
+    Equilibria are then orbits of period 1.
+
+    Raises:
+        ParameterError: several coordinates, or a load of records, which never repeats.
+    """
+    if not isinstance(system, System):
+        raise ParameterError(f"attractors are those of a System(model=..., load=..., impact=...), got {system!r}")
+    if len(system.model.coordinates) > 1:
+        names = ", ".join(system.model.coordinates)
+        raise ParameterError(f"attractors and basins are for models with one coordinate, and this one has {names}")
+    check_periodic(system)
+    if system.load.frequency is not None:
+        return system
+    return System(model=system.model, load=Load(frequency=1.0, **system.load.channels), impact=system.impact)
+
+
+def check_periodic(system: System) -> None:
+    """Refuse loads by records of samples: what goes on for ever under them is not defined.
+
+    Raises:
+        ParameterError: with the channel.
+    """
+    for name, signal in system.load.channels.items():
+        if any(isinstance(term, Record) for term in getattr(signal, "terms", (signal,))):
+            raise ParameterError(f"load.{name} is a Record, which does not repeat, so nothing settles under it; use Harmonic")
+
+
+def is_constant(load: Load) -> bool:
+    """Whether no channel varies: the section is then the phase plane, and orbits of period 1 are equilibria."""
+    return not any(signal.periodic for signal in load.channels.values())
+
+
+def section_states(system: System, states: np.ndarray, periods: float, tol: float = 1e-13) -> np.ndarray:
+    """The states after 1, 2, ... forcing periods from states (n, 2) at phase 0, (n, periods, 2); of half a period, at its end."""
+    return stroboscopic(system, motions_from(system, states, periods=periods, last="all", tol=tol))

@@ -1,0 +1,278 @@
+"""Recurrence: following many motions until each rests, repeats itself or the time is up.
+
+This is the one engine with which orbits, attractors, charts and diagrams ask where motions go. A motion recurs with the period q
+when its stroboscopic states, those at phase 0 of the load, come back to themselves after q forcing periods.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.flow.ensemble.dataset_reading import stop_names, stroboscopic
+from saltus.flow.ensemble.ensemble import simulate_many
+from saltus.flow.ensemble.ensemble_dataset import rate_name
+from saltus.flow.load_release import load_releases
+from saltus.flow.stops import Stop
+from saltus.progress import Progress, silent
+from saltus.systems import System
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class RecurrenceSettings:
+    """The numbers by which a motion is said to repeat itself, for all who ask."""
+
+    # The compiled lanes look for periods up to this one (`LONGEST_CYCLE` in flow/ensemble/sampling.py): a motion has settled on q
+    # periods when 2 q + 2 successive states agree with those q periods before to within 1e-10 of their size.
+    compiled_max_period: int = 16
+    # Longer periods are looked for in the states that were kept of a motion that was followed to the end: a round of them must
+    # agree with the round before to within this, which is looser as there is no streak of further rounds to look at.
+    long_agreement: float = 1e-9
+    # A motion that is followed to the end repeats itself if its last state is this near to the one a period before: Newton's
+    # method then solves for the orbit, and refuses what was none.
+    near_return: float = 1e-6
+    # The error of one step, relative to the state: a tenth of what the compiled lanes ask of two states that are the same.
+    tol: float = 1e-11
+
+
+RECURRENCE = RecurrenceSettings()
+
+
+class Outcome(IntEnum):
+    """How a motion ends that was followed for some forcing periods."""
+
+    MOVING = 0
+    HELD = 1
+    REST = 2
+    PERIODIC = 3
+    ENDED = 4
+
+    def __str__(self) -> str:
+        return SENTENCES[self]
+
+
+SENTENCES = {
+    Outcome.MOVING: "it goes on moving without repeating itself",
+    Outcome.HELD: "it is at rest at the contact, from where a later load may pull it",
+    Outcome.REST: "it is at rest at the contact for all later loads",
+    Outcome.PERIODIC: "it repeats itself",
+    Outcome.ENDED: "it is ended by a margin of the model, or cannot go on",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Recurrence:
+    """How many motions end, a row for each; a state is the coordinates, then their velocities, d numbers in all."""
+
+    outcome: np.ndarray  # (n,): an `Outcome` for each
+    period: np.ndarray  # (n,): forcing periods after which it repeats itself; 0 where it does not
+    periods: np.ndarray  # (n,): forcing periods that it was followed
+    last: np.ndarray  # (n, d): the state at the end
+    states: np.ndarray  # (n, kept, d): the stroboscopic states, the last one last, nan where there were fewer
+    extrema: np.ndarray | None = None  # (n, kept, 2): largest and smallest first coordinate in each of these periods
+    impact_counts: np.ndarray | None = None  # (n, kept): impacts in each of these periods
+
+    def __len__(self) -> int:
+        return len(self.outcome)
+
+    @property
+    def rest(self) -> np.ndarray:
+        """Which are at rest at the contact for good, (n,)."""
+        return np.asarray(self.outcome == Outcome.REST)
+
+    @property
+    def periodic(self) -> np.ndarray:
+        """Which repeat themselves, (n,)."""
+        return np.asarray(self.outcome == Outcome.PERIODIC)
+
+    @property
+    def ended(self) -> np.ndarray:
+        """Which were ended by a margin of the model or cannot go on, (n,)."""
+        return np.asarray(self.outcome == Outcome.ENDED)
+
+    @property
+    def unsettled(self) -> np.ndarray:
+        """Which neither rest for good, nor repeat themselves, nor have ended, (n,)."""
+        return np.asarray(self.outcome <= Outcome.HELD)
+
+    @property
+    def within_period(self) -> np.ndarray:
+        """Which of the kept forcing periods are the last `period` ones of a motion, (n, kept); all where it has no period."""
+        kept = max(a.shape[1] for a in (self.states, self.extrema, self.impact_counts) if a is not None)
+        length = np.where(self.period > 0, self.period, kept)
+        return np.asarray(np.arange(kept)[::-1] < length[:, None])
+
+    @property
+    def highest(self) -> np.ndarray:
+        """The largest first coordinate over the motion's period, (n,); -inf where none was recorded."""
+        assert self.extrema is not None
+        return np.asarray(np.nanmax(np.where(self.within_period, self.extrema[:, :, 0], np.nan), axis=1, initial=-np.inf))
+
+    @property
+    def lowest(self) -> np.ndarray:
+        """The smallest first coordinate over the motion's period, (n,); inf where none was recorded."""
+        assert self.extrema is not None
+        return np.asarray(np.nanmin(np.where(self.within_period, self.extrema[:, :, 1], np.nan), axis=1, initial=np.inf))
+
+    @property
+    def impact_count(self) -> np.ndarray:
+        """The impacts over the motion's period, (n,)."""
+        assert self.impact_counts is not None
+        return np.asarray(np.nansum(np.where(self.within_period, self.impact_counts, 0.0), axis=1).astype(int))
+
+    def only(self, rows: Any) -> Recurrence:
+        """The same of some of the motions."""
+        columns = {part.name: getattr(self, part.name) for part in fields(self)}
+        return replace(self, **{name: values[rows] for name, values in columns.items() if values is not None})
+
+    def after(self, periods: int, states: np.ndarray) -> Recurrence:
+        """The same as the end of motions that were already followed for so many periods, with these states, (n, kept, d)."""
+        return replace(self, periods=self.periods + periods, states=np.concatenate([states, self.states], axis=1))
+
+
+def find_recurrence(
+    system: System,
+    states: np.ndarray,
+    periods: int,
+    *,
+    parameters: Mapping[str, np.ndarray] | None = None,
+    max_period: int = RECURRENCE.compiled_max_period,
+    kept: int | None = None,
+    extrema: bool = False,
+    impact_count: bool = False,
+    stop_early: bool = True,
+    tol: float = RECURRENCE.tol,
+    threads: int | None = None,
+    progress: Progress = silent,
+    settings: RecurrenceSettings = RECURRENCE,
+) -> Recurrence:
+    """Follow motions from states at phase 0 until they rest for good, repeat themselves or the time is up.
+
+    Args:
+        system: what moves, under a load with a frequency.
+        states: (n, d): coordinates, then velocities.
+        periods: for how many forcing periods at most.
+        parameters: numbers by dotted path, (n,) each, in place of the system's.
+        max_period: the longest period looked for. Those above 16 need `kept` to be more than twice as many.
+        kept: how many of the last stroboscopic states are kept, by default all; 0 for none.
+        extrema, impact_count: whether these are recorded, over max(kept, max_period) of the last forcing periods.
+        stop_early: False follows every motion for all periods, and reads its period off the last states (`near_return`).
+        tol: the error that one step may make.
+        threads: how many cores to use; by default all.
+        progress: called with the fraction done.
+
+    A motion at the contact is at rest for good if it is proved to be captured, or if the load never pulls there; with parameters
+    of its own, only if it is proved.
+    """
+    wanted = {"state": kept != 0, "extrema": extrema, "impact_count": impact_count}
+    size = periods if kept is None else kept
+    result = motions_from(
+        system,
+        states,
+        parameters=parameters,
+        periods=periods,
+        until=("rest", "settled") if stop_early else (),
+        sample=tuple(name for name, chosen in wanted.items() if chosen),
+        last=max(1, min(max(size, max_period if extrema or impact_count else 1), periods)),
+        tol=tol,
+        threads=threads,
+        progress=progress,
+    )
+    found = _read(system, result, kept != 0)
+    found = replace(found, outcome=_outcome(system, result, parameters is not None))
+    return _with_periods(found, result["recurrence_period"].values if stop_early else None, max_period, settings)
+
+
+def motions_from(system: System, states: np.ndarray, **options: Any) -> xarray.Dataset:
+    """`simulate_many` from states (n, d) at phase 0."""
+    names = system.model.coordinates
+    velocities = tuple(states[:, len(names) + i] for i in range(len(names)))
+    start: dict[str, Any] = {name: states[:, i] for i, name in enumerate(names)}
+    return simulate_many(system, **start, velocity=velocities[0] if len(names) == 1 else velocities, **options)
+
+
+def last_states(system: System, result: xarray.Dataset) -> np.ndarray:
+    """The states at the end of an ensemble's motions, (..., d)."""
+    return np.stack([result[name].values for name in _state_names(system)], axis=-1)
+
+
+def return_distances(states: np.ndarray, max_period: int) -> np.ndarray:
+    """How far the last of states (..., kept, d) is from those q = 1, 2, ... periods before, (..., max_period or fewer)."""
+    count = min(max_period, states.shape[-2] - 1)
+    apart = np.abs(states[..., -1:, :] - states[..., -1 - count : -1, :]).max(axis=-1)
+    return np.asarray(apart[..., ::-1])
+
+
+def return_period(states: np.ndarray, max_period: int, within: float = RECURRENCE.near_return) -> np.ndarray:
+    """The fewest periods after which the last of states (..., kept, d) has come back to within a distance; 0 if there is none."""
+    near = return_distances(states, max_period) < within
+    return np.where(near.any(axis=-1), 1 + np.argmax(near, axis=-1), 0)
+
+
+def nearest_return(states: np.ndarray, max_period: int) -> int:
+    """The number of periods after which the last of states (kept, d) has come back nearest to where it was."""
+    return 1 + int(np.argmin(return_distances(states, max_period)))
+
+
+def _state_names(system: System) -> list[str]:
+    names = system.model.coordinates
+    return [*names, *(rate_name(name, names) for name in names)]
+
+
+def _read(system: System, result: xarray.Dataset, with_states: bool) -> Recurrence:
+    """What was recorded of the motions, whose outcomes are not known yet."""
+    name, last = system.model.coordinates[0], last_states(system, result)
+    extrema = None
+    if f"largest_{name}" in result:
+        extrema = np.stack([result[f"largest_{name}"].values, result[f"smallest_{name}"].values], axis=-1)
+    return Recurrence(
+        outcome=np.full(len(last), Outcome.MOVING, dtype=np.int8),
+        period=np.zeros(len(last), dtype=int),
+        periods=result["periods"].values,
+        last=last,
+        states=stroboscopic(system, result) if with_states else np.empty((len(last), 0, last.shape[1])),
+        extrema=extrema,
+        impact_counts=result["period_impact_count"].values if "period_impact_count" in result else None,
+    )
+
+
+def _outcome(system: System, result: xarray.Dataset, varied: bool) -> np.ndarray:
+    """The outcomes that do not follow from a period."""
+    stop = stop_names(result)
+    outcome = np.full(stop.shape, Outcome.MOVING, dtype=np.int8)
+    held = (result["side"].values == 0) & np.isin(stop, (Stop.HORIZON, Stop.REST))
+    if held.any():
+        outcome[held] = Outcome.HELD if varied or load_releases(system) else Outcome.REST
+    outcome[stop == Stop.CAPTURED] = Outcome.REST
+    outcome[~np.isin(stop, (Stop.HORIZON, Stop.REST, Stop.SETTLED, Stop.CAPTURED))] = Outcome.ENDED
+    return outcome
+
+
+def _with_periods(found: Recurrence, compiled: Any, max_period: int, settings: RecurrenceSettings) -> Recurrence:
+    """The same with the periods that the compiled lanes have found, or that the kept states show."""
+    outcome, period = found.outcome.copy(), found.period.copy()
+    if compiled is None:
+        period[:] = return_period(found.states, max_period, settings.near_return)
+    else:
+        period[:] = np.where(compiled <= max_period, compiled, 0)
+        longer = found.unsettled & (period == 0) & (max_period > settings.compiled_max_period)
+        for row in np.flatnonzero(longer):
+            period[row] = _long_period(found.states[row], max_period, settings)
+    period[~found.unsettled] = 0
+    outcome[period > 0] = Outcome.PERIODIC
+    return replace(found, outcome=outcome, period=period)
+
+
+def _long_period(states: np.ndarray, max_period: int, settings: RecurrenceSettings) -> int:
+    """The period, longer than the compiled lanes look for, with which the last states (kept, d) repeat; 0 if there is none."""
+    for q in range(settings.compiled_max_period + 1, min(max_period, len(states) // 2 - 1) + 1):
+        if np.abs(states[-q:] - states[-2 * q : -q]).max() < settings.long_agreement:
+            return q
+    return 0

@@ -1,0 +1,104 @@
+"""Recurrence: rest, periods, extrema and impacts of many motions at once, against single motions."""
+
+import math
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.flow import RECURRENCE, Outcome, find_recurrence, load_releases, nearest_return, return_distances, return_period
+from saltus.flow.recurrence import _long_period
+
+
+def forced(frequency=1.0, amplitude=0.5, e=1.0):
+    return saltus.System(
+        model=saltus.Metainterface(beta0=math.radians(80), damping=0.1),
+        load=saltus.Load(frequency=frequency, horizontal=saltus.Harmonic(amplitude=amplitude), vertical=-0.5),
+        impact=saltus.VelocityReduction(e),
+    )
+
+
+STATES = np.random.default_rng(1).uniform(-1.5, 1.5, (32, 2))
+AMPLITUDE = "load.horizontal.amplitude"
+
+
+def test_the_numbers_are_those_of_the_compiled_lanes():
+    from saltus.flow.ensemble.sampling import LONGEST_CYCLE
+
+    assert RECURRENCE.compiled_max_period == LONGEST_CYCLE
+
+
+def test_a_motion_that_repeats_itself_comes_back_to_its_state_after_its_period_and_not_before():
+    system = forced()
+    ends = find_recurrence(system, STATES, 400)
+    assert ends.periodic.sum() > 5
+    for row in np.flatnonzero(ends.periodic):
+        state, q = ends.last[row], int(ends.period[row])
+        motion = saltus.simulate(system, theta=state[0], velocity=state[1], periods=q)
+        assert abs(motion.theta - state[0]) < 1e-9
+        assert abs(motion.velocity - state[1]) < 1e-9
+        shorter = return_distances(ends.states[row], 16)[: q - 1]
+        assert (shorter > 1e-7).all()
+
+
+def test_extrema_and_impacts_are_those_of_one_period():
+    system = forced()
+    ends = find_recurrence(system, STATES, 400, kept=0, extrema=True, impact_count=True)
+    assert ends.states.shape == (32, 0, 2)
+    seen = 0
+    for row in np.flatnonzero(ends.periodic):
+        state = ends.last[row]
+        motion = saltus.simulate(system, theta=state[0], velocity=state[1], periods=int(ends.period[row]))
+        dense = motion.at(np.linspace(motion.start, motion.time, 4001))[0]
+        assert dense.max() == pytest.approx(ends.highest[row], abs=1e-5)
+        assert dense.min() == pytest.approx(ends.lowest[row], abs=1e-5)
+        assert len(motion.impacts) == ends.impact_count[row]
+        seen += 1
+    assert seen > 5
+
+
+def test_parameters_of_their_own_are_those_of_a_system_of_their_own():
+    amplitudes = np.linspace(0.3, 0.9, len(STATES))
+    together = find_recurrence(forced(), STATES, 100, parameters={AMPLITUDE: amplitudes})
+    for row in (0, 7, 31):
+        single = find_recurrence(forced(amplitude=float(amplitudes[row])), STATES[row : row + 1], 100)
+        assert single.outcome[0] == together.outcome[row]
+        assert np.array_equal(single.last[0], together.last[row])
+
+
+def test_rest_is_for_good_only_where_no_load_pulls():
+    loose, held = forced(amplitude=0.5, e=0.2), forced(amplitude=0.01, e=0.2)
+    assert load_releases(loose)
+    assert not load_releases(held)
+    quiet = find_recurrence(held, np.array([[1e-3, 0.0]]), 50)
+    assert quiet.rest.all()
+    moved = find_recurrence(loose, np.array([[0.0, 0.0]]), 1)
+    assert not moved.rest.any()
+
+
+def test_longer_periods_than_the_lanes_look_for_are_read_off_the_states():
+    states = np.tile(np.arange(20.0), 6)[:, None] * [1.0, -2.0]
+    assert _long_period(states, 32, RECURRENCE) == 20
+    assert _long_period(states, 19, RECURRENCE) == 0
+    assert _long_period(states + np.arange(120)[:, None] * 1e-6, 32, RECURRENCE) == 0
+
+
+def test_returns_are_measured_back_from_the_last_state():
+    states = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1e-7]])
+    assert return_distances(states, 3) == pytest.approx([1.0, 1e-7, 1.0], rel=1e-6)
+    assert return_distances(states, 9).shape == (3,)
+    assert return_period(np.stack([states, states + np.array([0, 0, 0, 0.5])[:, None]]), 3).tolist() == [2, 0]
+    assert nearest_return(states, 3) == 2
+
+
+def test_a_motion_followed_to_the_end_has_the_period_that_is_found_on_the_way():
+    system = forced()
+    early, late = find_recurrence(system, STATES, 600, kept=20), find_recurrence(system, STATES, 600, kept=20, stop_early=False)
+    settled = early.periodic
+    assert settled.sum() > 5
+    assert (late.period[settled] == early.period[settled]).all()
+    assert (late.periods == 600).all()
+
+
+def test_each_outcome_says_what_it_is():
+    assert len({str(outcome) for outcome in Outcome}) == len(Outcome)
