@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from attractor_cases import FOLDS, HELD, ONSET, loaded, walled
+from attractor_cases import FOLDS, HELD, ONSET
+from shared_systems import forced, walled
 
 import saltus
 from saltus.attractors.along_parameter import attractors_along, set_distance
@@ -12,7 +13,7 @@ from saltus.theory import wall_orbits
 
 
 def test_births_and_deaths_bracket_the_folds_and_the_jump_changes_the_identity() -> None:
-    found = attractors_along(loaded(), "load.frequency", np.linspace(0.83, 0.93, 11), starts=32)
+    found = attractors_along(forced(), "load.frequency", np.linspace(0.83, 0.93, 11), starts=32)
     events = list(zip(found["event_kind"].values, found["event_label"].values, strict=True))
     assert events == [("birth", 2), ("death", 1)]
     for fold, before, after in zip(FOLDS, found["event_before"].values, found["event_after"].values, strict=True):
@@ -26,7 +27,7 @@ def test_births_and_deaths_bracket_the_folds_and_the_jump_changes_the_identity()
 
 def test_rest_is_always_0_and_goes_with_the_load_that_releases_it() -> None:
     values = [ONSET - 2e-3, ONSET + 2e-3, 0.05, HELD - 2e-3, HELD + 2e-3]
-    found = attractors_along(loaded(), "load.horizontal.amplitude", values, starts=96)
+    found = attractors_along(forced(), "load.horizontal.amplitude", values, starts=96)
     assert np.isfinite(found["fraction"].sel(attractor=0).values).tolist() == [True, True, True, True, False]
     assert found["kind"].sel(attractor=0).values.tolist() == ["rest"] * 4 + [""]
     motion = found["fraction"].sel(attractor=1).values
@@ -35,11 +36,11 @@ def test_rest_is_always_0_and_goes_with_the_load_that_releases_it() -> None:
 
 
 def test_an_attractor_without_starts_of_its_own_is_carried_along() -> None:
-    system = loaded()
+    system = forced()
     values = [0.80, 0.83, 0.86, 0.88, 0.90]
     alone = attractors_along(system, "load.frequency", values, starts=1, seed=4)
     amplitude = alone["amplitude"].sel(attractor=1).values
-    branch = saltus.continue_orbit(saltus.find_orbit(loaded(W=0.8), theta=0.3), "load.frequency", (0.7, 0.92))
+    branch = saltus.continue_orbit(saltus.find_orbit(forced(W=0.8), theta=0.3), "load.frequency", (0.7, 0.92))
     upper = [max(orbit.amplitude for orbit in branch.at(value) if orbit.stable) for value in values]
     assert amplitude == pytest.approx(upper, rel=1e-9)  # the large motion is followed past the birth of the small one
 
@@ -56,7 +57,7 @@ def test_a_doubling_changes_the_period_where_the_closed_form_says_and_not_the_id
 
 
 def test_mirror_images_are_not_exchanged() -> None:
-    found = attractors_along(loaded(0.2, V=-1.6), "load.horizontal.amplitude", np.linspace(0.2, 0.32, 4), starts=24)
+    found = attractors_along(forced(0.2, V=-1.6), "load.horizontal.amplitude", np.linspace(0.2, 0.32, 4), starts=24)
     assert found["event_kind"].size == 0
     assert (found["largest_theta"].sel(attractor=1).values > 1.0).all()
     assert (found["smallest_theta"].sel(attractor=2).values < -1.0).all()
@@ -82,4 +83,4 @@ def test_the_distance_of_sets_is_hausdorffs_over_their_size() -> None:
 )
 def test_senseless_paths_and_values_are_refused(path: str, values: list[float], says: str) -> None:
     with pytest.raises(ParameterError, match=says):
-        attractors_along(loaded(), path, values)
+        attractors_along(forced(), path, values)

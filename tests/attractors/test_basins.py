@@ -7,14 +7,15 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray
-from attractor_cases import loaded, steady, strobes, walled
+from attractor_cases import strobes
+from shared_systems import forced, steady, walled
 
 from saltus.attractors.basins.grid import basins_of_attraction, cell_arguments, cells
 from saltus.attractors.find import Attractors, find_attractors
 from saltus.errors import ParameterError
 from saltus.plots.basins import draw_basins
 
-SYSTEM = loaded(W=0.88)
+SYSTEM = forced(W=0.88)
 THETA, VELOCITY = np.linspace(-2.4, 2.4, 13), np.linspace(-2.1, 2.1, 11)
 
 
@@ -76,7 +77,7 @@ def test_blocks_with_plain_arguments_give_the_whole(found: Attractors, picture: 
 
 
 def test_captured_cells_are_at_rest_at_a_time_of_their_own() -> None:
-    picture = basins_of_attraction(loaded(0.05), theta=[0.001, 0.5], velocity=[0.0, 0.3])
+    picture = basins_of_attraction(forced(0.05), theta=[0.001, 0.5], velocity=[0.0, 0.3])
     assert int(picture["label"][0, 0]) == 0
     assert 0.0 <= float(picture["time"][0, 0]) < 200.0
     assert "rest" in picture["attractor_kind"].values
@@ -108,7 +109,7 @@ def test_a_grid_of_its_own_keeps_to_the_side_of_the_wall() -> None:
 @pytest.mark.thorough
 def test_cells_of_a_chaotic_attractor_are_told_from_those_of_a_cycle() -> None:
     grid = np.linspace(-1.9, 1.9, 8)
-    system = loaded(3.0, 1.1)
+    system = forced(3.0, 1.1)
     picture = basins_of_attraction(system, theta=grid, velocity=grid)
     assert picture["attractor_kind"].values.tolist() == ["periodic", "chaotic"]
     assert picture.attrs["undecided"] == 0.0
@@ -135,7 +136,7 @@ def test_senseless_grids_are_refused(arguments: dict, says: str) -> None:
 
 def test_attractors_of_another_system_are_refused(found: Attractors) -> None:
     with pytest.raises(ParameterError, match="another system"):
-        basins_of_attraction(loaded(), theta=[0.0], velocity=[0.0], found=found)
+        basins_of_attraction(forced(), theta=[0.0], velocity=[0.0], found=found)
 
 
 def test_the_picture_shows_each_basin_in_its_own_lightness(picture: xarray.Dataset) -> None:

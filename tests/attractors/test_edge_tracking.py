@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import xarray
-from attractor_cases import loaded, steady
 from scipy.spatial import cKDTree
+from shared_systems import forced, steady
 
 import saltus
 from saltus.attractors.basins.boundaries import clipped, edge_saddles, edges
@@ -12,7 +12,7 @@ from saltus.attractors.basins.grid import basins_of_attraction
 from saltus.attractors.basins.labelling import label_states
 from saltus.attractors.find import Attractors, find_attractors
 
-SYSTEM = loaded(W=0.88)
+SYSTEM = forced(W=0.88)
 GRID = np.linspace(-2.5, 2.5, 31)
 
 
@@ -64,7 +64,7 @@ def test_under_a_constant_load_they_are_separatrices() -> None:
 
 
 def test_one_basin_has_no_curves() -> None:
-    picture = basins_of_attraction(loaded(), theta=GRID[::6], velocity=GRID[::6], curves=True)
+    picture = basins_of_attraction(forced(), theta=GRID[::6], velocity=GRID[::6], curves=True)
     assert picture["boundary_theta"].size == 0
 
 

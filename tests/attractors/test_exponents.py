@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import xarray as xr
-from verdict_cases import spread, under_force, wall
+from shared_systems import forced, walled
+from verdict_cases import spread
 
 import saltus
 from saltus import ParameterError
@@ -22,7 +23,7 @@ from saltus.theory import equilibria
 def test_they_are_exact_below_the_wall_of_a_piecewise_linear_oscillator(damping, stiffness):
     """The real parts of the roots of s^2 + c s + k, a pair in two of the cases."""
     expected = np.sort(np.roots([1.0, damping, stiffness]).real)[::-1]
-    found = lyapunov_spectrum(wall(damping, stiffness), x=0.1, periods=400, transient=10)
+    found = lyapunov_spectrum(walled(c=damping, k=stiffness, wall=20.0), x=0.1, periods=400, transient=10)
     np.testing.assert_allclose(found.values, expected, rtol=0, atol=5e-9)
     assert (np.abs(found.values - expected) <= found.errors + 5e-9).all()
     assert found.stroboscopic == pytest.approx(expected[0], abs=1e-7)
@@ -68,7 +69,7 @@ def test_they_are_the_eigenvalues_of_a_damped_pendulum_at_rest(frequency):
     """At the deformed equilibrium under constant loads, whose eigenvalues `theory` has; with and without a clock."""
     model = saltus.Metainterface(beta0=math.radians(80), damping=0.1)
     constant = saltus.System(model=model, load=saltus.Load(vertical=0.5))
-    system = constant if frequency is None else under_force(frequency, 0.0, vertical=0.5)
+    system = constant if frequency is None else forced(0.0, frequency, V=0.5)
     equilibrium = next(q for q in equilibria(constant) if q.stable and q.theta > 0)
     found = lyapunov_spectrum(system, theta=equilibrium.theta, periods=300, transient=0)
     np.testing.assert_allclose(found.values, np.real(equilibrium.eigenvalues), rtol=0, atol=1e-8)
@@ -77,8 +78,8 @@ def test_they_are_the_eigenvalues_of_a_damped_pendulum_at_rest(frequency):
 
 def test_on_an_orbit_they_are_the_logarithms_of_its_multipliers():
     """Near the fold at Hhat = 0.02199 the multipliers are real and unequal; they come from the orbit's own equations."""
-    near = saltus.find_orbit(under_force(1.0, 0.0225), theta=-2.5, velocity=-0.5).state
-    orbit = saltus.find_orbit(under_force(1.0, 0.0221), theta=near[0], velocity=near[1])
+    near = saltus.find_orbit(forced(0.0225, 1.0), theta=-2.5, velocity=-0.5).state
+    orbit = saltus.find_orbit(forced(0.0221, 1.0), theta=near[0], velocity=near[1])
     theta, velocity = orbit.state
     found = lyapunov_spectrum(orbit.system, theta=theta, velocity=velocity, periods=200, transient=0)
     expected = np.log(np.abs(orbit.multipliers)) / (2 * math.pi)
@@ -89,7 +90,7 @@ def test_on_an_orbit_they_are_the_logarithms_of_its_multipliers():
 
 @pytest.mark.parametrize(("frequency", "amplitude"), [(1.6, 3.0), (0.38, 0.2)])
 def test_in_chaos_they_add_up_to_minus_the_damping_and_the_map_has_the_same_largest_one(frequency, amplitude):
-    found = lyapunov_spectrum(under_force(frequency, amplitude), theta=0.3, periods=200, transient=100)
+    found = lyapunov_spectrum(forced(amplitude, frequency), theta=0.3, periods=200, transient=100)
     assert found.values.sum() == pytest.approx(-0.1, abs=1e-8)
     assert found.sum_defect < 1e-8
     assert found.largest_condition < 1e6
@@ -100,7 +101,7 @@ def test_in_chaos_they_add_up_to_minus_the_damping_and_the_map_has_the_same_larg
 
 def test_with_unequal_layers_and_losses_they_add_up_to_the_mean_divergence():
     """The divergence is that of the crossings: 2 ln e an impact, -C c / (1 + m) on the lower side, -C on the upper one."""
-    system = under_force(1.6, 3.0, e=0.95, mass_ratio=0.3, stiffness_ratio=1.4, dissipation_ratio=2.0)
+    system = forced(3.0, 1.6, e=0.95, m=0.3, k=1.4, c=2.0)
     found = lyapunov_spectrum(system, theta=0.5, periods=64, transient=50)
     assert found.sum_defect < 1e-8
     assert found.divergence < -0.11
@@ -118,13 +119,13 @@ def test_the_sum_of_the_exponents_is_the_divergence_of_random_systems():
     rng, checked = np.random.default_rng(8), 0
     for _ in range(30):
         numbers = {
-            "damping": rng.uniform(0.0, 0.3),
+            "C": rng.uniform(0.0, 0.3),
             "e": rng.choice([1.0, rng.uniform(0.6, 1.0)]),
-            "stiffness_ratio": rng.uniform(0.5, 2.0),
-            "mass_ratio": rng.uniform(0.0, 1.0),
-            "dissipation_ratio": rng.uniform(0.0, 2.0),
+            "k": rng.uniform(0.5, 2.0),
+            "m": rng.uniform(0.0, 1.0),
+            "c": rng.uniform(0.0, 2.0),
         }
-        system = under_force(rng.uniform(0.3, 3.0), rng.uniform(0.5, 4.0), **numbers)
+        system = forced(W=rng.uniform(0.3, 3.0), H=rng.uniform(0.5, 4.0), **numbers)
         found = lyapunov_spectrum(system, theta=rng.uniform(-1, 1), periods=48, transient=20, shadow=False)
         if found.note is None:
             assert found.sum_defect < 1e-8
@@ -154,7 +155,7 @@ def test_the_contraction_of_an_impact_that_depends_on_the_ground_is_that_of_its_
 
 def test_the_lanes_have_the_same_exponents_as_the_single_motion():
     """A settled motion, one in the transient and one with a period in many pieces, under losses and unequal layers."""
-    systems = [under_force(w, 0.5, e=0.95, mass_ratio=0.3) for w in (0.15, 0.7, 1.0)]
+    systems = [forced(0.5, w, e=0.95, m=0.3) for w in (0.15, 0.7, 1.0)]
     assert [piece_count(s.load.period) for s in systems] == [7, 2, 1]
     many = lyapunov_many(systems[0], {"load.frequency": [0.15, 0.7, 1.0]}, theta=0.9, periods=40, transient=10, tol=1e-12)
     for i, system in enumerate(systems):
@@ -167,7 +168,7 @@ def test_the_lanes_have_the_same_exponents_as_the_single_motion():
 def test_the_values_that_are_known_of_the_three_chaotic_motions():
     """Issue text: about +0.03, +0.12 and +0.2 per unit of time."""
     where = {"load.frequency": [0.38, 1.2, 1.6], "load.horizontal.amplitude": [0.2, 2.0, 3.0]}
-    found = lyapunov_many(under_force(1.0, 1.0), where, theta=0.3, periods=400)
+    found = lyapunov_many(forced(1.0, 1.0), where, theta=0.3, periods=400)
     assert found.positive.all()
     assert (found.cycle == 0).all()
     known = np.array([0.03, 0.12, 0.2])
@@ -180,7 +181,7 @@ def test_chaos_and_a_periodic_motion_coexist_at_large_amplitude(frequency):
     """Hhat = 3, as the paper's piercing of the chaotic band says; after 1200 periods, from 24 states."""
     states = spread(24)
     found = lyapunov_many(
-        under_force(frequency, 3.0), theta=states[:, 0], velocity=states[:, 1], periods=200, transient=1000, tol=1e-10
+        forced(3.0, frequency), theta=states[:, 0], velocity=states[:, 1], periods=200, transient=1000, tol=1e-10
     )
     chaotic = found.positive & (found.cycle == 0)
     assert chaotic.sum() >= 3
@@ -191,7 +192,7 @@ def test_chaos_and_a_periodic_motion_coexist_at_large_amplitude(frequency):
 def test_error_bars_hold_between_independent_motions_on_one_attractor():
     """The exponents of 64 motions scatter about their common mean within their bars in 95 of 100 cases; 85 at the least here."""
     states = spread(64, 1.0)
-    found = lyapunov_many(under_force(1.6, 3.0), theta=states[:, 0], velocity=states[:, 1], periods=200, transient=100, tol=1e-10)
+    found = lyapunov_many(forced(3.0, 1.6), theta=states[:, 0], velocity=states[:, 1], periods=200, transient=100, tol=1e-10)
     apart = np.abs(found.exponent[:, 0] - found.exponent[:, 0].mean())
     assert (apart < found.error[:, 0]).mean() > 0.85
     scatter = float(found.exponent[:, 0].std())
@@ -200,7 +201,7 @@ def test_error_bars_hold_between_independent_motions_on_one_attractor():
 
 def test_growth_by_shear_alone_is_not_taken_for_chaos():
     """Without damping, on a torus, derivatives grow in proportion to the time; in a longer run the exponent falls."""
-    system = under_force(1.3, 0.05, damping=0.0)
+    system = forced(0.05, 1.3, C=0.0)
     short, long = (lyapunov_spectrum(system, theta=0.5, periods=n, transient=100, shadow=False) for n in (64, 400))
     assert short.values[0] > 0.0
     assert long.values[0] < 0.5 * short.values[0]
@@ -210,11 +211,11 @@ def test_growth_by_shear_alone_is_not_taken_for_chaos():
 
 
 def test_rest_with_a_loss_at_impacts_leaves_nothing():
-    found = lyapunov_spectrum(under_force(0.5, 0.05, e=0.5), theta=0.1, periods=32, transient=20)
+    found = lyapunov_spectrum(forced(0.05, 0.5, e=0.5), theta=0.1, periods=32, transient=20)
     assert np.isneginf(found.values).all()
     assert (found.errors == 0.0).all()
     assert "rests at contact" in found.note
-    many = lyapunov_many(under_force(0.5, 0.05), {"impact.e": [0.5, 1.0]}, theta=0.1, periods=32, transient=100)
+    many = lyapunov_many(forced(0.05, 0.5), {"impact.e": [0.5, 1.0]}, theta=0.1, periods=32, transient=100)
     assert np.isneginf(many.exponent[0]).all()
     assert (many.ending == 1).all()
 
@@ -222,28 +223,28 @@ def test_rest_with_a_loss_at_impacts_leaves_nothing():
 def test_impacts_that_lose_nothing_have_no_exponents_at_rest():
     """The motion nears rest as exp(-C t / 3), but its phase is lost, and rest itself has no derivative."""
     for theta in (0.1, 0.0):
-        found = lyapunov_spectrum(under_force(0.5, 0.05), theta=theta, periods=32, transient=150)
+        found = lyapunov_spectrum(forced(0.05, 0.5), theta=theta, periods=32, transient=150)
         assert np.isnan(found.values).all()
         assert "lose nothing" in found.note
         assert math.isnan(found.sum_defect)
-    many = lyapunov_many(under_force(0.5, 0.05), theta=[0.1, 0.05], periods=32, transient=100)
+    many = lyapunov_many(forced(0.05, 0.5), theta=[0.1, 0.05], periods=32, transient=100)
     assert np.isnan(many.exponent).all()
 
 
 def test_a_periodic_rest_has_exponents_of_minus_infinity():
     """A loss at impacts, and a load that pulls the system off its contact once in a while: it has rested before each release."""
-    found = lyapunov_spectrum(under_force(0.05, 0.12, e=0.3), theta=0.05, periods=32, transient=2)
+    found = lyapunov_spectrum(forced(0.12, 0.05, e=0.3), theta=0.05, periods=32, transient=2)
     assert np.isneginf(found.values).all()
 
 
 def test_results_are_labelled_and_do_not_depend_on_what_else_is_computed():
     amplitudes = xr.DataArray([0.4, 0.5, 3.0], dims="amplitude")
     starts = xr.DataArray([0.3, 0.9], dims="theta0")
-    found = lyapunov_many(under_force(1.0, 1.0), {"load.horizontal.amplitude": amplitudes}, theta=starts, periods=32, transient=5)
+    found = lyapunov_many(forced(1.0, 1.0), {"load.horizontal.amplitude": amplitudes}, theta=starts, periods=32, transient=5)
     assert found.exponent.dims == ("theta0", "amplitude", "index")
     assert all("units" in variable.attrs for variable in found.data_vars.values())
-    assert saltus.System.from_json(found.attrs["system"]) == under_force(1.0, 1.0)
-    alone = lyapunov_many(under_force(1.0, 3.0), theta=[0.9], periods=32, transient=5)
+    assert saltus.System.from_json(found.attrs["system"]) == forced(1.0, 1.0)
+    alone = lyapunov_many(forced(3.0, 1.0), theta=[0.9], periods=32, transient=5)
     np.testing.assert_array_equal(found.exponent[1, 2], alone.exponent[0])
 
 
@@ -264,15 +265,15 @@ def test_threads_do_not_get_in_each_others_way_in_a_fresh_process():
 def test_progress_goes_from_nothing_to_all():
     for follow in (lyapunov_many, lyapunov_spectrum):
         told = []
-        follow(under_force(1.0, 0.5), theta=0.3, periods=64, transient=5, progress=told.append)
+        follow(forced(0.5, 1.0), theta=0.3, periods=64, transient=5, progress=told.append)
         assert told == sorted(told)
         assert told[-1] == 1.0
 
 
 def test_the_factor_of_impacts_is_that_of_the_law():
     arrays = {"impact.e": np.array([0.5, 1.0])}
-    np.testing.assert_allclose(impact_factor(under_force(1.0, 0.5), arrays), [0.25, 1.0])
-    inelastic = under_force(1.0, 0.5).with_({"impact": saltus.InelasticImpact(), "model.mass_ratio": 0.3})
+    np.testing.assert_allclose(impact_factor(forced(0.5, 1.0), arrays), [0.25, 1.0])
+    inelastic = forced(0.5, 1.0).with_({"impact": saltus.InelasticImpact(), "model.mass_ratio": 0.3})
     assert float(impact_factor(inelastic, {})) == pytest.approx(math.cos(math.radians(160)) ** 2 / 1.3)
 
 
@@ -299,7 +300,7 @@ RECORD = saltus.Record([0.0, 1.0], [0.0, 1.0])
     ],
 )
 def test_they_refuse_what_has_no_meaning(follow, changes, match):
-    arguments = {"system": under_force(1.0, 0.5), "theta": 0.3} | changes
+    arguments = {"system": forced(0.5, 1.0), "theta": 0.3} | changes
     with pytest.raises(ParameterError, match=match):
         follow(arguments.pop("system"), **arguments)
 

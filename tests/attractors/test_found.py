@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from attractor_cases import FOLDS, HELD, ONSET, loaded, steady, strobes, walled
+from attractor_cases import FOLDS, HELD, ONSET, strobes
+from shared_systems import forced, steady, walled
 
 import saltus
 from saltus.attractors.attractor import Target
@@ -17,11 +18,11 @@ from saltus.theory import equilibria
 @pytest.fixture(scope="module")
 def branch() -> saltus.Branch:
     """The period-1 motions at H = 0.5, which coexist between the folds."""
-    return saltus.continue_orbit(saltus.find_orbit(loaded(), theta=0.3), "load.frequency", (0.8, 1.0))
+    return saltus.continue_orbit(saltus.find_orbit(forced(), theta=0.3), "load.frequency", (0.8, 1.0))
 
 
 def test_the_attractors_between_two_folds_are_the_stable_orbits_of_the_branch(branch: saltus.Branch) -> None:
-    found = find_attractors(loaded(W=0.88), starts=64)
+    found = find_attractors(forced(W=0.88), starts=64)
     expected = sorted(orbit.amplitude for orbit in branch.at(0.88) if orbit.stable)
     assert len(expected) == 2
     assert [member.amplitude for member in found] == pytest.approx(expected, rel=1e-9)
@@ -34,14 +35,14 @@ def test_the_attractors_between_two_folds_are_the_stable_orbits_of_the_branch(br
     ("W", "count"), [(FOLDS[0] - 0.004, 1), (FOLDS[0] + 0.004, 2), (FOLDS[1] - 0.004, 2), (FOLDS[1] + 0.004, 1)]
 )
 def test_their_number_changes_at_the_folds(W: float, count: int) -> None:
-    assert len(find_attractors(loaded(W=W), starts=48)) == count
+    assert len(find_attractors(forced(W=W), starts=48)) == count
 
 
 @pytest.mark.parametrize(
     ("H", "kinds"), [(ONSET - 5e-4, ["rest"]), (ONSET + 5e-4, ["rest", "periodic"]), (HELD + 2e-3, ["periodic"])]
 )
 def test_rest_and_motion_coexist_from_the_onset_to_the_load_that_releases(H: float, kinds: list[str]) -> None:
-    found = find_attractors(loaded(H), starts=96)
+    found = find_attractors(forced(H), starts=96)
     assert [member.kind for member in found] == kinds
     assert found.undecided == 0
     if kinds[0] == "rest":
@@ -49,7 +50,7 @@ def test_rest_and_motion_coexist_from_the_onset_to_the_load_that_releases(H: flo
 
 
 def test_each_start_ends_where_a_scalar_simulation_says() -> None:
-    system = loaded(W=0.88)
+    system = forced(W=0.88)
     found = find_attractors(system, starts=12, seed=3)
     for state, label in zip(found.states, found.assigned, strict=True):
         last = strobes(system, state, 80)[-1]
@@ -57,7 +58,7 @@ def test_each_start_ends_where_a_scalar_simulation_says() -> None:
 
 
 def test_mirror_images_are_two_attractors_even_where_no_start_leads_to_one() -> None:
-    system = loaded(0.3, V=-1.6)
+    system = forced(0.3, V=-1.6)
     found = find_attractors(system, starts=64)
     assert [(member.label, member.mirror) for member in found] == [(1, 2), (2, 1)]
     one, other = found
@@ -68,13 +69,13 @@ def test_mirror_images_are_two_attractors_even_where_no_start_leads_to_one() -> 
 
 
 def test_a_symmetric_cycle_is_its_own_mirror_image() -> None:
-    found = find_attractors(loaded(1.0, 2.4), starts=48)
+    found = find_attractors(forced(1.0, 2.4), starts=48)
     assert [(member.label, member.period, member.mirror) for member in found] == [(1, 1, 1), (2, 3, 2), (3, 3, 3)]
     assert all(len(member.strobes) == member.period for member in found)
 
 
 def test_labels_do_not_depend_on_the_sample() -> None:
-    one, other = (find_attractors(loaded(1.0, 2.4), starts=n, seed=seed) for n, seed in ((40, 1), (56, 9)))
+    one, other = (find_attractors(forced(1.0, 2.4), starts=n, seed=seed) for n, seed in ((40, 1), (56, 9)))
     assert [m.amplitude for m in one] == pytest.approx([m.amplitude for m in other], rel=1e-9)
 
 
@@ -95,14 +96,14 @@ def test_an_oscillator_that_never_reaches_its_wall_has_one_attractor_and_its_clo
 
 
 def test_with_losses_an_orbit_may_rest_and_be_an_attractor() -> None:
-    found = find_attractors(loaded(0.15, 0.2, e=0.3), starts=32)
+    found = find_attractors(forced(0.15, 0.2, e=0.3), starts=32)
     (member,) = found
     assert isinstance(member.orbit, RestingOrbit)
     assert member.starts == 32
 
 
 def test_known_stable_orbits_count_and_repelling_ones_do_not(branch: saltus.Branch) -> None:
-    system = loaded(W=0.88)
+    system = forced(W=0.88)
     found = find_attractors(system, starts=1, known=branch)
     assert [member.amplitude for member in found] == pytest.approx(
         sorted(orbit.amplitude for orbit in branch.at(0.88) if orbit.stable), rel=1e-9
@@ -111,7 +112,7 @@ def test_known_stable_orbits_count_and_repelling_ones_do_not(branch: saltus.Bran
 
 
 def test_further_starts_find_but_do_not_count() -> None:
-    system = loaded(W=0.88)
+    system = forced(W=0.88)
     whole = find_attractors(system, starts=32)
     found = find_attractors(system, starts=1, also=np.concatenate([member.strobes for member in whole]))
     assert len(found) == 2
@@ -119,7 +120,7 @@ def test_further_starts_find_but_do_not_count() -> None:
 
 
 def test_the_error_of_a_share_is_binomial_and_covers_the_truth() -> None:
-    shares, system = [], loaded(W=0.88)
+    shares, system = [], forced(W=0.88)
     for seed in range(4):
         found = find_attractors(system, starts=64, seed=seed)
         p, n = found.of(1).fraction, 64
@@ -130,13 +131,13 @@ def test_the_error_of_a_share_is_binomial_and_covers_the_truth() -> None:
 
 
 def test_the_dataset_says_what_was_found_and_how() -> None:
-    found = find_attractors(loaded(0.05), starts=40)
+    found = find_attractors(forced(0.05), starts=40)
     data = found.to_xarray()
     assert data["attractor"].values.tolist() == [0, 1]
     assert data["attractor_kind"].values.tolist() == ["rest", "periodic"]
     assert float(data["fraction"].sum()) == pytest.approx(1.0)
     assert (data["end"].values == found.assigned).all()
-    assert saltus.System.from_json(data.attrs["system"]) == loaded(0.05)
+    assert saltus.System.from_json(data.attrs["system"]) == forced(0.05)
     assert "captured" in str(data["evidence"].values[0])
     assert "residual" in str(data["evidence"].values[1])
 
@@ -155,7 +156,7 @@ def test_a_sampled_set_knows_its_points_from_others() -> None:
 
 @pytest.mark.thorough
 def test_without_losses_nothing_attracts() -> None:
-    found = find_attractors(loaded(0.05, C=0.0), starts=2)
+    found = find_attractors(forced(0.05, C=0.0), starts=2)
     assert len(found) == 0
     assert found.undecided == 2
     assert any("areas do not shrink" in reason for reason in found.reasons)
@@ -163,7 +164,7 @@ def test_without_losses_nothing_attracts() -> None:
 
 @pytest.mark.thorough
 def test_chaos_and_a_periodic_motion_coexist() -> None:
-    found = find_attractors(loaded(3.0, 1.1), starts=64)
+    found = find_attractors(forced(3.0, 1.1), starts=64)
     assert [member.kind for member in found] == ["periodic", "chaotic"]
     assert found.undecided == 0
     assert found.of(2).amplitude > 4.0
@@ -173,15 +174,15 @@ def test_chaos_and_a_periodic_motion_coexist() -> None:
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: find_attractors(loaded(), region=(1.0, 0.0)), "half widths"),
-        (lambda: find_attractors(loaded(), starts=0), "starts"),
-        (lambda: find_attractors(loaded(), max_period=40), "max_period"),
-        (lambda: find_attractors(loaded(), also=[[1.0, np.inf]]), "also"),
-        (lambda: find_attractors(loaded(), known=[3]), "known must be"),
+        (lambda: find_attractors(forced(), region=(1.0, 0.0)), "half widths"),
+        (lambda: find_attractors(forced(), starts=0), "starts"),
+        (lambda: find_attractors(forced(), max_period=40), "max_period"),
+        (lambda: find_attractors(forced(), also=[[1.0, np.inf]]), "also"),
+        (lambda: find_attractors(forced(), known=[3]), "known must be"),
         (lambda: find_attractors("loaded"), "System"),
         (lambda: find_attractors(saltus.System(model=saltus.TwoLayer(beta0=1.4))), "one coordinate"),
         (
-            lambda: find_attractors(loaded().with_({"load.horizontal": saltus.Record([0.0, 1.0], [0.0, 1.0])})),
+            lambda: find_attractors(forced().with_({"load.horizontal": saltus.Record([0.0, 1.0], [0.0, 1.0])})),
             "does not repeat",
         ),
     ],
@@ -193,4 +194,4 @@ def test_senseless_questions_are_refused(call, says: str) -> None:
 
 def test_an_orbit_of_another_system_is_refused(branch: saltus.Branch) -> None:
     with pytest.raises(ParameterError, match=r"differs in load\.frequency"):
-        find_attractors(loaded(W=0.5), known=branch.orbits[0])
+        find_attractors(forced(W=0.5), known=branch.orbits[0])

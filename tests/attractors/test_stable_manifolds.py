@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from attractor_cases import loaded, steady, strobes, walled
+from attractor_cases import strobes
 from scipy.optimize import brentq
 from scipy.spatial import cKDTree
+from shared_systems import forced, steady, walled
 
 import saltus
 from saltus.attractors.basins.grid import basins_of_attraction
@@ -21,7 +22,7 @@ from saltus.theory import equilibria, wall_orbits
 @pytest.fixture(scope="module")
 def saddle() -> saltus.PeriodicOrbit:
     """Of the three orbits between the folds at H = 0.5 the one that repels."""
-    found = saltus.search_orbits(loaded(W=0.88), "load.frequency", [0.88], max_period=1, starts=32)
+    found = saltus.search_orbits(forced(W=0.88), "load.frequency", [0.88], max_period=1, starts=32)
     return next(orbit for orbit in found.orbits if not orbit.stable)
 
 
@@ -33,7 +34,7 @@ def curve(saddle: saltus.PeriodicOrbit) -> Manifold:
 @pytest.fixture(scope="module")
 def longer() -> Manifold:
     """Of a saddle of period 3."""
-    found = saltus.search_orbits(loaded(1.0, 2.4), "load.frequency", [2.4], max_period=3, starts=32)
+    found = saltus.search_orbits(forced(1.0, 2.4), "load.frequency", [2.4], max_period=3, starts=32)
     orbit = next(orbit for orbit in found.orbits if orbit.period == 3 and not orbit.stable)
     return stable_manifold(orbit, window=((-2.0, 2.0), (-2.0, 2.0)), periods=24, step=0.02)
 
@@ -160,20 +161,20 @@ def test_the_unstable_manifold_leads_to_both_attractors(saddle: saltus.PeriodicO
         math.exp(-0.1 * 2.0 * math.pi / 0.88), rel=1e-9
     )  # the determinant of the map
     ends = sorted(float(branch.states[-1, 0]) for branch in found.curves)
-    attracting = saltus.search_orbits(loaded(W=0.88), "load.frequency", [0.88], max_period=1, starts=16, repelling=0).orbits
+    attracting = saltus.search_orbits(forced(W=0.88), "load.frequency", [0.88], max_period=1, starts=16, repelling=0).orbits
     assert ends == pytest.approx(sorted(orbit.state[0] for orbit in attracting), abs=1e-5)
 
 
 def test_only_saddles_have_manifolds(saddle: saltus.PeriodicOrbit) -> None:
     with pytest.raises(ParameterError, match="only a saddle"):
-        stable_manifold(saltus.find_orbit(loaded(), theta=0.3))
+        stable_manifold(saltus.find_orbit(forced(), theta=0.3))
     with pytest.raises(ParameterError, match="window must be"):
         stable_manifold(saddle, window=((1.0, 0.0), (0.0, 1.0)))
     with pytest.raises(ParameterError, match="belongs to a periodic orbit"):
-        stable_manifold(loaded())
+        stable_manifold(forced())
 
 
-@pytest.mark.parametrize("system", [loaded(0.4, 0.9), walled(0.5, wall=0.7)], ids=["metainterface", "wall with a loss"])
+@pytest.mark.parametrize("system", [forced(0.4, 0.9), walled(0.5, wall=0.7)], ids=["metainterface", "wall with a loss"])
 def test_backward_motions_come_from_where_forward_ones_began(system: saltus.System) -> None:
     name = system.model.coordinates[0]
     motion = saltus.simulate(system, **{name: 0.3}, velocity=0.25, time=0.4, duration=17.0, tol=1e-14)
@@ -206,7 +207,7 @@ def test_a_reversed_load_is_the_load_at_minus_the_time() -> None:
 @pytest.mark.parametrize("impact", [saltus.VelocityReduction(0.0), saltus.EnergyRestitution(0.9), saltus.InelasticImpact()])
 def test_impacts_without_an_inverse_are_refused(impact) -> None:
     with pytest.raises(ParameterError, match="cannot be followed backward"):
-        reversed_system(loaded().with_({"impact": impact}))
+        reversed_system(forced().with_({"impact": impact}))
 
 
 def test_without_damping_a_separatrix_has_the_energy_of_its_saddle() -> None:
@@ -249,4 +250,4 @@ def test_separatrices_part_the_basins_of_a_constant_load() -> None:
 
 def test_a_varying_load_has_no_phase_plane() -> None:
     with pytest.raises(ParameterError, match="stable_manifold"):
-        separatrices(loaded())
+        separatrices(forced())

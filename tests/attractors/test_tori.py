@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from verdict_cases import spread, under_force, wall
+from shared_systems import forced, under, walled
+from verdict_cases import spread
 
 import saltus
 from saltus import MotionError, ParameterError
@@ -15,14 +16,8 @@ from saltus.attractors import excludes_tori
 BETA0 = math.radians(80)
 
 
-def loaded(*, damping=0.1, smoothing=None, impact=None, **channels):
-    model = saltus.Metainterface(beta0=BETA0, damping=damping, smoothing=smoothing)
-    load = saltus.Load(frequency=1.0, **channels)
-    return saltus.System(model=model, load=load, impact=impact or saltus.VelocityReduction())
-
-
 def test_the_papers_system_has_none():
-    reason = excludes_tori(under_force(0.38, 0.2))
+    reason = excludes_tori(forced(0.2, 0.38))
     assert "continuous" in reason
     assert "shrinks areas" in reason
     assert "errata 22" in reason
@@ -32,52 +27,51 @@ def test_the_papers_system_has_none():
 @pytest.mark.parametrize(
     "changes",
     [
-        {"damping": 0.0},  # areas are kept
-        {"dissipation_ratio": 0.0},  # and those of motions on the lower side alone
-        {"vertical": 0.5, "amplitude": 0.0},  # the contact pushes away on both sides, always
-        {"vertical": 0.5},  # or for a part of the period
+        {"C": 0.0},  # areas are kept
+        {"c": 0.0},  # and those of motions on the lower side alone
+        {"V": 0.5, "H": 0.0},  # the contact pushes away on both sides, always
+        {"V": 0.5},  # or for a part of the period
     ],
 )
 def test_without_one_of_the_conditions_a_torus_is_not_excluded(changes):
-    arguments = {"frequency": 1.0, "amplitude": 0.5} | changes
-    assert excludes_tori(under_force(**arguments)) is None
+    assert excludes_tori(forced(**changes)) is None
 
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 def test_losses_at_impacts_do_not_help_a_torus(e):
-    assert excludes_tori(under_force(1.0, 0.5, e=e))
-    assert excludes_tori(wall(0.1, at=0.1, e=e))
+    assert excludes_tori(forced(0.5, 1.0, e=e))
+    assert excludes_tori(walled(c=0.1, wall=0.1, e=e))
 
 
 def test_the_wall_needs_damping():
     """A one-sided wall tears nothing apart; without damping motions beside it keep areas."""
-    assert "one wall" in excludes_tori(wall(0.1, at=0.1))
-    assert excludes_tori(wall(0.0, at=0.1)) is None
+    assert "one wall" in excludes_tori(walled(c=0.1, wall=0.1))
+    assert excludes_tori(walled(c=0.0, wall=0.1)) is None
 
 
 def test_laws_that_may_raise_the_speed_do_not_count():
-    assert excludes_tori(loaded(vertical=-0.5, impact=saltus.InelasticImpact()))
-    assert excludes_tori(loaded(vertical=-0.5, impact=saltus.EnergyRestitution(0.9))) is None
+    assert excludes_tori(under(vertical=-0.5, impact=saltus.InelasticImpact()))
+    assert excludes_tori(under(vertical=-0.5, impact=saltus.EnergyRestitution(0.9))) is None
 
 
 def test_a_smoothed_sign_is_continuous_whatever_the_vertical_load():
-    assert "no contact" in excludes_tori(loaded(vertical=0.5, smoothing=100.0))
-    assert excludes_tori(loaded(vertical=0.5, smoothing=100.0, damping=0.0)) is None
+    assert "no contact" in excludes_tori(under(vertical=0.5, smoothing=100.0))
+    assert excludes_tori(under(vertical=0.5, smoothing=100.0, C=0.0)) is None
 
 
 def test_the_acceleration_of_the_ground_counts_as_a_load():
     """nu'' = -nuhat Omega^2 sin: at nuhat = 0.6, V - nu'' is above 0 for a while, which alone tears, at 0.4 never."""
     for amplitude, excluded in ((0.4, True), (0.6, False)):
-        system = loaded(vertical=-0.5, ground_vertical=saltus.Harmonic(amplitude=amplitude))
+        system = under(vertical=-0.5, ground_vertical=saltus.Harmonic(amplitude=amplitude))
         assert (excludes_tori(system) is not None) is excluded
 
 
 def test_a_load_that_pulls_one_way_while_the_contact_would_open_tears_nothing():
     """V - nu'' > 0 around tau = pi / 2 only, where a force H > 0 presses the upper layer shut: one side opens, not both."""
     ground = saltus.Harmonic(amplitude=0.6)
-    aligned = loaded(vertical=-0.5, ground_vertical=ground, horizontal=saltus.Harmonic(amplitude=0.1))
+    aligned = under(vertical=-0.5, ground_vertical=ground, horizontal=saltus.Harmonic(amplitude=0.1))
     assert excludes_tori(aligned) is not None
-    crossed = loaded(vertical=-0.5, ground_vertical=ground, horizontal=saltus.Harmonic(amplitude=0.1, phase=math.pi / 2))
+    crossed = under(vertical=-0.5, ground_vertical=ground, horizontal=saltus.Harmonic(amplitude=0.1, phase=math.pi / 2))
     assert excludes_tori(crossed) is None
 
 
@@ -105,13 +99,13 @@ def test_it_is_so_wherever_the_vertical_load_presses_throughout(vertical, swing,
 
 def test_where_a_torus_is_not_excluded_the_flow_tears_or_keeps_areas():
     """At V cos(beta0) > 0 and H = 0 the motion from rest is not unique; motions beside it end far from each other."""
-    system = under_force(1.0, 0.0, vertical=0.5)
+    system = forced(0.0, 1.0, V=0.5)
     assert excludes_tori(system) is None
     with pytest.raises(MotionError, match="not unique"):
         saltus.simulate(system, theta=0.0, periods=1)
     ends = [saltus.simulate(system, theta=theta, periods=1).theta for theta in (1e-9, -1e-9)]
     assert ends[0] - ends[1] > 1e6 * 2e-9
-    pressed = under_force(1.0, 0.0)
+    pressed = forced(0.0, 1.0)
     near = [saltus.simulate(pressed, theta=theta, periods=1).theta for theta in (1e-9, -1e-9)]
     assert abs(near[0] - near[1]) < 1e-6
 
@@ -119,7 +113,7 @@ def test_where_a_torus_is_not_excluded_the_flow_tears_or_keeps_areas():
 def test_the_contraction_that_it_states_holds_for_every_motion():
     """det of the stroboscopic map's derivative is at most exp(-C T) with equal layers, and e^2 less for every impact."""
     for e in (1.0, 0.8):
-        system = under_force(1.0, 0.5, e=e)
+        system = forced(0.5, 1.0, e=e)
         for theta, velocity in spread(12):
             found = saltus.sensitivities(system, theta=theta, velocity=velocity, periods=1)
             if found.undefined is None:
@@ -129,7 +123,7 @@ def test_the_contraction_that_it_states_holds_for_every_motion():
 def test_it_refuses_records_and_what_is_no_system():
     record = saltus.Record(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
     with pytest.raises(ParameterError, match="is a Record"):
-        excludes_tori(loaded(horizontal=record))
+        excludes_tori(under(horizontal=record))
     with pytest.raises(ParameterError, match="takes a System"):
         excludes_tori("a system")
 

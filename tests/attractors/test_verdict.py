@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from verdict_cases import under_force, wall
+from shared_systems import forced, walled
 
 import saltus
 from saltus import ParameterError
@@ -16,7 +16,7 @@ from saltus.theory import equilibria
 
 
 def test_rest_is_proved():
-    verdict = classify(under_force(1.0, 0.05), theta=0.01)
+    verdict = classify(forced(0.05, 1.0), theta=0.01)
     assert verdict.kind == "rest"
     assert verdict.period is None
     assert verdict.state == {"theta": 0.0, "velocity": 0.0}
@@ -25,7 +25,7 @@ def test_rest_is_proved():
 
 @pytest.mark.parametrize("e", [1.0, 0.5])
 def test_a_periodic_motion_is_certified_by_its_own_equations(e):
-    system = under_force(1.0, 0.5, e=e)
+    system = forced(0.5, 1.0, e=e)
     verdict = classify(system, theta=0.3)
     assert (verdict.kind, verdict.period) == ("periodic", 1)
     expected = saltus.find_orbit(system, theta=0.3)
@@ -40,7 +40,7 @@ def test_a_periodic_motion_is_certified_by_its_own_equations(e):
 
 def test_a_longer_period_is_counted_in_forcing_periods():
     """Hhat = 1 at Omega = 2.6: the family of period 3 between the folds of numerics.md, section 7."""
-    found = [classify(under_force(2.6, 1.0), theta=theta, velocity=v) for theta, v in ((4.0, 0.0), (3.0, 2.0), (-3.5, -1.0))]
+    found = [classify(forced(1.0, 2.6), theta=theta, velocity=v) for theta, v in ((4.0, 0.0), (3.0, 2.0), (-3.5, -1.0))]
     longer = [v for v in found if v.period == 3]
     assert longer
     for verdict in longer:
@@ -51,7 +51,7 @@ def test_a_longer_period_is_counted_in_forcing_periods():
 
 def test_an_orbit_with_rest_is_periodic():
     """Below one, e lets impacts die away; the load pulls the system off its contact again, twice a period."""
-    verdict = classify(under_force(0.05, 0.12, e=0.3), theta=0.05)
+    verdict = classify(forced(0.12, 0.05, e=0.3), theta=0.05)
     assert verdict.kind == "periodic"
     assert verdict.orbit.rest_share > 0.1
     assert verdict.evidence["largest_multiplier"] == 0.0
@@ -66,7 +66,7 @@ def test_chaos_is_seen_with_its_exponent(frequency, amplitude, known, periods):
 
     Its exponent is small: over 400 periods it is four to six times its error, which is undecided for one start in two.
     """
-    system = under_force(frequency, amplitude)
+    system = forced(amplitude, frequency)
     verdict = classify(system, theta=0.3, periods=periods)
     assert verdict.kind == "chaotic"
     assert verdict.exponents.values[0] == pytest.approx(known, abs=0.15 * known + float(verdict.exponents.errors[0]))
@@ -93,7 +93,7 @@ def settled_late(system, count, periods):
 @pytest.mark.parametrize("amplitude", [7.2, 7.3, *MORE])
 def test_long_chaotic_transients_are_not_called_chaos(amplitude):
     """At Omega = 4 motions wander for thousands of periods, and many settle in the end; the first thousand show nothing of it."""
-    system = under_force(4.0, amplitude)
+    system = forced(amplitude, 4.0)
     starts, late, _ = settled_late(system, 24, 4000)
     slowest = int(np.nanargmax(late))
     assert late[slowest] > 1200  # known to settle, later than the first look of the verdict below
@@ -108,7 +108,7 @@ def test_long_chaotic_transients_are_not_called_chaos(amplitude):
 
 
 def test_given_time_a_transient_is_followed_to_its_end():
-    system = under_force(4.0, 7.2)
+    system = forced(7.2, 4.0)
     starts, late, cycle = settled_late(system, 24, 4000)
     slowest = int(np.nanargmax(late))
     theta, velocity = starts[slowest]
@@ -119,7 +119,7 @@ def test_given_time_a_transient_is_followed_to_its_end():
 
 def test_a_motion_that_settles_while_its_exponents_are_taken_is_periodic_after_all():
     """Motions of a mean life of a thousand periods in chaos, given 600 to settle; one of three at least does it later."""
-    system = under_force(4.0, 7.2)
+    system = forced(7.2, 4.0)
     starts, late, _ = settled_late(system, 64, 2000)
     verdicts = [
         classify(system, theta=starts[i, 0], velocity=starts[i, 1], periods=600, transient=0)
@@ -136,9 +136,9 @@ def test_a_motion_that_settles_while_its_exponents_are_taken_is_periodic_after_a
 @pytest.fixture(scope="module")
 def at_the_fold():
     """A state near the fold of the onset at Omega = 1, which numerics.md and the issue place at Hhat = 0.0219879514."""
-    state = saltus.find_orbit(under_force(1.0, 0.0225), theta=-2.5, velocity=-0.5).state
+    state = saltus.find_orbit(forced(0.0225, 1.0), theta=-2.5, velocity=-0.5).state
     for amplitude in (0.0221, 0.022, 0.02199, 0.021988):
-        orbit = saltus.find_orbit(under_force(1.0, amplitude), theta=state[0], velocity=state[1], settle=0, period=1)
+        orbit = saltus.find_orbit(forced(amplitude, 1.0), theta=state[0], velocity=state[1], settle=0, period=1)
         state = orbit.state
     return orbit
 
@@ -146,11 +146,11 @@ def at_the_fold():
 def test_a_slow_passage_by_a_fold_is_no_attractor(at_the_fold):
     """Just below the fold there is no orbit any more, but motions dwell where it was for thousands of periods, and then rest."""
     theta, velocity = at_the_fold.state
-    early = classify(under_force(1.0, 0.0219879514 - 1e-8), theta=theta, velocity=velocity + 1e-4, periods=200, transient=50)
+    early = classify(forced(0.0219879514 - 1e-8, 1.0), theta=theta, velocity=velocity + 1e-4, periods=200, transient=50)
     assert early.kind == "undecided"
     assert "torus is excluded" in early.reason
     assert early.evidence["no_tori"]
-    late = classify(under_force(1.0, 0.0219879514 - 1e-7), theta=theta, velocity=velocity + 1e-4, periods=4000)
+    late = classify(forced(0.0219879514 - 1e-7, 1.0), theta=theta, velocity=velocity + 1e-4, periods=4000)
     assert late.kind == "rest"
     assert late.periods > 1000
     during = classify(late.system, theta=theta, velocity=velocity + 1e-4, periods=late.periods - 300, transient=0)
@@ -172,24 +172,24 @@ def test_a_slow_approach_to_an_orbit_is_periodic(at_the_fold):
 
 def test_a_torus_is_quasi_periodic():
     """Undamped motion about a deformed equilibrium under a weak force: a curve of the map, as KAM theory has it."""
-    system = under_force(1.0, 0.002, damping=0.0, vertical=0.5)
+    system = forced(0.002, 1.0, C=0.0, V=0.5)
     verdict = classify(system, theta=0.03, periods=300)
     assert verdict.kind == "quasi-periodic"
     assert (np.abs(verdict.exponents.values) < 1e-3).all()
     assert abs(verdict.zero_one.K) < 0.1
-    linear = classify(wall(0.0, frequency=math.sqrt(5) - 1), x=0.3, periods=300)
+    linear = classify(walled(c=0.0, W=math.sqrt(5) - 1, wall=20.0), x=0.3, periods=300)
     assert linear.kind == "quasi-periodic"
     assert (np.abs(linear.exponents.values) < 1e-12).all()
 
 
 def test_with_damping_the_same_start_ends_on_an_orbit():
-    verdict = classify(under_force(1.0, 0.002, damping=0.1, vertical=0.5), theta=0.03)
+    verdict = classify(forced(0.002, 1.0, C=0.1, V=0.5), theta=0.03)
     assert (verdict.kind, verdict.period) == ("periodic", 1)
 
 
 def test_an_orbit_that_does_not_attract_is_no_attractor():
     """Undamped, linear, started on its periodic solution F / (k - W^2) cos W tau: multipliers of modulus 1."""
-    verdict = classify(wall(0.0, 1.0, force=0.2, frequency=1.5), x=0.2 / (1.0 - 2.25))
+    verdict = classify(walled(c=0.0, k=1.0, A=0.2, W=1.5, wall=20.0), x=0.2 / (1.0 - 2.25))
     assert verdict.kind == "undecided"
     assert "does not attract" in verdict.reason
     assert verdict.evidence["largest_multiplier"] == pytest.approx(1.0, abs=1e-9)
@@ -219,25 +219,25 @@ def test_a_motion_that_ends_is_undecided():
     verdict = classify(system, theta=0.1)
     assert verdict.kind == "undecided"
     assert "where its margin overturned reaches 0" in verdict.reason
-    torn = classify(under_force(1.0, 0.3, damping=0.1, vertical=0.5, e=0.0), theta=0.3, velocity=-3.0)
+    torn = classify(forced(0.3, 1.0, C=0.1, V=0.5, e=0.0), theta=0.3, velocity=-3.0)
     assert torn.kind == "undecided"
     assert "not unique" in torn.reason
 
 
 def test_a_certificate_says_what_is_wrong():
-    system = under_force(1.6, 3.0)
+    system = forced(3.0, 1.6)
     state = find_recurrence(system, np.array([[0.3, 0.0]]), 300, kept=1).states[0, -1]
     found = certify(system, state, 1)
     assert not found.sound
     assert found.doubt
-    sound = saltus.find_orbit(under_force(1.0, 0.5), theta=0.3)
+    sound = saltus.find_orbit(forced(0.5, 1.0), theta=0.3)
     beside = certify(sound.system, np.array(sound.state) + 1e-4, 1)
     assert "beside the motion" in beside.doubt
     assert certify(sound.system, np.array(sound.state), 1).sound
 
 
 def test_verdicts_repeat_themselves():
-    one, other = (classify(under_force(1.6, 3.0), theta=0.3, periods=96, transient=50, seed=4) for _ in range(2))
+    one, other = (classify(forced(3.0, 1.6), theta=0.3, periods=96, transient=50, seed=4) for _ in range(2))
     assert one.reason == other.reason
     assert one.evidence == other.evidence
     assert one.kind in KINDS
@@ -245,7 +245,7 @@ def test_verdicts_repeat_themselves():
 
 def test_progress_goes_from_nothing_to_all():
     told = []
-    classify(under_force(1.6, 3.0), theta=0.3, periods=96, transient=50, progress=told.append)
+    classify(forced(3.0, 1.6), theta=0.3, periods=96, transient=50, progress=told.append)
     assert told == sorted(told)
     assert told[-1] == 1.0
 
@@ -264,6 +264,6 @@ def test_progress_goes_from_nothing_to_all():
     ],
 )
 def test_it_refuses_what_has_no_meaning(changes, match):
-    arguments = {"system": under_force(1.0, 0.5), "theta": 0.3} | changes
+    arguments = {"system": forced(0.5, 1.0), "theta": 0.3} | changes
     with pytest.raises(ParameterError, match=match):
         classify(arguments.pop("system"), **arguments)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from flow_references import BETA80, driven
+from shared_systems import BETA80, forced
 from xarray import DataArray
 
 from saltus.bounds import capture as module
@@ -28,7 +28,7 @@ from saltus.systems import (
 )
 from saltus.theory import Stability, equilibria
 
-BASE = driven(C=0.1, V=-0.5, H=0.02, W=1.0)
+BASE = forced(C=0.1, V=-0.5, H=0.02, W=1.0)
 LIFT = 0.5 / math.tan(BETA80)  # Hcr of BASE
 
 
@@ -167,7 +167,7 @@ def leaves(system, speed, phases=12, duration=80.0):
 
 @pytest.mark.parametrize(("H", "V", "e", "factor"), [(0.05, -1.5, 1.0, 5), (0.15, -1.5, 1.0, 25), (0.2, -1.8, 0.8, 20)])
 def test_the_threshold_is_within_a_factor_of_where_motions_do_leave(H, V, e, factor):
-    system = driven(H=H, V=V, e=e)
+    system = forced(H=H, V=V, e=e)
     speed = float(capture_speed(system))
     assert not leaves(system, speed)
     assert leaves(system, factor * speed)
@@ -179,11 +179,11 @@ def test_the_threshold_is_within_a_factor_of_where_motions_do_leave(H, V, e, fac
 @pytest.mark.parametrize(
     "system",
     [
-        driven(H=1.01 * LIFT, e=0.5),  # lifts the system off once a period
-        driven(V=0.5, e=0.5),  # pushes both layers open
-        driven(C=0.0),  # nothing takes energy
-        driven(C=0.0, H=0.02),
-        driven(mean=0.05, H=0.04, e=0.3),
+        forced(H=1.01 * LIFT, e=0.5),  # lifts the system off once a period
+        forced(H=0.0, V=0.5, e=0.5),  # pushes both layers open
+        forced(H=0.0, C=0.0),  # nothing takes energy
+        forced(C=0.0, H=0.02),
+        forced(mean=0.05, H=0.04, e=0.3),
         System(model=TwoLayer(beta0=1.3), load=Load(vertical=-0.5)),  # no contact of its own
         System(
             model=Metainterface(beta0=1.3),

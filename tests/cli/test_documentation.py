@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shared_systems import forced
 
 import saltus
 from saltus.bounds.capture import capture_speed
@@ -121,16 +122,8 @@ def first_cells(text):
     return re.findall(r"`([^`]+)`", " ".join(re.findall(r"^\| (`[^|]*)\|", text, re.MULTILINE)))
 
 
-def paper_system(**changes):
-    system = saltus.System(
-        model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
-        load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(amplitude=0.5), vertical=-0.5),
-    )
-    return system.with_(changes)
-
-
 def test_the_attributes_of_an_orbit_are_all_there():
-    orbit = saltus.find_orbit(paper_system(), theta=0.3)
+    orbit = saltus.find_orbit(forced(), theta=0.3)
     named = first_cells(orbits_section("One orbit"))
     assert len(named) > 15
     for name in named:
@@ -161,7 +154,7 @@ def test_the_options_of_a_diagram_are_all_there():
 def test_the_nodes_and_variables_of_a_diagram_are_all_there():
     from saltus.studies import response_spectrum
 
-    tree = response_spectrum(paper_system(), bounds=(0.8, 1.0), max_period=1, values=[0.9], starts=8, bands=2)
+    tree = response_spectrum(forced(), bounds=(0.8, 1.0), max_period=1, values=[0.9], starts=8, bands=2)
     _, rest = orbits_section("Spectra and diagrams").split("| node | |")
     nodes, variables = rest.split("| variable of a branch |")
     assert "branch_000" in tree

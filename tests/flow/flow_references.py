@@ -1,29 +1,16 @@
 """References for the flow: systems that share one structure, a 30-digit integrator, and heyoka.py restarted at impacts."""
 
-import math
 from dataclasses import dataclass, field
 
 import mpmath as mp
 import numpy as np
+from shared_systems import BETA80
 
-from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
-
-BETA80 = math.radians(80)
-
-# Every set of paths compiles a tangent of its own, some seconds each: tests of `driven` that need some of these take all.
+# Every set of paths compiles a tangent of its own, some seconds each: tests of `forced` that need some of these take all.
 SHARED_PATHS = (
     *("load.horizontal.amplitude", "load.horizontal.phase", "load.frequency", "load.vertical"),
     *("model.beta0", "model.damping"),
 )
-
-
-def driven(*, beta0=BETA80, C=0.1, m=0.0, k=1.0, c=1.0, V=-0.5, H=0.0, mean=0.0, phase=0.0, W=1.0, e=1.0, impact=None):
-    """A metainterface under H(t) = mean + H sin(W t + phase) and a constant V; with m > 0 the loads are on the upper mass."""
-    return System(
-        model=Metainterface(beta0=beta0, damping=C, mass_ratio=m, stiffness_ratio=k, dissipation_ratio=c),
-        load=Load(frequency=W, horizontal=Harmonic(amplitude=H, mean=mean, phase=phase), vertical=V),
-        impact=impact or VelocityReduction(e),
-    )
 
 
 def evaluate_steps(dense, samples=9):

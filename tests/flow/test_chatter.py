@@ -1,6 +1,7 @@
 """Impacts without loss (e = 1) near contact: the averaged law of numerics.md against resolved impacts and closed forms.
 
 Between impacts at speed v the motion on side s lasts 2 v_s / abs(a_s). Per unit of time the speed gains the share a_s' / (3 a_s)
+from shared_systems import forced, BETA80
 from the change of the pull a_s, and loses the share g_s / 3 to the damping g_s. Averaged over both sides, with v_s = f_s v where
 the impact law changes the speed by a fixed factor there and back, the action J = v^3 sum f_s / abs(a_s) decays at the rate
 (sum g_s f_s / abs(a_s)) / (sum f_s / abs(a_s)).
@@ -10,8 +11,8 @@ import math
 
 import numpy as np
 import pytest
-from flow_references import BETA80, driven
 from scipy.integrate import quad
+from shared_systems import BETA80, forced
 
 from saltus.flow import EventKind, simulate
 from saltus.flow import kernel_layout as k
@@ -62,7 +63,7 @@ CONSERVATIVE = {"C": 0.0, "V": -0.5, "H": 0.06, "W": 0.2}
 
 def worst_relative_error(numbers, v0, duration, lower_factor=1.0, impact=None):
     """Of the law against the impacts that the kernel resolves, all those that leave the upper side."""
-    motion = simulate(driven(**numbers, impact=impact), theta=0.0, velocity=-v0, duration=duration, tol=1e-15)
+    motion = simulate(forced(**numbers, impact=impact), theta=0.0, velocity=-v0, duration=duration, tol=1e-15)
     upper = motion.impacts.side < 0
     assert motion.phase_known
     assert upper.sum() > 100
@@ -92,30 +93,30 @@ def test_the_averaged_speed_follows_the_closed_form_of_symmetric_layers():
     t, C, V, H, W = 17.0, 0.1, -0.5, 0.07, 0.21
     A, b = abs(V) * math.cos(BETA80), math.sin(BETA80)
     h0, h = 0.2 * H * b, H * math.sin(W * t + math.asin(0.2)) * b
-    speed = averaged_speed(driven(C=C, V=V, H=H, W=W, phase=math.asin(0.2)), 8e-6, t)
+    speed = averaged_speed(forced(C=C, V=V, H=H, W=W, phase=math.asin(0.2)), 8e-6, t)
     expected = 8e-6 * ((A**2 - h**2) / (A**2 - h0**2)) ** (1 / 3) * math.exp(-C * t / 3)
     assert speed == pytest.approx(expected, rel=1e-11)
 
 
 @pytest.mark.parametrize("duration", [0.3, 4.0, 23.0])
 def test_the_averaged_speed_follows_the_law_for_unequal_layers(duration):
-    assert averaged_speed(driven(**UNEQUAL), -9e-6, duration) == pytest.approx(law(UNEQUAL, 9e-6, duration), rel=1e-9)
+    assert averaged_speed(forced(**UNEQUAL), -9e-6, duration) == pytest.approx(law(UNEQUAL, 9e-6, duration), rel=1e-9)
 
 
 @pytest.mark.parametrize("start", [-1, 1])
 def test_the_averaged_speed_follows_the_law_where_the_impact_changes_the_speed(start):
     numbers, factor = {"C": 0.15, "m": 0.8, "c": 0.6, "V": -0.8, "H": 0.1, "W": 0.3}, {-1: 1.0, 1: 1 / math.sqrt(1.8)}[start]
-    system = driven(**numbers, impact=EnergyRestitution(1.0))
+    system = forced(**numbers, impact=EnergyRestitution(1.0))
     expected = law(numbers, 5e-6 / factor, 9.0, lower_factor=1 / math.sqrt(1.8)) * factor
     assert averaged_speed(system, start * 5e-6, 9.0) == pytest.approx(expected, rel=1e-9)
 
 
 def test_without_damping_and_under_constant_loads_the_speed_stays():
-    assert averaged_speed(driven(C=0.0, V=-0.5), 7e-6, 40.0) == pytest.approx(7e-6, rel=1e-13)
+    assert averaged_speed(forced(H=0.0, C=0.0, V=-0.5), 7e-6, 40.0) == pytest.approx(7e-6, rel=1e-13)
 
 
 def test_resolved_impacts_decay_into_chatter_once_they_are_too_small():
-    motion = simulate(driven(C=1.0, V=-1.5), theta=0.0, velocity=2e-4, duration=15.0)
+    motion = simulate(forced(H=0.0, C=1.0, V=-1.5), theta=0.0, velocity=2e-4, duration=15.0)
     (event,) = [e for e in motion.events if e.kind is EventKind.CHATTER]
     assert not motion.phase_known
     assert abs(event.velocity_after) == pytest.approx(1e-5, rel=1e-2)
@@ -126,7 +127,7 @@ def test_resolved_impacts_decay_into_chatter_once_they_are_too_small():
 
 def test_chatter_is_released_when_the_load_says_and_its_phase_is_said_to_be_lost():
     H, W = 0.2, 0.5
-    motion = simulate(driven(H=H, W=W), theta=0.0, velocity=5e-6, duration=4.0)
+    motion = simulate(forced(H=H, W=W), theta=0.0, velocity=5e-6, duration=4.0)
     released = math.asin(0.5 * math.cos(BETA80) / (H * math.sin(BETA80))) / W
     kinds = [e.kind for e in motion.events]
     assert kinds[:2] == [EventKind.CHATTER, EventKind.RELEASE]
@@ -136,7 +137,7 @@ def test_chatter_is_released_when_the_load_says_and_its_phase_is_said_to_be_lost
 
 
 def test_chatter_never_starts_where_an_impact_loses_speed():
-    motion = simulate(driven(e=0.999, C=0.5), theta=0.0, velocity=1e-4, duration=30.0)
+    motion = simulate(forced(H=0.0, e=0.999, C=0.5), theta=0.0, velocity=1e-4, duration=30.0)
     assert motion.phase_known
     assert motion.rest_time is not None
 
@@ -164,14 +165,14 @@ def test_chatter_does_not_begin_where_the_contact_hardly_holds_and_ends_where_it
     """The averaged law needs contact accelerations that change slowly over two impacts; near a release they do not."""
     beta0 = math.radians(80)
     loose = 0.5 / math.tan(beta0) * (1 - 1e-7)  # H just below Hcr, and falling
-    system = driven(C=0.0, V=-0.5, H=loose, W=0.5, phase=math.pi / 2)
+    system = forced(C=0.0, V=-0.5, H=loose, W=0.5, phase=math.pi / 2)
     resolved = simulate(system, theta=0.0, velocity=1.01e-5, duration=5.0)
     below = simulate(system, theta=0.0, velocity=9.9e-6, duration=5.0)
     assert resolved.phase_known
     assert below.phase_known
     speeds = [np.abs(m.impacts.velocity_after[-10:]).max() for m in (below, resolved)]
     assert speeds[0] == pytest.approx(speeds[1] * 9.9 / 10.1, rel=0.2)
-    growing = driven(C=0.0, V=-0.5, H=0.98 * loose, W=0.05, phase=math.pi / 2)
+    growing = forced(C=0.0, V=-0.5, H=0.98 * loose, W=0.05, phase=math.pi / 2)
     motion = simulate(growing, theta=0.0, velocity=9.9e-6, duration=30.0)
     assert [e.kind for e in motion.events][:2] == [EventKind.CHATTER, EventKind.IMPACT]
     assert not motion.phase_known

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from flow_references import driven
+from shared_systems import forced
 
 from saltus.flow import simulate
 
@@ -61,7 +61,7 @@ def test_the_determinant_of_the_flow_is_the_product_of_its_impacts_and_of_its_da
     rng, used, kinds = np.random.default_rng(11), 0, set()
     for _ in range(120):
         numbers, state = random_case(rng)
-        system = driven(**numbers)
+        system = forced(**numbers)
         motion, _ = end(system, state)
         speeds = np.abs(motion.impacts.velocity_before)
         if len(motion.impacts) < 1 or speeds.min() < 0.15:  # near a grazing the flow has no Taylor series of 8 STEP
@@ -78,7 +78,7 @@ def test_the_determinant_of_the_flow_is_the_product_of_its_impacts_and_of_its_da
 
 
 def test_after_rest_the_determinant_is_zero():
-    system = driven(e=0.3, H=0.25, W=0.05, C=0.3)
+    system = forced(e=0.3, H=0.25, W=0.05, C=0.3)
     states = [np.array([0.05, 0.0]), np.array([0.05 + STEP, 0.0]), np.array([0.05, STEP])]
     motions = [end(system, s)[0] for s in states]
     assert all(any(e.kind == "rest" for e in m.events) and m.side != 0 for m in motions)  # rest, then release before the end

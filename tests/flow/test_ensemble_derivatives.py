@@ -2,23 +2,15 @@
 
 import numpy as np
 import pytest
+from shared_systems import forced
 
 import saltus
 from saltus.flow import stop_names
-from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
 
 pytestmark = pytest.mark.thorough  # many structures of their own
 
 STEP = 2e-4
 STATES = np.array([[0.3, 0.1], [-0.5, 0.2], [0.6, -0.1]])
-
-
-def driven(C, H, e=1.0, W=1.0):
-    return System(
-        model=Metainterface(beta0=1.4, damping=C),
-        load=Load(frequency=W, horizontal=Harmonic(H), vertical=-0.5),
-        impact=VelocityReduction(e),
-    )
 
 
 def by_differences(system, theta, velocity, time, span):
@@ -45,7 +37,7 @@ def by_differences(system, theta, velocity, time, span):
 )
 def test_the_start_is_fixed_and_the_end_moves_only_with_the_periods_asked_for(C, H, e, span, until, stop, held, time):
     """Asked for periods, the state after as many of them, settled or not; asked for a duration, at that time."""
-    system = driven(C, H, e)
+    system = forced(H, C=C, e=e, beta0=1.4)
     ensemble = saltus.simulate_many(
         system,
         theta=STATES[:, 0],

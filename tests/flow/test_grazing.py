@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from flow_references import driven
+from shared_systems import forced
 
 from saltus.flow import EventKind, simulate
 from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscillator
 
 # In this motion theta comes down to a minimum near contact on its own side, from above. V < 0: at contact both sides push back.
-SYSTEM = driven(H=0.5, W=0.3)
+SYSTEM = forced(H=0.5, W=0.3)
 DURATION = 6.0
 
 
@@ -120,7 +120,7 @@ def test_touches_at_the_ends_of_periods_are_survived_for_any_phase():
 
 def test_a_repelling_contact_tears_the_flow_at_its_grazing_and_neither_hangs_nor_penetrates():
     """V > 0 pushes away on both sides: beyond the touch the motion does not come back."""
-    system = driven(V=0.3, C=0.05, H=0.3, W=1.1)
+    system = forced(V=0.3, C=0.05, H=0.3, W=1.1)
     angles = np.linspace(0.1, 2.0, 60)
     finals = np.array([simulate(system, theta=a, velocity=-0.5, duration=6.0).theta for a in angles])
     assert (finals > 0).any()

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from flow_references import driven
+from shared_systems import forced
 
 from saltus.flow import simulate
 
@@ -92,7 +92,7 @@ def test_100_random_motions_agree_with_heyoka_to_1e_9(integrator, record_propert
     rng, compared, grazing, sensitive, impacts, worst = np.random.default_rng(2024), 0, 0, 0, 0, 0.0
     for _ in range(CASES):
         numbers, theta, velocity, duration = random_case(rng)
-        system = driven(**numbers)
+        system = forced(**numbers)
         motion = simulate(system, theta=theta, velocity=velocity, duration=duration, tol=1e-14)
         if passes_near_a_grazing(motion):
             grazing += 1

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from flow_references import BETA80, driven, evaluate_steps
+from flow_references import evaluate_steps
+from shared_systems import BETA80, forced
 
 from saltus.flow import simulate
 from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface, System, VelocityReduction
@@ -77,7 +78,7 @@ def test_a_continuous_velocity_between_unequal_masses_changes_the_energy_at_each
 
 
 def test_with_viscous_damping_the_energy_falls_by_what_the_damper_takes():
-    system = driven(C=0.2, c=1.5, m=0.3, k=1.2, impact=EnergyRestitution(1.0))
+    system = forced(H=0.0, C=0.2, c=1.5, m=0.3, k=1.2, impact=EnergyRestitution(1.0))
     motion = simulate(system, theta=0.6, velocity=0.0, duration=12.0, tol=1e-15)
     nodes, weights = np.polynomial.legendre.leggauss(20)
     taken = 0.0
@@ -110,7 +111,7 @@ def test_the_mirrored_system_moves_as_the_mirror_image_bit_for_bit(e, theta, vel
 
 
 def test_under_a_symmetric_load_the_mirror_image_is_the_motion_half_a_period_later():
-    system = driven(H=0.6, W=1.2)
+    system = forced(H=0.6, W=1.2)
     half = math.pi / 1.2
     motion = simulate(system, theta=0.3, velocity=0.1, time=0.0, duration=20.0)
     image = simulate(system, theta=-0.3, velocity=-0.1, time=half, duration=20.0)
@@ -146,8 +147,8 @@ def test_a_horizontal_force_and_a_ground_motion_of_one_amplitude_are_one_load(m)
 @pytest.mark.parametrize(("H", "theta", "velocity"), [(0.0, 0.3, 0.0), (0.0, -1.7, 0.4), (0.4, 0.3, 0.0), (0.8, -0.5, 0.2)])
 def test_a_conservative_motion_run_backwards_returns_to_its_start(H, theta, velocity):
     W, phase, T = 1.3, 0.3, 15.0
-    there = simulate(driven(C=0.0, H=H, W=W, phase=phase), theta=theta, velocity=velocity, duration=T, tol=1e-15)
-    reversed_load = driven(C=0.0, H=H, W=W, phase=math.pi - W * T - phase)  # H(T - s), as a sine of W s
+    there = simulate(forced(C=0.0, H=H, W=W, phase=phase), theta=theta, velocity=velocity, duration=T, tol=1e-15)
+    reversed_load = forced(C=0.0, H=H, W=W, phase=math.pi - W * T - phase)  # H(T - s), as a sine of W s
     back = simulate(reversed_load, theta=there.theta, velocity=-there.velocity, duration=T, tol=1e-15)
     assert back.theta == pytest.approx(theta, abs=1e-12)
     assert back.velocity == pytest.approx(-velocity, abs=1e-12)
@@ -155,7 +156,7 @@ def test_a_conservative_motion_run_backwards_returns_to_its_start(H, theta, velo
 
 
 def test_a_motion_is_the_same_whether_computed_at_once_or_in_pieces():
-    system = driven(H=0.5, W=0.9, e=0.95)
+    system = forced(H=0.5, W=0.9, e=0.95)
     whole = simulate(system, theta=0.3, velocity=0.0, duration=40.0, tol=1e-15)
     time, theta, velocity, crossings = 0.0, 0.3, 0.0, 0
     for end in [*np.random.default_rng(3).uniform(0, 40, 25).tolist(), 40.0]:
@@ -169,7 +170,7 @@ def test_a_motion_is_the_same_whether_computed_at_once_or_in_pieces():
 
 
 def test_the_steps_of_the_dense_output_join():
-    motion = simulate(driven(H=0.5), theta=0.3, velocity=0.0, periods=10, tol=1e-14)
+    motion = simulate(forced(H=0.5), theta=0.3, velocity=0.0, periods=10, tol=1e-14)
     values = evaluate_steps(motion.dense, samples=2)
     np.testing.assert_allclose(values[:-1, 1], values[1:, 0], atol=3e-14)
     np.testing.assert_allclose(motion.dense.start[1:], (motion.dense.start + motion.dense.length)[:-1], atol=1e-13)

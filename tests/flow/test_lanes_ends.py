@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from flow_references import driven
+from shared_systems import forced
 
 import saltus
 from saltus.errors import MotionError
@@ -16,7 +16,7 @@ from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface, Sys
 @pytest.mark.parametrize("begin", [0.0, 1.0])
 def test_an_accumulation_that_ends_beside_a_forcing_period_has_the_scalar_kernels_impacts(late, begin):
     """It is followed to the end only where the motion itself ends first."""
-    system = driven(V=-0.5, e=0.8)
+    system = forced(H=0.0, V=-0.5, e=0.8)
     motion = saltus.simulate(system, theta=0.3, duration=100.0)
     rest = next(event.time for event in motion.events if event.kind == EventKind.REST)
     turned = system.with_({"load.frequency": 2 * math.pi / (rest - late)})
@@ -30,7 +30,7 @@ def test_an_accumulation_that_ends_beside_a_forcing_period_has_the_scalar_kernel
 
 
 def test_impacts_too_slow_to_be_followed_are_captured_at_once():
-    system = driven(H=0.05, e=1.0)
+    system = forced(H=0.05, e=1.0)
     threshold = float(saltus.capture_speed(system))
     speeds = np.array([1e-7, 1e-6, 1e-5, 1e-4, 0.9 * threshold])
     ends = saltus.simulate_many(system, theta=0.0, velocity=speeds, periods=50, until="rest")

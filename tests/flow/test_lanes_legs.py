@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 import pytest
-from flow_references import driven
 from numba import njit
+from shared_systems import forced
 from test_ensemble_samples import KINDS, extrema
 
 import saltus
@@ -18,9 +18,9 @@ from saltus.taylor.private_numba import OPTIONS
 SHORT = {"load.frequency": 40.0, "load.horizontal.amplitude": 0.3}  # periods shorter than a step
 RECORD = Record([-2.0, -0.7, 0.31, 1.3, 2.9, 9.0], [0.0, 0.3, -0.2, 0.4, 0.1, 0.2])
 SYSTEMS = {
-    "short": driven(e=0.9).with_(SHORT),
-    "ordinary": driven(e=0.9, H=0.3, W=2.0),
-    "record": driven(e=0.9).with_({"load": Load(frequency=7.0, horizontal=RECORD + Harmonic(0.1), vertical=-0.5)}),
+    "short": forced(H=0.0, e=0.9).with_(SHORT),
+    "ordinary": forced(e=0.9, H=0.3, W=2.0),
+    "record": forced(H=0.0, e=0.9).with_({"load": Load(frequency=7.0, horizontal=RECORD + Harmonic(0.1), vertical=-0.5)}),
 }
 
 
@@ -49,7 +49,7 @@ def test_each_period_has_what_the_scalar_motion_has_in_it(system, time, periods)
 
 def test_what_has_settled_ends_at_the_end_of_its_period():
     """With its derivatives, as after so many periods that were asked for."""
-    system, options = driven(C=0.3, H=0.3, W=2.0), {"theta": 0.6, "tol": 1e-13, "sensitivities": ("load.frequency",)}
+    system, options = forced(C=0.3, H=0.3, W=2.0), {"theta": 0.6, "tol": 1e-13, "sensitivities": ("load.frequency",)}
     ends = saltus.simulate_many(system, periods=400, until="settled", **options)
     assert str(stop_names(ends)) == "settled"
     assert float(ends.periods) == round(float(ends.periods)) < 400

@@ -7,15 +7,15 @@ import pickle
 import numpy as np
 import pytest
 import xarray
-from flow_references import BETA80, driven
 from scipy.integrate import quad
 from scipy.optimize import brentq
+from shared_systems import BETA80, forced
 
 from saltus.errors import ParameterError
 from saltus.flow import EventKind, Motion, Stop, simulate
 from saltus.systems import Harmonic, Load, RockingBlock, System, WallOscillator
 
-SYSTEM = driven(H=0.5, e=0.9)
+SYSTEM = forced(H=0.5, e=0.9)
 WALL = System(model=WallOscillator(damping=0.1, wall=1e6), load=Load(frequency=1.3, force=Harmonic(0.4)))
 
 
@@ -153,7 +153,7 @@ def test_impacts_alternate_between_the_sides_and_lose_the_same_share(motion):
 
 
 def test_events_come_in_order_of_time():
-    system = driven(H=0.12, W=0.15, e=0.5)  # comes to rest and is released, over and over
+    system = forced(H=0.12, W=0.15, e=0.5)  # comes to rest and is released, over and over
     motion = simulate(system, theta=0.3, periods=3)
     kinds = [event.kind for event in motion.events]
     times = np.array([event.time for event in motion.events])
@@ -167,7 +167,7 @@ def test_events_come_in_order_of_time():
 
 # --- margins -------------------------------------------------------------------------------------------------------------
 
-LARGE = driven(H=1.0, W=0.8)
+LARGE = forced(H=1.0, W=0.8)
 OPENING = math.pi - BETA80
 
 
@@ -200,7 +200,7 @@ def test_first_passage_of_the_limits_is_where_the_angle_reaches_them(large):
 
 
 def test_share_of_the_wrong_reaction_is_that_of_fine_samples(large):
-    for motion, system in ((large, LARGE), (simulate(driven(H=0.5), theta=0.3, periods=30), driven(H=0.5))):
+    for motion, system in ((large, LARGE), (simulate(forced(H=0.5), theta=0.3, periods=30), forced(H=0.5))):
         times = np.linspace(0, motion.time, 400_001)
         value = reaction(times, *motion.at(times), system)
         wrong = value < 0
@@ -214,8 +214,8 @@ def test_share_of_the_wrong_reaction_is_that_of_fine_samples(large):
 
 def test_paper_s_motion_violates_the_reaction_for_eight_percent_of_the_time():
     # Errata 21: 8 % at H = 0.5, Omega = 1, on the periodic motion.
-    settled = simulate(driven(H=0.5), theta=0.3, periods=200, dense=False)
-    motion = simulate(driven(H=0.5), theta=settled.theta, velocity=settled.velocity, periods=10)
+    settled = simulate(forced(H=0.5), theta=0.3, periods=200, dense=False)
+    motion = simulate(forced(H=0.5), theta=settled.theta, velocity=settled.velocity, periods=10)
     assert motion.validity.share["reaction"] == pytest.approx(0.08, abs=0.005)
 
 
@@ -241,7 +241,7 @@ def test_motion_that_starts_beyond_a_limit_stops_at_once():
 
 
 def test_respected_margins_are_reported_as_such():
-    quiet = simulate(driven(H=0.0), theta=0.05, duration=1.0)
+    quiet = simulate(forced(H=0.0), theta=0.05, duration=1.0)
     assert quiet.validity.respected
     assert str(quiet.validity) == "line_limit respected; kinematic_limit respected; reaction respected"
     passed = simulate(LARGE, theta=1.7, velocity=1.3, duration=1.0)
@@ -291,7 +291,7 @@ def test_dataset_survives_netcdf(motion, tmp_path):
 
 
 def test_dataset_of_a_motion_at_rest_has_its_rest_time():
-    motion = simulate(driven(H=0.0, e=0.5), theta=0.3, duration=30.0)
+    motion = simulate(forced(H=0.0, e=0.5), theta=0.3, duration=30.0)
     data = motion.to_xarray()
     assert motion.stop is Stop.REST
     assert motion.side == 0

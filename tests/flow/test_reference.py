@@ -5,7 +5,8 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from flow_references import PreciseSystem, driven
+from flow_references import PreciseSystem
+from shared_systems import forced
 
 from saltus.flow import simulate
 
@@ -15,12 +16,12 @@ DECADES = range(6, 16)
 
 
 def error(tol):
-    motion = simulate(driven(H=0.5), theta=0.3, velocity=0.0, periods=20, tol=tol)
+    motion = simulate(forced(H=0.5), theta=0.3, velocity=0.0, periods=20, tol=tol)
     return max(abs(motion.theta - THETA), abs(motion.velocity - VELOCITY))
 
 
 def test_the_reference_motion_is_met_to_its_last_digits():
-    motion = simulate(driven(H=0.5), theta=0.3, velocity=0.0, periods=20, tol=1e-15)
+    motion = simulate(forced(H=0.5), theta=0.3, velocity=0.0, periods=20, tol=1e-15)
     assert motion.theta == pytest.approx(THETA, abs=1e-14, rel=0)
     assert motion.velocity == pytest.approx(VELOCITY, abs=1e-14, rel=0)
     assert len(motion.impacts) == IMPACT_COUNT
@@ -50,7 +51,7 @@ TENSION = {"beta0": 1.4, "C": 0.05, "m": 0.0, "k": 0.8, "c": 1.4, "V": 0.2, "H":
 def test_unequal_layers_with_and_without_loss_agree_with_a_30_digit_integrator_of_its_own(numbers, e, start):
     with mp.workdps(30):
         exact = PreciseSystem(**numbers, factors=(e, e)).run(*start, 12.0)
-        motion = simulate(driven(**numbers, e=e), theta=start[0], velocity=start[1], duration=12.0, tol=1e-15)
+        motion = simulate(forced(**numbers, e=e), theta=start[0], velocity=start[1], duration=12.0, tol=1e-15)
         assert len(motion.impacts) == len(exact.impacts) >= 2
         for time, before, (t, _, v, _) in zip(motion.impacts.time, motion.impacts.velocity_before, exact.impacts, strict=True):
             assert abs(time - t) < 2e-14
@@ -60,7 +61,7 @@ def test_unequal_layers_with_and_without_loss_agree_with_a_30_digit_integrator_o
 
 
 def test_a_step_of_degree_p_has_an_error_of_order_p_plus_1():
-    motion = simulate(driven(H=0.5), theta=0.3, velocity=0.0, duration=0.5, tol=1e-15)
+    motion = simulate(forced(H=0.5), theta=0.3, velocity=0.0, duration=0.5, tol=1e-15)
     series = motion.dense.series[0, 0]
     assert motion.dense.length[0] > 0.2
     with mp.workdps(30):
@@ -72,7 +73,7 @@ def test_a_step_of_degree_p_has_an_error_of_order_p_plus_1():
 
 def test_every_step_keeps_its_last_terms_below_the_tolerance():
     for tol in (1e-7, 1e-10, 1e-13):
-        motion = simulate(driven(H=0.5), theta=0.3, velocity=0.0, periods=3, tol=tol)
+        motion = simulate(forced(H=0.5), theta=0.3, velocity=0.0, periods=3, tol=tol)
         dense = motion.dense
         order = dense.series.shape[2] - 2
         speeds = np.abs(dense.series[:, 0, 1:] * np.arange(1, order + 2))  # of theta', whose series sets the step
@@ -82,7 +83,7 @@ def test_every_step_keeps_its_last_terms_below_the_tolerance():
 
 
 def test_20_periods_and_the_same_duration_are_one_motion():
-    by_periods = simulate(driven(H=0.5, W=1.3), theta=0.3, velocity=0.0, periods=20)
-    by_duration = simulate(driven(H=0.5, W=1.3), theta=0.3, velocity=0.0, duration=20 * 2 * math.pi / 1.3)
+    by_periods = simulate(forced(H=0.5, W=1.3), theta=0.3, velocity=0.0, periods=20)
+    by_duration = simulate(forced(H=0.5, W=1.3), theta=0.3, velocity=0.0, duration=20 * 2 * math.pi / 1.3)
     assert by_periods.theta == pytest.approx(by_duration.theta, abs=1e-12)
     assert by_periods.velocity == pytest.approx(by_duration.velocity, abs=1e-12)

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from flow_references import BETA80, driven, evaluate_steps
+from flow_references import evaluate_steps
+from shared_systems import BETA80, forced
 
 from saltus.errors import MotionError
 from saltus.flow import EventKind, Stop, simulate
@@ -29,7 +30,7 @@ def closed_form_release(H, V, W, beta0=BETA80):
 @pytest.mark.parametrize("tol", [1e-15, 1e-12, 1e-7])
 def test_rest_ends_at_the_closed_form_release_time_on_the_side_of_the_load(H, V, W, beta0, m, tol):
     for sign in (1, -1):
-        motion = simulate(driven(H=sign * H, V=V, W=W, beta0=beta0, m=m, e=0.8), theta=0.0, velocity=0.0, periods=0.25, tol=tol)
+        motion = simulate(forced(H=sign * H, V=V, W=W, beta0=beta0, m=m, e=0.8), theta=0.0, velocity=0.0, periods=0.25, tol=tol)
         release = closed_form_release(H, V, W, beta0)
         assert kinds(motion)[:2] == [EventKind.REST, EventKind.RELEASE]
         assert motion.events[0].time == 0.0
@@ -39,7 +40,7 @@ def test_rest_ends_at_the_closed_form_release_time_on_the_side_of_the_load(H, V,
 
 def test_a_slow_load_brings_rest_and_release_twice_a_period_each_at_its_closed_form_time():
     H, W = 0.15, 0.02
-    system = driven(H=H, W=W, e=0.6, C=0.3)
+    system = forced(H=H, W=W, e=0.6, C=0.3)
     motion = simulate(system, theta=0.3, velocity=0.0, periods=4, tol=1e-14)
     released = np.array([e.time for e in motion.events if e.kind is EventKind.RELEASE])
     half = math.pi / W
@@ -56,7 +57,7 @@ def test_a_slow_load_brings_rest_and_release_twice_a_period_each_at_its_closed_f
 @pytest.mark.parametrize("m", [0.0, 0.7])
 def test_after_a_simple_root_theta_grows_like_the_slope_of_the_acceleration_times_tau_cubed_over_6(sign, m):
     H, W = 0.4, 0.7
-    motion = simulate(driven(H=sign * H, W=W, m=m, e=0.8), theta=0.0, velocity=0.0, periods=0.25, tol=1e-15)
+    motion = simulate(forced(H=sign * H, W=W, m=m, e=0.8), theta=0.0, velocity=0.0, periods=0.25, tol=1e-15)
     release = motion.events[1].time
     slope = sign * H * W * math.cos(W * release) * SIN / (1 + m * (sign > 0))
     tau = np.array([2e-2, 1e-2, 5e-3])
@@ -81,11 +82,11 @@ def test_after_a_jump_of_the_load_theta_grows_like_the_acceleration_times_tau_sq
 
 def test_an_acceleration_that_only_touches_zero_does_not_release():
     below = BALANCE * (1 - 4e-15)  # a few roundings short of the touch, whose own sign no double can tell
-    motion = simulate(driven(H=below, e=0.8), theta=0.0, velocity=0.0, periods=5)
+    motion = simulate(forced(H=below, e=0.8), theta=0.0, velocity=0.0, periods=5)
     assert motion.stop is Stop.REST
     assert motion.rest_time == 0.0
     assert (motion.theta, motion.velocity) == (0.0, 0.0)
-    touching = simulate(driven(H=BALANCE, e=0.8), theta=0.0, velocity=0.0, periods=5)
+    touching = simulate(forced(H=BALANCE, e=0.8), theta=0.0, velocity=0.0, periods=5)
     assert touching.stop is Stop.REST
     assert np.abs(evaluate_steps(touching.dense)).max() < 1e-25
 
@@ -93,7 +94,7 @@ def test_an_acceleration_that_only_touches_zero_does_not_release():
 @pytest.mark.parametrize("excess", [1e-3, 1e-6, 1e-9])
 def test_an_acceleration_that_exceeds_zero_briefly_releases_at_its_first_root_and_rest_returns(excess):
     H = BALANCE * (1 + excess)
-    motion = simulate(driven(H=H, e=0.8), theta=0.0, velocity=0.0, periods=0.5, tol=1e-15)
+    motion = simulate(forced(H=H, e=0.8), theta=0.0, velocity=0.0, periods=0.5, tol=1e-15)
     release = motion.events[1]
     assert release.kind is EventKind.RELEASE
     # the root of sin(t) = 1 / (1 + excess) is known as well as its slope, sqrt(2 excess), allows
@@ -126,8 +127,8 @@ def test_a_triple_root_releases_and_theta_grows_like_tau_to_the_5th():
 
 # H = BALANCE + rate (1 - cos t) and its kind: the first non-zero derivative of the acceleration at t = 0, and what follows.
 @pytest.mark.parametrize(("system", "power", "factor"), [
-    (driven(H=0.2, mean=BALANCE, e=0.8), 3, 1 / 6),
-    (driven(H=-0.2, mean=BALANCE + 0.2, phase=math.pi / 2, e=0.8), 4, 1 / 24),
+    (forced(H=0.2, mean=BALANCE, e=0.8), 3, 1 / 6),
+    (forced(H=-0.2, mean=BALANCE + 0.2, phase=math.pi / 2, e=0.8), 4, 1 / 24),
     (two_harmonics(BALANCE, 0.15, -0.05), 5, 1 / 20),
 ])  # fmt: skip
 def test_a_start_on_an_equality_leaves_by_its_first_non_zero_coefficient_if_that_points_outward(system, power, factor):
@@ -138,10 +139,10 @@ def test_a_start_on_an_equality_leaves_by_its_first_non_zero_coefficient_if_that
 
 
 @pytest.mark.parametrize("system", [
-    driven(H=-0.2, mean=BALANCE, e=0.8),
-    driven(H=0.2, mean=BALANCE - 0.2, phase=math.pi / 2, e=0.8),
+    forced(H=-0.2, mean=BALANCE, e=0.8),
+    forced(H=0.2, mean=BALANCE - 0.2, phase=math.pi / 2, e=0.8),
     two_harmonics(BALANCE, -0.15, 0.05),
-    driven(mean=BALANCE, e=0.8),
+    forced(H=0.0, mean=BALANCE, e=0.8),
 ])  # fmt: skip
 def test_a_start_on_an_equality_rests_if_the_first_non_zero_coefficient_points_inward_or_all_are_zero(system):
     motion = simulate(system, theta=0.0, velocity=0.0, duration=0.5)
@@ -151,11 +152,11 @@ def test_a_start_on_an_equality_rests_if_the_first_non_zero_coefficient_points_i
 
 def test_a_start_that_both_sides_attract_away_from_contact_is_refused_with_its_instant():
     with pytest.raises(MotionError, match=r"not unique.*side=\+1 or side=-1"):
-        simulate(driven(V=0.5), theta=0.0, velocity=0.0, duration=1.0)
+        simulate(forced(H=0.0, V=0.5), theta=0.0, velocity=0.0, duration=1.0)
 
 
 def test_naming_the_side_resolves_it_into_two_mirror_images():
-    upper, lower = (simulate(driven(V=0.5), theta=0.0, velocity=0.0, duration=5.0, side=s) for s in (-1, 1))
+    upper, lower = (simulate(forced(H=0.0, V=0.5), theta=0.0, velocity=0.0, duration=5.0, side=s) for s in (-1, 1))
     assert lower.theta == -upper.theta
     assert lower.theta != 0
     assert lower.at(1e-3)[0] == pytest.approx(0.5 * COS * 1e-6 / 2, rel=1e-3)
@@ -163,7 +164,7 @@ def test_naming_the_side_resolves_it_into_two_mirror_images():
 
 def test_where_only_one_side_points_outward_no_choice_is_asked_for():
     for H, side in ((0.3, 1), (-0.3, -1)):
-        motion = simulate(driven(mean=H, V=0.5), theta=0.0, velocity=0.0, duration=0.3)
+        motion = simulate(forced(H=0.0, mean=H, V=0.5), theta=0.0, velocity=0.0, duration=0.3)
         assert motion.side == side
         assert motion.theta * side > 0
 
@@ -180,11 +181,11 @@ def test_rest_that_ends_on_both_sides_at_once_is_refused_and_resolved_by_side():
 
 
 def test_without_a_vertical_load_the_horizontal_one_alone_decides():
-    leaving = simulate(driven(V=0.0, H=0.4), theta=0.0, velocity=0.0, duration=0.5, tol=1e-15)
+    leaving = simulate(forced(V=0.0, H=0.4), theta=0.0, velocity=0.0, duration=0.5, tol=1e-15)
     assert leaving.at(0.01)[0] == pytest.approx(0.4 * SIN * 1e-6 / 6, rel=0.01)
-    pushed = simulate(driven(V=0.0, mean=-0.4), theta=0.0, velocity=0.0, duration=0.5)
+    pushed = simulate(forced(H=0.0, V=0.0, mean=-0.4), theta=0.0, velocity=0.0, duration=0.5)
     assert pushed.at(1e-3)[0] == pytest.approx(-0.4 * SIN * 1e-6 / 2, rel=1e-3)
-    unloaded = simulate(driven(V=0.0), theta=0.0, velocity=0.0, duration=0.5)
+    unloaded = simulate(forced(H=0.0, V=0.0), theta=0.0, velocity=0.0, duration=0.5)
     assert unloaded.stop is Stop.REST
 
 
@@ -192,7 +193,7 @@ def test_without_a_vertical_load_the_horizontal_one_alone_decides():
 def test_an_imbalance_near_the_working_precision_neither_hangs_nor_stays_undecided(nudge):
     for C in (0.0, 0.1):
         for drift in (1e-3, -1e-3, 0.0):
-            system = driven(mean=BALANCE, H=drift, C=C, e=0.8)
+            system = forced(mean=BALANCE, H=drift, C=C, e=0.8)
             balanced = simulate(system, theta=0.0, velocity=0.0, duration=3.0)
             nudged = simulate(system.with_({"load.horizontal.mean": BALANCE + nudge}), theta=0.0, velocity=0.0, duration=3.0)
             assert nudged.theta == pytest.approx(balanced.theta, abs=1e-11)
@@ -201,7 +202,7 @@ def test_an_imbalance_near_the_working_precision_neither_hangs_nor_stays_undecid
 
 def test_balances_of_large_loads_neither_hang_nor_raise():
     for V in np.linspace(-500.0, -50000.0, 40):
-        motion = simulate(driven(V=float(V), mean=-V / math.tan(BETA80), e=0.8), theta=0.0, velocity=0.0, duration=1.0)
+        motion = simulate(forced(H=0.0, V=float(V), mean=-V / math.tan(BETA80), e=0.8), theta=0.0, velocity=0.0, duration=1.0)
         assert math.isfinite(motion.theta)
 
 
@@ -218,9 +219,9 @@ def test_the_wall_holds_what_presses_on_it_until_the_force_falls_to_k_d():
 
 
 def test_a_perfectly_plastic_impact_rests_at_once_where_it_is_held_and_goes_on_where_it_is_not():
-    stuck = simulate(driven(e=0.0), theta=0.3, velocity=0.0, duration=10.0)
+    stuck = simulate(forced(H=0.0, e=0.0), theta=0.3, velocity=0.0, duration=10.0)
     assert len(stuck.impacts) == 1
     assert stuck.rest_time == stuck.impacts.time[0]
-    pushed = simulate(driven(e=0.0, mean=-0.5), theta=0.3, velocity=0.0, duration=3.0)
+    pushed = simulate(forced(H=0.0, e=0.0, mean=-0.5), theta=0.3, velocity=0.0, duration=3.0)
     first = pushed.impacts.time[0]
     assert pushed.at(first + 1e-3)[0] == pytest.approx(-(0.5 * SIN - 0.5 * COS) * 1e-6 / 2, rel=1e-3)

@@ -5,7 +5,8 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from flow_references import BETA80, SHARED_PATHS, PreciseSystem, driven
+from flow_references import SHARED_PATHS, PreciseSystem
+from shared_systems import BETA80, forced
 
 import saltus
 from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscillator
@@ -108,7 +109,7 @@ def test_all_derivatives_are_those_of_a_30_digit_motion(numbers, start, impacts,
             *(difference(lambda p, name=name: precise({**numbers, name: p}, start, *span), numbers[name]) for name in PATHS),
         ]
     result = saltus.sensitivities(
-        driven(**numbers), theta=start[0], velocity=start[1], **length, parameters=tuple(PATHS.values()), tol=1e-12
+        forced(**numbers), theta=start[0], velocity=start[1], **length, parameters=tuple(PATHS.values()), tol=1e-12
     )
     assert result.parameter_paths == tuple(PATHS.values())
     assert result.undefined is None
@@ -185,11 +186,11 @@ def test_the_wall_s_place_and_law_and_the_oscillator_s_numbers():
 
 def test_the_start_counts_in_the_derivative_to_the_frequency():
     """From time t0 on H(t) = H sin(W t): W moves the phase at the start as well, by t0 a unit of W."""
-    t0, system = 12345.678, driven(H=0.5, W=1.3)
+    t0, system = 12345.678, forced(H=0.5, W=1.3)
     late = saltus.sensitivities(system, theta=0.3, duration=9.0, time=t0, parameters=("load.frequency",), tol=1e-14)
     phase = math.fmod(1.3 * t0, 2 * math.pi)
     early = saltus.sensitivities(
-        driven(H=0.5, W=1.3, phase=phase),
+        forced(H=0.5, W=1.3, phase=phase),
         theta=0.3,
         duration=9.0,
         parameters=SHARED_PATHS,
@@ -201,7 +202,7 @@ def test_the_start_counts_in_the_derivative_to_the_frequency():
 
 
 def test_the_end_of_a_motion_of_so_many_periods_moves_with_the_frequency():
-    system = driven(H=0.5, W=1.3)
+    system = forced(H=0.5, W=1.3)
     whole = saltus.sensitivities(system, theta=0.3, periods=4, parameters=("load.frequency",), tol=1e-14)
     fixed = saltus.sensitivities(system, theta=0.3, duration=whole.motion.time, parameters=("load.frequency",), tol=1e-14)
     acceleration = system.model.acceleration(
@@ -213,7 +214,7 @@ def test_the_end_of_a_motion_of_so_many_periods_moves_with_the_frequency():
 
 
 def test_the_derivative_of_two_stretches_is_the_product_of_theirs():
-    system = driven(H=0.5, m=0.3, e=0.9)
+    system = forced(H=0.5, m=0.3, e=0.9)
     first = saltus.sensitivities(system, theta=0.3, velocity=0.1, duration=7.0, tol=1e-14)
     then = saltus.sensitivities(
         system, theta=first.motion.theta, velocity=first.motion.velocity, time=7.0, duration=6.0, tol=1e-14
@@ -223,7 +224,7 @@ def test_the_derivative_of_two_stretches_is_the_product_of_theirs():
 
 
 def test_mirror_motions_have_mirror_derivatives():
-    system = driven(H=0.5, mean=0.05, phase=0.4)
+    system = forced(H=0.5, mean=0.05, phase=0.4)
     one = saltus.sensitivities(system, theta=0.3, velocity=-0.2, periods=4, parameters=SHARED_PATHS)
     other = saltus.sensitivities(system.mirrored(), theta=-0.3, velocity=0.2, periods=4, parameters=SHARED_PATHS)
     assert one.motion.theta == -other.motion.theta
@@ -234,7 +235,7 @@ def test_mirror_motions_have_mirror_derivatives():
 
 
 def test_the_motion_is_that_of_simulate_to_the_last_bit():
-    system = driven(H=0.5, m=0.3, e=0.9)
+    system = forced(H=0.5, m=0.3, e=0.9)
     plain = saltus.simulate(system, theta=0.3, velocity=0.1, periods=20)
     motion = saltus.sensitivities(system, theta=0.3, velocity=0.1, periods=20, parameters=("load.frequency",)).motion
     assert (motion.theta, motion.velocity) == (plain.theta, plain.velocity)
@@ -245,7 +246,7 @@ def test_the_motion_is_that_of_simulate_to_the_last_bit():
 
 @pytest.mark.parametrize("tol", [1e-6, 1e-8, 1e-10, 1e-12])
 def test_the_error_follows_the_tolerance(tol):
-    system = driven(H=0.5)
+    system = forced(H=0.5)
     best = saltus.sensitivities(system, theta=0.3, periods=5, parameters=SHARED_PATHS, tol=1e-15)
     result = saltus.sensitivities(system, theta=0.3, periods=5, parameters=SHARED_PATHS, tol=tol)
     for name in ("state", "parameters", "event_times"):

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flow_references import BETA80, SHARED_PATHS, driven
+from flow_references import SHARED_PATHS
+from shared_systems import BETA80, forced
 
 import saltus
 from saltus.systems import (
@@ -65,7 +66,7 @@ def test_a_ball_s_rest_moves_as_its_geometric_series_says(e):
 
 @pytest.mark.parametrize("impact", [VelocityReduction(0.6), EnergyRestitution(0.5)])
 def test_the_end_of_an_accumulation_on_unequal_layers_moves_as_its_differences_do(impact):
-    system = driven(m=0.5, k=1.2, c=0.8, impact=impact, C=0.2)
+    system = forced(H=0.0, m=0.5, k=1.2, c=0.8, impact=impact, C=0.2)
     law = "impact.e" if isinstance(impact, VelocityReduction) else "impact.r"
     paths = ("load.vertical", "model.beta0", "model.mass_ratio", law)
     result = saltus.sensitivities(system, theta=0.3, velocity=0.1, duration=40.0, parameters=paths)
@@ -85,7 +86,7 @@ def test_the_end_of_an_accumulation_on_unequal_layers_moves_as_its_differences_d
 def test_a_release_moves_with_the_load_that_holds_it():
     """Rest ends where H sin(W t) = abs(V) / tan(beta0); what came before the rest does not matter."""
     H, W, V = 0.25, 0.05, -0.5
-    system = driven(e=0.3, H=H, W=W, C=0.3, V=V)
+    system = forced(e=0.3, H=H, W=W, C=0.3, V=V)
     result = saltus.sensitivities(system, theta=0.05, duration=20.0, parameters=SHARED_PATHS)
     kinds = [event.kind for event in result.motion.events]
     release = kinds.index("release")
@@ -185,7 +186,7 @@ def test_a_margin_stops_the_motion_where_it_is_and_moves_with_everything():
 
 
 def test_a_margin_of_the_acceleration_moves_too():
-    system = driven(H=0.5)
+    system = forced(H=0.5)
     result = saltus.sensitivities(system, theta=0.3, periods=9, stop_at="reaction", parameters=("load.vertical",), tol=1e-14)
     assert result.motion.limit == "reaction"
 
@@ -244,7 +245,7 @@ def test_an_exponent_is_a_parameter_like_another():
 
 
 def test_chatter_takes_the_derivative_and_says_so():
-    result = saltus.sensitivities(driven(C=1.0, V=-1.5), theta=0.0, velocity=2e-4, duration=15.0, parameters=SHARED_PATHS)
+    result = saltus.sensitivities(forced(H=0.0, C=1.0, V=-1.5), theta=0.0, velocity=2e-4, duration=15.0, parameters=SHARED_PATHS)
     assert not result.motion.phase_known
     assert "phase is lost" in result.undefined
     assert np.isnan(result.state).all()
@@ -258,13 +259,13 @@ def test_chatter_takes_the_derivative_and_says_so():
 def test_rest_without_loss_has_no_derivative_to_the_state_but_to_the_loads():
     """Beside the state at rest every motion chatters for ever; at rest the loads alone say when it is released."""
     H, W = 0.2, 0.5
-    system = driven(H=H, W=W)
+    system = forced(H=H, W=W)
     result = saltus.sensitivities(system, theta=0.0, duration=4.0, parameters=SHARED_PATHS)
     assert "impacts lose nothing" in result.undefined
     assert np.isnan(result.state).all()
 
     def end(H):
-        motion = saltus.simulate(driven(H=H, W=W), theta=0.0, duration=4.0, tol=1e-15)
+        motion = saltus.simulate(forced(H=H, W=W), theta=0.0, duration=4.0, tol=1e-15)
         return np.array([motion.theta, motion.velocity])
 
     np.testing.assert_allclose(result.parameters[:, 0], difference(lambda d: end(H + d)), rtol=1e-8)
@@ -321,13 +322,13 @@ def test_derivatives_beyond_the_range_of_numbers_are_said_to_be():
 )
 def test_a_path_to_no_number_is_refused_with_the_near_ones(parameters, message):
     with pytest.raises(saltus.ParameterError, match=message):
-        saltus.sensitivities(driven(H=0.5), theta=0.3, duration=1.0, parameters=parameters)
+        saltus.sensitivities(forced(H=0.5), theta=0.3, duration=1.0, parameters=parameters)
 
 
 def test_one_path_may_stand_alone_and_none_is_the_state_alone():
-    one = saltus.sensitivities(driven(H=0.5), theta=0.3, duration=1.0, parameters="load.frequency")
+    one = saltus.sensitivities(forced(H=0.5), theta=0.3, duration=1.0, parameters="load.frequency")
     assert one.parameter_paths == ("load.frequency",)
-    none = saltus.sensitivities(driven(H=0.5), theta=0.3, duration=1.0)
+    none = saltus.sensitivities(forced(H=0.5), theta=0.3, duration=1.0)
     assert none.parameters.shape == (2, 0)
     assert none.state.shape == (2, 2)
     np.testing.assert_array_equal(none.state, one.state)

@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from flow_references import driven
 from scipy.integrate import solve_ivp
+from shared_systems import forced
 
 from saltus.errors import ParameterError
 from saltus.flow import simulate
 from saltus.systems import Metainterface
 
-EXACT = driven(H=0.5)
+EXACT = forced(H=0.5)
 SMOOTH = EXACT.with_({"model.smoothing": 50.0})
 
 

@@ -2,138 +2,16 @@
 
 import functools
 import math
-from dataclasses import dataclass
-from typing import Any, ClassVar
 
 import numpy as np
+from shared_systems import forced, hinged, paired, rocking, shaken, walled
 
 from saltus import (
-    EnergyRestitution,
-    Harmonic,
-    Load,
-    Metainterface,
-    Model,
-    RockingBlock,
     System,
-    VelocityReduction,
-    WallOscillator,
     find_orbit,
 )
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
-
-BETA80 = math.radians(80)
-
-
-def forced(beta0=BETA80, C=0.1, k=1.0, m=0.0, c=1.0, V=-0.5, H=0.5, mean=0.0, phase=0.0, W=1.0, e=1.0):
-    """A metainterface under H(t) = mean + H sin(W t + phase) and a constant V."""
-    return System(
-        model=Metainterface(beta0=beta0, damping=C, stiffness_ratio=k, mass_ratio=m, dissipation_ratio=c),
-        load=Load(frequency=W, horizontal=Harmonic(amplitude=H, mean=mean, phase=phase), vertical=V),
-        impact=VelocityReduction(e),
-    )
-
-
-def shaken(zeta=0.3, nu=0.05, r=0.9, m=0.2, W=1.1):
-    """Unequal layers on a ground that moves both ways, with a restitution of energy."""
-    return System(
-        model=Metainterface(beta0=BETA80, damping=0.1, stiffness_ratio=1.2, mass_ratio=m, dissipation_ratio=0.8),
-        load=Load(
-            frequency=W,
-            ground_horizontal=Harmonic(amplitude=zeta),
-            ground_vertical=Harmonic(amplitude=nu, phase=0.4),
-            vertical=-0.5,
-        ),
-        impact=EnergyRestitution(r),
-    )
-
-
-def walled(A=0.2, W=1.3, k=1.0, c=0.1, wall=1.0, e=0.8, mean=0.0):
-    """The impact oscillator under mean + A cos(W t)."""
-    return System(
-        model=WallOscillator(stiffness=k, damping=c, wall=wall),
-        load=Load(frequency=W, force=Harmonic(amplitude=A, mean=mean, phase=math.pi / 2)),
-        impact=VelocityReduction(e),
-    )
-
-
-def rocking(a=1.5, W=5.0, alpha=0.25):
-    """A rocking block with Housner's impacts; the ground moves with the acceleration -a alpha sin(W t)."""
-    from saltus import InelasticImpact
-
-    return System(
-        model=RockingBlock(alpha=alpha),
-        load=Load(frequency=W, ground_horizontal=Harmonic(amplitude=a * alpha / W**2)),
-        impact=InelasticImpact(),
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Hinge(Model):
-    """A user's model: a cubic spring and a bias s f at x = `edge`, which the motion goes through, the gap in units of its own."""
-
-    edge: float = 0.4
-    cubic: float = 0.2
-    damping: float = 0.1
-    bias: float = -0.3
-
-    coordinates: ClassVar[tuple[str, ...]] = ("x",)
-    channels: ClassVar[tuple[str, ...]] = ("push",)
-
-    @property
-    def contact(self) -> Any:
-        return self.edge
-
-    def gap(self, x: Any, side: Any) -> Any:
-        return 2.5 * side * (x - self.edge)
-
-    def acceleration(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
-        far = x - self.edge
-        return load.push(t) - self.damping * velocity - far - self.cubic * far**3 + side * self.bias
-
-
-def hinged(push=0.6, W=0.9, edge=0.4, e=0.95, **numbers):
-    """The user's model under a harmonic push."""
-    return System(
-        model=Hinge(edge=edge, **numbers),
-        load=Load(frequency=W, push=Harmonic(amplitude=push)),
-        impact=VelocityReduction(e),
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pair(Model):
-    """A user's smooth model of two degrees of freedom: cubic springs, a coupling, a damper each."""
-
-    coupling: float = 0.3
-    cubic: float = 0.4
-    damping: float = 0.15
-
-    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
-    channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
-
-    def acceleration(self, t, position, velocity, side, load):
-        (x, y), (u, v) = position, velocity
-        pull = self.coupling * (x - y)
-        return (
-            load.force(t) - self.damping * u - x - self.cubic * x**3 - pull,
-            -self.damping * v - 1.5 * y - self.cubic * y**3 + pull,
-        )
-
-
-def paired(force=0.5, W=1.2, **numbers):
-    """The smooth pair under a harmonic force on the first mass."""
-    return System(model=Pair(**numbers), load=Load(frequency=W, force=Harmonic(amplitude=force)))
-
-
-def smoothed(B=50.0, H=0.5, W=1.0):
-    """The paper's system with its sign smoothed."""
-    return System(
-        model=Metainterface(beta0=BETA80, damping=0.1, smoothing=B),
-        load=Load(frequency=W, horizontal=Harmonic(amplitude=H), vertical=-0.5),
-    )
-
 
 FREQUENCY = "load.frequency"
 FORCED = (FREQUENCY, "load.horizontal.amplitude", "model.beta0", "model.mass_ratio", "impact.e")
@@ -191,7 +69,7 @@ ORBITS = {  # system, paths, start: one of each kind
     "rocking block": (*CASES["rocking"], {"theta": 0.01}),
     "a user's model": (*CASES["hinged"], {"x": 1.2}),
     "a user's smooth model": (paired(), PAIRED, PAIRED_START),
-    "smoothed": (smoothed(), SMOOTHED, {"theta": 0.3}),
+    "smoothed": (forced(smoothing=50.0), SMOOTHED, {"theta": 0.3}),
 }
 
 

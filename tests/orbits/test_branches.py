@@ -5,7 +5,8 @@ import math
 
 import numpy as np
 import pytest
-from orbit_cases import FREQUENCY, forced, hinged, walled
+from orbit_cases import FREQUENCY
+from shared_systems import forced, hinged, walled
 
 from saltus import ParameterError, continue_orbit, find_orbit, simulate
 

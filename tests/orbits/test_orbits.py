@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from orbit_cases import FORCED, forced, orbit_of, walled
+from orbit_cases import FORCED, orbit_of
+from shared_systems import forced, walled
 
 from saltus import find_orbit, sensitivities, simulate
 
@@ -42,7 +43,9 @@ def test_it_comes_back(orbit):
     assert orbit.defect < 1e-12
 
 
+@pytest.mark.parametrize("name", PERIODS)
 def test_it_does_not_come_back_earlier(orbit):
+    assert orbit.period > 1
     start = phase_zero(orbit)
     begin = np.append([start[c] for c in orbit.system.model.coordinates], np.atleast_1d(start["velocity"]))
     for q in range(1, orbit.period):

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from orbit_cases import CASES, hinged, paired, random_guess, slope, walled
+from orbit_cases import CASES, random_guess, slope
+from shared_systems import hinged, paired, walled
 
 from saltus import simulate
 from saltus.flow import segments as at

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from study_cases import forced
+from shared_systems import forced
 
 from saltus import ParameterError, WallOscillator
 from saltus.studies.diagram.bands import Band, Bands, Tried, band_dataset, chaotic_bands
@@ -75,11 +75,11 @@ def test_results_do_not_depend_on_the_run(quasi_periodic_band):
         ({"count": 0}, "count must"),
         ({"starts": 1.5}, "starts must be a whole number"),
         ({"region": 3}, "region must be two half widths"),
-        ({"system": System(model=forced().model, load=Load(vertical=-0.5))}, "give the Load a frequency"),
+        ({"system": System(model=forced(1.0).model, load=Load(vertical=-0.5))}, "give the Load a frequency"),
     ],
 )
 def test_bad_use_is_answered_with_a_sentence(change, says):
-    given = {"system": forced(), "path": "load.frequency", "bounds": (0.5, 2.0)} | change
+    given = {"system": forced(1.0), "path": "load.frequency", "bounds": (0.5, 2.0)} | change
     with pytest.raises(ParameterError, match=says):
         chaotic_bands(**given)
 

@@ -4,7 +4,7 @@ import inspect
 
 import numpy as np
 import pytest
-from study_cases import forced
+from shared_systems import forced
 
 from saltus.attractors import basins_of_attraction
 from saltus.errors import ParameterError
@@ -13,7 +13,7 @@ from saltus.sweep import status
 from saltus.sweep import store_files as files
 
 GRID = {"theta": np.linspace(-2.0, 2.0, 9), "velocity": np.linspace(-1.5, 2.0, 7)}
-SYSTEM = forced(W=2.4)  # three attractors
+SYSTEM = forced(1.0, W=2.4)  # three attractors
 
 
 @pytest.mark.parametrize("rows", [1, 3, 100])
@@ -46,7 +46,7 @@ def test_the_store_of_something_else_is_refused_before_anything_is_computed(tmp_
     basin_sweep(SYSTEM, theta=[0.5], velocity=[0.0], store=tmp_path / "store")
     monkeypatch.setattr("saltus.flow.recurrence.simulate_many", lambda *args, **more: pytest.fail("it began to compute"))
     with pytest.raises(ParameterError, match="of the basins of another system; name another store"):
-        basin_sweep(forced(W=2.5), theta=[0.5], velocity=[0.0], store=tmp_path / "store")
+        basin_sweep(forced(1.0, W=2.5), theta=[0.5], velocity=[0.0], store=tmp_path / "store")
     (tmp_path / "file").write_text("mine")
     with pytest.raises(ParameterError, match="is a file"):
         basin_sweep(SYSTEM, store=tmp_path / "file")

@@ -7,7 +7,7 @@ import types
 import numpy as np
 import pytest
 import xarray as xr
-from study_cases import forced
+from shared_systems import forced
 
 import saltus
 from saltus.errors import ParameterError
@@ -28,12 +28,12 @@ H, V = "load.horizontal.amplitude", "load.vertical"
 @functools.cache
 def chart():
     """A coarse chart about the corner where the onset meets the fold of deformed equilibria."""
-    return stability_chart(forced(), horizontal=np.linspace(0, 0.12, 9), vertical=np.linspace(-1.5, -0.5, 9), rows=9)
+    return stability_chart(forced(1.0), horizontal=np.linspace(0, 0.12, 9), vertical=np.linspace(-1.5, -0.5, 9), rows=9)
 
 
 @functools.cache
 def borders():
-    return exact_borders(forced(), chart(), most=8)
+    return exact_borders(forced(1.0), chart(), most=8)
 
 
 def at(curve, vertical):
@@ -148,7 +148,7 @@ def test_the_stable_part_of_a_branch_is_that_of_the_whole_one():
 
 def test_every_end_without_a_curve_is_a_special_point_between_its_cells():
     """Without any curve: what is known of each change is known from continuation between its two cells alone."""
-    whole, alone = with_borders(forced(), chart(), most=0)
+    whole, alone = with_borders(forced(1.0), chart(), most=0)
     cells = read(whole)
     assert alone.curves == []
     assert set(alone.ends) == set(keys_of(cells, ends_of(cells)))
@@ -176,7 +176,7 @@ def test_what_continuation_adds_to_a_chart_are_motions_that_repeat():
         if name.startswith("motion_"):
             poor[name].values[inside] = np.nan if poor[name].dtype.kind == "f" else 0
     poor["count"].values[inside] = 0
-    whole, _ = with_borders(forced(), poor, most=0)
+    whole, _ = with_borders(forced(1.0), poor, most=0)
     assert whole.attrs["added_by_continuation"] >= inside.sum()
     both = (whole["count"].values > 0) & (chart()["count"].values > 0)
     assert both[inside].mean() > 0.8
@@ -186,7 +186,7 @@ def test_what_continuation_adds_to_a_chart_are_motions_that_repeat():
     np.testing.assert_array_equal(np.isfinite(sizes).sum(axis=2), whole["count"].values)
     for row, column in np.argwhere(inside & (whole["count"].values > 0)):
         cell = whole.isel(vertical=row, horizontal=column)
-        system = forced().with_({H: float(cell["horizontal"]), V: float(cell["vertical"])})
+        system = forced(1.0).with_({H: float(cell["horizontal"]), V: float(cell["vertical"])})
         for i in range(int(cell["count"])):
             theta, velocity = (float(cell[f"motion_{name}"][i]) for name in ("theta", "velocity"))
             end = saltus.simulate(system, theta=theta, velocity=velocity, periods=int(cell["motion_period"][i]), dense=False)
@@ -195,7 +195,7 @@ def test_what_continuation_adds_to_a_chart_are_motions_that_repeat():
 
 def test_a_motion_that_goes_on_where_the_chart_has_none_is_told():
     cells = read(chart())
-    follower = Follower(forced(), chart(), cells)
+    follower = Follower(forced(1.0), chart(), cells)
     ends = ends_of(cells)
     inside = next(
         i for i in range(len(cells.rank)) if cells.horizontal[cells.cell[i, 1]] > 0.08 and cells.vertical[cells.cell[i, 0]] > -0.9
@@ -206,7 +206,7 @@ def test_a_motion_that_goes_on_where_the_chart_has_none_is_told():
     without = read(
         chart().assign(motion_amplitude=chart()["motion_amplitude"].where(chart()["horizontal"] < cells.horizontal[target[1]]))
     )
-    other = Follower(forced(), chart(), without)
+    other = Follower(forced(1.0), chart(), without)
     same = next(
         i
         for i in range(len(without.rank))
@@ -247,8 +247,8 @@ def test_a_chart_is_read_in_any_order_of_its_dimensions():
 
 def test_a_chart_read_lazily_gets_its_motions_too():
     bare = chart().chunk() if importlib.util.find_spec("dask") else chart()
-    whole, _ = with_borders(forced(), bare, most=0)
-    same, _ = with_borders(forced(), chart(), most=0)
+    whole, _ = with_borders(forced(1.0), bare, most=0)
+    same, _ = with_borders(forced(1.0), chart(), most=0)
     assert whole.attrs["added_by_continuation"] > 0
     np.testing.assert_array_equal(whole["count"].values, same["count"].values)
 
@@ -256,7 +256,7 @@ def test_a_chart_read_lazily_gets_its_motions_too():
 @pytest.mark.parametrize("most", [-1, 2.5])
 def test_a_number_of_curves_without_meaning_is_refused(most):
     with pytest.raises(ParameterError, match="most must"):
-        exact_borders(forced(), chart(), most=most)
+        exact_borders(forced(1.0), chart(), most=most)
 
 
 @pytest.mark.parametrize(
@@ -270,7 +270,7 @@ def test_a_number_of_curves_without_meaning_is_refused(most):
 )
 def test_the_quasi_static_border_is_there_only_where_its_closed_form_holds(changes, there):
     tree = bordered_chart(
-        forced().with_(changes), curves=0, horizontal=[0.001, 0.002], vertical=[-0.3, -0.2], starts=1, periods=3
+        forced(1.0).with_(changes), curves=0, horizontal=[0.001, 0.002], vertical=[-0.3, -0.2], starts=1, periods=3
     )
     assert ("static" in tree.children) is there
     assert {"chart", "borders", "disagreements"} <= set(tree.children)
@@ -278,7 +278,7 @@ def test_the_quasi_static_border_is_there_only_where_its_closed_form_holds(chang
 
 def test_ends_of_orbits_that_rest_are_special_points_too():
     """Impacts with loss: families end where a rest has no duration left (CH) or a release is only touched (RL)."""
-    system = System(model=forced().model, load=forced().load, impact=VelocityReduction(0.6))
+    system = System(model=forced(1.0).model, load=forced(1.0).load, impact=VelocityReduction(0.6))
     here = stability_chart(system, horizontal=np.linspace(0.02, 0.5, 9), vertical=[-0.4, -0.2], starts=6)
     _, found = with_borders(system, here, most=0)
     assert {"CH", "RL"} & {ending.said for ending in found.ends.values()}
@@ -298,7 +298,7 @@ def test_an_unstable_orbit_whose_special_point_was_not_located_is_no_motion(monk
         special, ends, missed = (), ("start", "is no longer stable"), ("LP between",)
 
     monkeypatch.setattr(chart_follow, "follow_stable", lambda *_: Lost())
-    follower = Follower(forced(), chart(), cells)
+    follower = Follower(forced(1.0), chart(), cells)
     ending, special = follower.follow(ends.only(np.arange(len(ends)) == 0))
     assert special is None
     assert ending.said == "the orbit is not stable to its multipliers"

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 import xarray as xr
-from study_cases import forced
+from shared_systems import forced
 
 from saltus.errors import ParameterError
 from saltus.orbits import find_orbit, search_orbits
@@ -23,7 +23,7 @@ ONSET = 0.0219879514  # Hhat of the fold at V = -0.5, Omega = 1 (issue 5)
 def row(W=1.0):
     """A row of cells at V = -0.5, closely about the onset at Omega = 1."""
     return stability_chart(
-        forced(W=W), horizontal=[0.02, ONSET - 2e-4, ONSET + 2e-4, 0.024, 0.03, 0.04, 0.07, 0.2], vertical=[-0.5]
+        forced(1.0, W=W), horizontal=[0.02, ONSET - 2e-4, ONSET + 2e-4, 0.024, 0.03, 0.04, 0.07, 0.2], vertical=[-0.5]
     )
 
 
@@ -66,9 +66,9 @@ def test_a_cell_has_what_a_search_from_other_states_finds(W, horizontal):
 def test_without_a_horizontal_load_motions_are_the_deformed_equilibria():
     fold = unloaded_fold(np.deg2rad(80))[0]
     vertical = [-1.9, -1.6, fold - 0.05, fold + 0.05, -1.0, -0.3]
-    here = stability_chart(forced(), horizontal=[0.0], vertical=vertical, starts=8)
+    here = stability_chart(forced(1.0), horizontal=[0.0], vertical=vertical, starts=8)
     for i, load in enumerate(vertical):
-        still = forced().with_({H: 0.0, V: load})
+        still = forced(1.0).with_({H: 0.0, V: load})
         still = type(still)(model=still.model, load=Load(vertical=load))
         known = [e.theta for e in equilibria(still) if e.stable and e.theta > 0]
         assert here["count"].values[i, 0] == len(known)  # and not twice as many: mirror images count once
@@ -79,15 +79,15 @@ def test_without_a_horizontal_load_motions_are_the_deformed_equilibria():
 def test_motions_are_followed_from_cell_to_cell_where_nothing_else_leads_to_them():
     horizontal = np.linspace(0.02, 0.1, 17)
     options = {"vertical": [-0.5], "starts": 1, "region": (0.02, 0.02)}  # states that are captured below Hcr = 0.088
-    alone = [int(stability_chart(forced(), horizontal=[value], **options)["count"][0, 0]) for value in horizontal[:6]]
+    alone = [int(stability_chart(forced(1.0), horizontal=[value], **options)["count"][0, 0]) for value in horizontal[:6]]
     assert sum(alone) == 0
-    together = stability_chart(forced(), horizontal=horizontal, **options)
+    together = stability_chart(forced(1.0), horizontal=horizontal, **options)
     assert ((together["count"].values[0] > 0) == (horizontal > ONSET)).all()
 
 
 def test_smaller_motions_than_asked_for_do_not_count():
     options = {"horizontal": [0.06, 0.07, 0.08], "vertical": [-0.5]}
-    all_, large = (stability_chart(forced(), **options, least=least) for least in (1e-3, 0.03))
+    all_, large = (stability_chart(forced(1.0), **options, least=least) for least in (1e-3, 0.03))
     sizes = all_["motion_amplitude"].values
     assert (large["count"].values == (sizes >= 0.03).sum(axis=2)).all()
     assert (all_["count"].values > large["count"].values).any()  # motions with 6 impacts
@@ -97,7 +97,7 @@ def test_smaller_motions_than_asked_for_do_not_count():
 
 
 def test_chaos_is_not_a_motion_that_counts():
-    here = stability_chart(forced(W=0.38), horizontal=[0.2], vertical=[-0.5])  # the exponent is +0.03 there (issue 5)
+    here = stability_chart(forced(1.0, W=0.38), horizontal=[0.2], vertical=[-0.5])  # the exponent is +0.03 there (issue 5)
     assert here["unsettled"].values[0, 0] > 0
     assert not monostable(here).values.any()
     assert not here["rest"].values.any()
@@ -105,11 +105,11 @@ def test_chaos_is_not_a_motion_that_counts():
 
 def test_chunks_stores_and_threads_change_nothing(tmp_path):
     options = {"horizontal": [0.03, 0.06, 0.2], "vertical": [-0.8, -0.5], "starts": 6}
-    one = stability_chart(forced(), **options)
-    two = stability_chart(forced(), **options, rows=1, store=tmp_path / "chart")
+    one = stability_chart(forced(1.0), **options)
+    two = stability_chart(forced(1.0), **options, rows=1, store=tmp_path / "chart")
     for name in one.data_vars:
         xr.testing.assert_equal(one[name], two[name].load())
-    assert two.attrs["system"] == one.attrs["system"] == forced().to_json()
+    assert two.attrs["system"] == one.attrs["system"] == forced(1.0).to_json()
     assert one.attrs["least"] == charts.LEAST
     assert one.attrs["path"] == [H, V]
     assert {variable.attrs["units"] for variable in one.data_vars.values()} == {"rad", "1"}
@@ -125,15 +125,15 @@ def test_any_two_parameters_make_a_plane():
 
 
 def test_limits_of_the_mechanism():
-    here = stability_chart(forced(), horizontal=[0.1], vertical=[-2.0, -0.5], starts=8)
+    here = stability_chart(forced(1.0), horizontal=[0.1], vertical=[-2.0, -0.5], starts=8)
     straight = np.pi - np.deg2rad(80)
     assert here["amplitude"].values[0, 0] > straight
     assert here["beyond_line"].values[:, 0].tolist() == [True, False]
     assert not here["beyond_kinematic"].values.any()
     far = xr.Dataset({"amplitude": (("vertical", "horizontal"), [[np.nan, 1.8, 3.4, 3.5]])}, {"horizontal": np.arange(4.0)})
-    assert charts.with_limits(far, forced(), (H, V))["beyond_kinematic"].values.tolist() == [[False, False, False, True]]
+    assert charts.with_limits(far, forced(1.0), (H, V))["beyond_kinematic"].values.tolist() == [[False, False, False, True]]
     steeper = far.drop_vars("horizontal").assign_coords(horizontal=np.deg2rad([80.0, 80.0, 60.0, 90.0]))
-    flags = charts.with_limits(steeper, forced(), ("model.beta0", V))
+    flags = charts.with_limits(steeper, forced(1.0), ("model.beta0", V))
     assert flags["beyond_line"].values.tolist() == [[False, True, True, True]]
 
 
@@ -180,7 +180,7 @@ def test_tracks_that_come_together_go_on_as_one_that_stands_for_all():
 
 
 def test_starts_fill_the_region_and_what_is_close_to_the_contact():
-    states = starts(forced(), 12, (2.0, 1.0), 3)
+    states = starts(forced(1.0), 12, (2.0, 1.0), 3)
     assert (np.abs(states) <= [2.0, 1.0]).all()
     assert np.abs(states[::2, 0]).max() > 1.0
     assert np.abs(states[-1]).max() <= 0.02
@@ -207,15 +207,17 @@ def test_starts_fill_the_region_and_what_is_close_to_the_contact():
 )
 def test_what_has_no_meaning_is_refused(change, words):
     with pytest.raises(ParameterError, match=words):
-        stability_chart(forced(), **({"horizontal": [0.1], "vertical": [-0.5]} | change))
+        stability_chart(forced(1.0), **({"horizontal": [0.1], "vertical": [-0.5]} | change))
 
 
 def test_systems_without_a_chart_are_refused():
     with pytest.raises(ParameterError, match="takes a System"):
         stability_chart("saltus")
-    still = type(forced())(model=forced().model, load=Load(horizontal=0.1, vertical=-0.5))
+    still = type(forced(1.0))(model=forced(1.0).model, load=Load(horizontal=0.1, vertical=-0.5))
     with pytest.raises(ParameterError, match="frequency"):
         stability_chart(still)
-    two = type(forced())(model=TwoLayer(beta0=1.4), load=Load(frequency=1.0, horizontal=Harmonic(amplitude=0.1), vertical=-0.5))
+    two = type(forced(1.0))(
+        model=TwoLayer(beta0=1.4), load=Load(frequency=1.0, horizontal=Harmonic(amplitude=0.1), vertical=-0.5)
+    )
     with pytest.raises(ParameterError, match="one coordinate"):
         stability_chart(two)

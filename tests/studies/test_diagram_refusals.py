@@ -7,9 +7,11 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
-from study_cases import AMPLITUDE, FREQUENCY, forced
+from shared_systems import forced
+from study_cases import AMPLITUDE, FREQUENCY
 
 from saltus.errors import ParameterError
 from saltus.studies import bifurcation_diagram, response_spectrum
@@ -59,14 +61,14 @@ GOOD = {"path": FREQUENCY, "bounds": (0.5, 1.5)}
 def test_a_diagram_without_meaning_is_refused_in_a_sentence(changes, sentence, monkeypatch):
     monkeypatch.setattr(spectrum, "search_orbits", lambda *args, **options: pytest.fail("it began to compute"))
     with pytest.raises(ParameterError, match=sentence) as refusal:
-        response_spectrum(forced(), **{**GOOD, **changes})
+        response_spectrum(forced(1.0), **{**GOOD, **changes})
     assert "\n" not in str(refusal.value)
     assert len(str(refusal.value)) < 300
 
 
 def test_what_is_no_system_or_has_no_forcing_is_refused():
     with pytest.raises(ParameterError, match=r"System\(model"):
-        response_spectrum(forced().model)
+        response_spectrum(forced(1.0).model)
     with pytest.raises(ParameterError, match="frequency"):
         response_spectrum(UNFORCED)
     with pytest.raises(ParameterError, match="without a frequency"):
@@ -75,7 +77,7 @@ def test_what_is_no_system_or_has_no_forcing_is_refused():
 
 def test_an_unknown_option_is_named():
     with pytest.raises(TypeError, match="max_periods"):
-        response_spectrum(forced(), max_periods=3)
+        response_spectrum(forced(1.0), max_periods=3)
 
 
 def test_an_error_in_the_progress_ends_the_diagram():
@@ -84,13 +86,14 @@ def test_an_error_in_the_progress_ends_the_diagram():
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        bifurcation_diagram(forced(), AMPLITUDE, (0.4, 0.6), max_period=1, values=[0.5], starts=2, progress=fail)
+        bifurcation_diagram(forced(1.0), AMPLITUDE, (0.4, 0.6), max_period=1, values=[0.5], starts=2, progress=fail)
 
 
 PROGRAM = """
 import signal, sys
-sys.path.insert(0, {tests!r})
-from study_cases import FREQUENCY, forced
+sys.path[:0] = {tests!r}
+from shared_systems import forced
+from study_cases import FREQUENCY
 from saltus.files import write_dataset
 from saltus.studies import response_spectrum
 
@@ -100,7 +103,7 @@ def heard(share, what):
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background jobs are started without
 try:
-    write_dataset({path!r}, response_spectrum(forced(), FREQUENCY, (0.3, 3.0), starts=100, max_period=3, progress=heard))
+    write_dataset({path!r}, response_spectrum(forced(1.0), FREQUENCY, (0.3, 3.0), starts=100, max_period=3, progress=heard))
 except KeyboardInterrupt:
     print("interrupted", flush=True)
 """
@@ -108,7 +111,9 @@ except KeyboardInterrupt:
 
 @pytest.mark.parametrize("when", ["searching", "following"])
 def test_ctrl_c_leaves_nothing_half_written(when, tmp_path):
-    program = PROGRAM.format(tests=os.path.dirname(__file__), when=when, path=str(tmp_path / "spectrum.nc"))
+    program = PROGRAM.format(
+        tests=[str(Path(__file__).parent), str(Path(__file__).parents[1])], when=when, path=str(tmp_path / "spectrum.nc")
+    )
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
         patience = threading.Timer(200.0, process.kill)
         patience.start()

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 import xarray as xr
-from study_cases import FREQUENCY, forced
+from shared_systems import forced, walled
+from study_cases import FREQUENCY
 
 import saltus
 from saltus.errors import ParameterError
 from saltus.files import write_dataset
 from saltus.orbits import orbits_of, search_orbits
-from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscillator
 
 FACTS = (
     "amplitude",
@@ -33,14 +33,6 @@ def reloaded(data, folder):
         return file.load()
 
 
-def walled():
-    return System(
-        model=WallOscillator(stiffness=1.0, damping=0.1, wall=0.7),
-        load=Load(frequency=1.3, force=Harmonic(amplitude=0.2, phase=np.pi / 2)),
-        impact=VelocityReduction(0.8),
-    )
-
-
 def through_a_grazing():
     """Symmetric, from two to six impacts at H = 0.5, Omega = 0.28463."""
     orbit = saltus.find_orbit(forced(H=0.5), theta=0.3)
@@ -49,7 +41,7 @@ def through_a_grazing():
 
 def from_none_to_one_impact():
     """An oscillator that comes to touch its wall: points without sides beside others with one."""
-    return saltus.continue_orbit(saltus.find_orbit(walled(), x=0.2), "load.force.amplitude", (0.1, 0.8))
+    return saltus.continue_orbit(saltus.find_orbit(walled(wall=0.7), x=0.2), "load.force.amplitude", (0.1, 0.8))
 
 
 def test_a_tree_comes_back_from_netcdf_as_it_was(spectrum, tmp_path):
@@ -71,7 +63,7 @@ def test_orbits_come_back_bit_for_bit(make, tmp_path):
         assert {name: getattr(orbit, name) for name in FACTS} == {name: getattr(other, name) for name in FACTS}
         assert np.array_equal(orbit.solution.unknowns, other.solution.unknowns)
         assert np.array_equal(orbit.multipliers, other.multipliers, equal_nan=True)
-        assert np.array_equal(orbit.impact_times, other.impacts)
+        assert np.array_equal(orbit.impact_times, other.impact_times)
         assert orbit.start() == other.start()
 
 

@@ -4,18 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from study_cases import AMPLITUDE, FREQUENCY, forced
+from shared_systems import forced, under
+from study_cases import AMPLITUDE, FREQUENCY
 
 import saltus
 from saltus.orbits import orbits_of
 from saltus.studies import bifurcation_diagram, response_spectrum
-from saltus.systems import Harmonic, Load, Metainterface, System
+from saltus.systems import Harmonic
 
 pytestmark = pytest.mark.thorough  # structures of their own for each load
-
-
-def loaded(**channels):
-    return System(model=Metainterface(beta0=math.radians(80), damping=0.1), load=Load(frequency=1.0, **channels))
 
 
 def branches_of(tree):
@@ -25,7 +22,7 @@ def branches_of(tree):
 def test_a_moving_ground_is_the_force_omega_squared_zeta():
     """Load (ii) against load (i) with H = Omega^2 zeta (erratum 14), orbit by orbit."""
     zeta = 0.5
-    ground = loaded(ground_horizontal=Harmonic(amplitude=zeta), vertical=-0.5)
+    ground = under(ground_horizontal=Harmonic(amplitude=zeta), vertical=-0.5)
     (branch,) = branches_of(response_spectrum(ground, FREQUENCY, (0.8, 1.2), max_period=1, values=[1.0], starts=6))
     assert branch["kept"].max() < 1e-8
     orbits = orbits_of(branch)
@@ -43,7 +40,7 @@ def test_two_harmonics_break_the_symmetry_and_a_bubble_is_one_branch(value):
 
     At 1.1 the search settles on a doubled orbit, whose ends lead to those that repel; at 1.28 on one of these, stable there.
     """
-    both = loaded(horizontal=Harmonic(amplitude=1.0), vertical=Harmonic(mean=-0.5, amplitude=0.25, phase=math.pi / 2))
+    both = under(horizontal=Harmonic(amplitude=1.0), vertical=Harmonic(mean=-0.5, amplitude=0.25, phase=math.pi / 2))
     branches = branches_of(response_spectrum(both, FREQUENCY, (0.85, 1.3), max_period=2, values=[value], starts=8))
     single, bubble = sorted(branches, key=lambda branch: int(branch["period"][1]))
     assert not single["symmetric"].any()
@@ -59,7 +56,7 @@ def test_two_harmonics_break_the_symmetry_and_a_bubble_is_one_branch(value):
 def test_an_amplitude_of_the_other_sign_is_the_mirrored_load():
     """H and -H are the same load half a forcing period apart, and lead to the same orbits."""
     ranges = ((0.3, 0.6), (-0.6, -0.3))
-    trees = [bifurcation_diagram(forced(), AMPLITUDE, r, max_period=1, values=[np.mean(r)], starts=6) for r in ranges]
+    trees = [bifurcation_diagram(forced(1.0), AMPLITUDE, r, max_period=1, values=[np.mean(r)], starts=6) for r in ranges]
     (one,), (other,) = map(branches_of, trees)
     for at, there in ((0, -1), (-1, 0)):
         assert float(one["parameter"][at]) == -float(other["parameter"][there])
@@ -73,7 +70,7 @@ def test_an_amplitude_of_the_other_sign_is_the_mirrored_load():
 
 def test_from_no_load_on_the_onset_is_a_fold_and_what_is_too_small_to_see_is_counted():
     """Beyond the fold at H = 0.0219879514 the unstable orbits shrink to rest through endless grazings, near Hcr = 0.088."""
-    tree = bifurcation_diagram(forced(), AMPLITUDE, (0.0, 0.15), max_period=1, values=[0.12], starts=6)
+    tree = bifurcation_diagram(forced(1.0), AMPLITUDE, (0.0, 0.15), max_period=1, values=[0.12], starts=6)
     branches = branches_of(tree)
     main = max(branches, key=lambda branch: branch.sizes["point"])
     folds = main["special_parameter"].values[main["kind"].values == "LP"]

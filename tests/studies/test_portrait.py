@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from shared_systems import steady
 
 from saltus.attractors.manifolds.equilibria import equilibria
 from saltus.errors import ParameterError
@@ -28,16 +29,9 @@ from saltus.theory import equilibria as known_equilibria
 WINDOW = ((-2.5, 2.5), (-1.5, 1.5))
 
 
-def paper(C=0.0, H=0.0, V=-1.5, e=1.0, beta0=80):
-    """The metainterface under a constant load."""
-    return System(
-        model=Metainterface(beta0=np.deg2rad(beta0), damping=C), load=Load(horizontal=H, vertical=V), impact=VelocityReduction(e)
-    )
-
-
 @functools.cache
 def portrait(C=0.0, H=0.0, e=1.0):
-    return phase_portrait(paper(C, H, e=e), window=WINDOW, duration=12.0, samples=300)
+    return phase_portrait(steady(C=C, H=H, e=e), window=WINDOW, duration=12.0, samples=300)
 
 
 # --- motions -----------------------------------------------------------------------------------------------------------------
@@ -46,7 +40,9 @@ def portrait(C=0.0, H=0.0, e=1.0):
 @pytest.mark.parametrize("H", [0.0, 0.05])
 def test_an_undamped_motion_keeps_its_energy_through_impacts(H):
     data = portrait(H=H)
-    energy = total_energy(paper(H=H), data["theta"].values, data["velocity"].values, np.where(data["theta"].values < 0, -1, 1))
+    energy = total_energy(
+        steady(C=0.0, H=H), data["theta"].values, data["velocity"].values, np.where(data["theta"].values < 0, -1, 1)
+    )
     drift = np.nanmax(energy, axis=1) - np.nanmin(energy, axis=1)
     assert drift.max() < 1e-10
     assert np.ptp(energy[:, 0]) > 0.5  # the motions are many
@@ -55,7 +51,7 @@ def test_an_undamped_motion_keeps_its_energy_through_impacts(H):
 
 def test_a_damped_motion_only_loses_energy():
     data = portrait(C=0.1)
-    energy = total_energy(paper(0.1), data["theta"].values, data["velocity"].values, np.where(data["theta"].values < 0, -1, 1))
+    energy = total_energy(steady(), data["theta"].values, data["velocity"].values, np.where(data["theta"].values < 0, -1, 1))
     for row in energy:
         steps = np.diff(row[np.isfinite(row)])
         assert steps.max() < 1e-10
@@ -88,7 +84,7 @@ def test_motions_begin_all_over_the_window_and_within_the_wall():
 
 
 def test_given_starts_are_those_that_are_followed():
-    data = phase_portrait(paper(), window=WINDOW, starts=[(0.3, 0.1), (-1.0, 0.0)], duration=1.0, samples=5)
+    data = phase_portrait(steady(C=0.0), window=WINDOW, starts=[(0.3, 0.1), (-1.0, 0.0)], duration=1.0, samples=5)
     np.testing.assert_array_equal(data["theta"].values[:, 0], [0.3, -1.0])
     np.testing.assert_array_equal(data["velocity"].values[:, 0], [0.1, 0.0])
     np.testing.assert_allclose(data["time"].values[:, -1], 1.0)
@@ -102,7 +98,7 @@ def test_given_starts_are_those_that_are_followed():
     [(0, -1.5, 0, 80), (0.05, -1.5, 0.1, 80), (0.4, -0.5, 0.1, 80), (0, 0.5, 0.1, 80), (0.1, -2, 0.3, 60), (0, -0.5, 3, 80)],
 )
 def test_equilibria_are_those_of_theory(H, V, C, beta0):
-    system = paper(C, H, V, beta0=beta0)
+    system = steady(V, C, H=H, beta0=np.deg2rad(beta0))
     found = equilibria(system, ((-3.4, 3.4), (-1.0, 1.0)))
     known = [one for one in known_equilibria(system) if abs(one.theta) < 3.4]
     assert len(found) == len(known) > 0
@@ -118,7 +114,7 @@ def test_equilibria_are_those_of_theory(H, V, C, beta0):
 
 
 def test_the_portrait_holds_the_equilibria_of_theory():
-    data, known = portrait(0.1, 0.05), [one for one in known_equilibria(paper(0.1, 0.05)) if abs(one.theta) < 2.5]
+    data, known = portrait(0.1, 0.05), [one for one in known_equilibria(steady(H=0.05)) if abs(one.theta) < 2.5]
     np.testing.assert_allclose(data["equilibrium"], [one.theta for one in known], atol=1e-13)
     np.testing.assert_array_equal(data["stable"], [one.stable for one in known])
     assert int(data["stable"].sum()) == 3
@@ -133,7 +129,7 @@ def test_the_contact_is_an_equilibrium_up_to_the_critical_load():
     critical = critical_horizontal(np.deg2rad(80), -0.5)
     window = ((-0.05, 0.05), (-0.1, 0.1))
     for factor, held in ((0.999, True), (1.001, False)):
-        places = [one.place for one in equilibria(paper(H=factor * critical, V=-0.5), window)]
+        places = [one.place for one in equilibria(steady(-0.5, 0.0, H=factor * critical), window)]
         assert (0.0 in places) is held
 
 
@@ -184,7 +180,7 @@ def test_equilibria_on_the_points_of_the_grid_are_found():
 
 
 def test_undamped_separatrices_have_the_energy_of_their_saddle():
-    system, data = paper(H=0.05), portrait(H=0.05)
+    system, data = steady(C=0.0, H=0.05), portrait(H=0.05)
     saddles = [one.energy for one in known_equilibria(system) if one.eigenvalues and not one.stable and abs(one.theta) < 2.5]
     theta, velocity = data["separatrix_theta"].values, data["separatrix_velocity"].values
     energy = total_energy(system, theta, velocity, np.where(theta < 0, -1, 1))
@@ -195,7 +191,7 @@ def test_undamped_separatrices_have_the_energy_of_their_saddle():
 
 def test_damped_separatrices_are_those_of_the_paper_module():
     """`saltus.paper.figures.manifolds` integrates backward by SciPy, with events of its own."""
-    system, data = paper(0.1, 0.05), portrait(0.1, 0.05)
+    system, data = steady(H=0.05), portrait(0.1, 0.05)
     saddles = [one for one in known_equilibria(system) if one.eigenvalues and not one.stable and abs(one.theta) < 2.5]
     compared = 0
     for saddle in saddles:
@@ -247,11 +243,11 @@ def test_where_impacts_cannot_be_undone_there_are_no_separatrices_and_it_is_said
 def test_arguments_without_meaning_are_refused_before_anything_moves(changes, sentence, monkeypatch):
     monkeypatch.setattr("saltus.studies.portrait.simulate", lambda *args, **options: pytest.fail("it began to compute"))
     with pytest.raises(ParameterError, match=sentence):
-        phase_portrait(paper(), **changes)
+        phase_portrait(steady(C=0.0), **changes)
 
 
 def test_what_has_no_phase_plane_is_refused():
-    varying = paper().with_({})
+    varying = steady(C=0.0).with_({})
     varying = System(model=varying.model, load=Load(frequency=1.0, horizontal=Harmonic(amplitude=0.1), vertical=-0.5))
     with pytest.raises(ParameterError, match=r"load\.horizontal varies, so there is no phase plane"):
         phase_portrait(varying)

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from study_cases import AMPLITUDE, forced
+from shared_systems import forced
+from study_cases import AMPLITUDE
 
 import saltus
 from saltus.orbits import orbits_of

@@ -5,7 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import xarray as xr
-from study_cases import AMPLITUDE, FREQUENCY, forced
+from shared_systems import forced
+from study_cases import AMPLITUDE, FREQUENCY
 
 from saltus.orbits import orbits_of
 from saltus.orbits.newton import solve
@@ -161,7 +162,7 @@ def test_progress_grows_to_one_and_says_what_is_done():
 
 def test_where_everything_rests_there_is_no_branch():
     """Far below the onset, H = 0.0219879514 at Omega = 1, all motions end at rest."""
-    tree = bifurcation_diagram(forced(), AMPLITUDE, (0.0, 0.01), max_period=2, values=[0.005], starts=8)
+    tree = bifurcation_diagram(forced(1.0), AMPLITUDE, (0.0, 0.01), max_period=2, values=[0.005], starts=8)
     assert [name for name in tree.children if name.startswith("branch")] == []
     assert tree["attractors"].sizes["dot"] == 0
     assert int(tree["search"]["at_rest"][0]) == 8
