@@ -38,7 +38,7 @@ MAY_IMPORT = {
     "cli": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots", "config", "paper"},
 }
 HEAVY = (
-    *("scipy", "numba", "xarray", "matplotlib", "pydantic", "h5netcdf", "zarr", "distributed"),
+    *("scipy", "numba", "xarray", "matplotlib", "h5netcdf", "zarr", "distributed"),
     *("saltus.flow", "saltus.sweep", "saltus.paper"),
 )
 LONGEST_FUNCTION, MEDIAN_FUNCTION, LONGEST_FILE = 60, 8, 400  # lines, docstrings included

@@ -20,8 +20,18 @@ R = TypeVar("R")
 RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
 
 
-def check_number(
-    name: str,
+def check_number(name: str, value: Any, **bounds: Any) -> None:
+    """Refuse what is not a finite real number within the bounds of `number_problem`.
+
+    Raises:
+        ParameterError: with the name, the range and the value, and a hint where degrees look likely.
+    """
+    problem = number_problem(value, **bounds)
+    if problem is not None:
+        raise ParameterError(f"{name} {problem}", name)
+
+
+def number_problem(
     value: Any,
     *,
     above: float | None = None,
@@ -29,29 +39,26 @@ def check_number(
     at_least: float | None = None,
     at_most: float | None = None,
     unit: str = "",
-) -> None:
-    """Refuse what is not a finite real number within the stated bounds.
-
-    Raises:
-        ParameterError: with the name, the range and the value, and a hint where degrees look likely.
-    """
+) -> str | None:
+    """What is wrong with a value that must be a finite real number within bounds, such as "must lie in [0, 1], got 2"."""
     number = isinstance(value, (float, int, np.floating, np.integer)) and not isinstance(value, bool)
     if number and isinstance(value, int) and abs(value) > sys.float_info.max:
         value = math.inf
     wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
     if not number:
         kind = wanted.replace("lie in", "be a number in").replace("be finite", "be a finite number")
-        raise ParameterError(f"{name} must {kind}, got {value!r}", name)
-    inside: bool = (
+        return f"must {kind}, got {value!r}"
+    inside = (
         math.isfinite(value)
         and (above is None or value > above)
         and (below is None or value < below)
         and (at_least is None or value >= at_least)
         and (at_most is None or value <= at_most)
     )
-    if not inside:
-        hint = " (degrees?)" if unit == "rad" and math.isfinite(value) and 3.2 < abs(value) <= 360 else ""
-        raise ParameterError(f"{name} must {wanted}, got {value!r}{hint}", name)
+    if inside:
+        return None
+    hint = " (degrees?)" if unit == "rad" and math.isfinite(value) and 3.2 < abs(value) <= 360 else ""
+    return f"must {wanted}, got {value!r}{hint}"
 
 
 def _range_text(above: float | None, below: float | None, at_least: float | None, at_most: float | None) -> str:

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from saltus.cli.run_command import check
 from saltus.config import load_study
-from saltus.config.questions import QUESTIONS, keys_of, read_pairs, read_values
+from saltus.config.questions import QUESTIONS, keys_of
+from saltus.config.readers import read_pairs, read_values
 from saltus.errors import ParameterError
 
 KEYS = {kind: set(keys_of(kind)) for kind in QUESTIONS}

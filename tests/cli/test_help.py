@@ -7,7 +7,7 @@ import pytest
 
 import saltus as package
 
-HEAVY = ("numpy", "scipy", "numba", "xarray", "matplotlib", "pydantic")
+HEAVY = ("numpy", "scipy", "numba", "xarray", "matplotlib")
 
 
 @pytest.mark.parametrize("command", ["simulate", "info", "reproduce"])

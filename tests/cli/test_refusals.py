@@ -83,7 +83,7 @@ CASES = {
     "both": (simulate("periods = 1", "duration = 2") + "[load]\nfrequency = 1\n", ", line 6", "both periods and duration"),
     "neither": (simulate("theta = 1"), ", line 4", "simulate needs periods (of the load) or duration"),
     "periods_constant": (simulate("periods = 3"), ", line 5", "simulate.periods needs load.frequency"),
-    "periods_negative": (simulate("periods = -3"), ", line 5", "simulate.periods must be above 0, got -3"),
+    "periods_negative": (simulate("periods = -3"), ", line 5", "simulate.periods must lie in (0, inf), got -3"),
     "duration_nan": (simulate("duration = nan"), ", line 5", "simulate.duration must be a finite number, got nan"),
     "coordinate": (simulate("x = 3", "duration = 1"), ", line 5", "unknown key simulate.x"),
     "tol": (simulate("duration = 1", "tol = 0.1"), ", line 6", "simulate.tol must lie in [1e-15, 1e-06], got 0.1"),

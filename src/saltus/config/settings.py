@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BeforeValidator, create_model
-
-from saltus.config.fields import Angle, Number, Table, check_table, read_number, read_text, read_whole, show
+from saltus.config.readers import Reader, read_angle, read_number, read_table, read_text, read_whole, read_within, show
 from saltus.config.source import Source
+from saltus.errors import near
 from saltus.systems import Model, System
-
-TOLERANCES = (1e-15, 1e-6)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +40,7 @@ def read_settings(source: Source, system: System, data: Any) -> Settings:
         ParameterError: with the place of what is wrong.
     """
     coordinates = system.model.coordinates
-    values = check_table(source, ("simulate",), data, _table(system.model, margin_names(system)))
+    values = read_table(source, ("simulate",), data, _readers(system.model, margin_names(system)))
     _check_horizon(source, system, values)
     state = {name: values.pop(name, 0.0) for name in coordinates}
     return Settings(state=state, **values)
@@ -71,64 +68,36 @@ def _check_horizon(source: Source, system: System, values: Mapping[str, Any]) ->
         )
 
 
-def _table(model: Model, margins: tuple[str, ...]) -> type[Table]:
-    count = len(model.coordinates)
-    velocity = Annotated[Any, BeforeValidator(_numbers(count))] if count > 1 else Number
-    positive = Annotated[float, BeforeValidator(_positive)]
-    fields: dict[str, Any] = {name: (Angle if model.unit_of(name) == "rad" else Number, 0.0) for name in model.coordinates}
-    fields |= {"velocity": (velocity, 0.0), "periods": (positive, None), "duration": (positive, None)}
-    fields |= {"tol": (Annotated[float, BeforeValidator(_tolerance)], None), "time": (Number, 0.0)}
-    fields |= {"side": (Annotated[int, BeforeValidator(_side)], None)}
-    fields |= {"stop_at": (Annotated[Any, BeforeValidator(_margins(margins))], ())}
-    fields |= {"samples": (Annotated[int, BeforeValidator(_samples)], None)}
-    return create_model("simulate", __base__=Table, **fields)
+def _readers(model: Model, margins: tuple[str, ...]) -> dict[str, Reader]:
+    """The keys of the table, which are the arguments of `saltus.simulate` and `samples`."""
+
+    def read_margins(value: Any) -> tuple[str, ...]:
+        names = tuple(read_text(item) for item in (value if isinstance(value, list) else [value]))
+        for name in names:
+            if name not in margins:
+                raise ValueError(f"names no margin of this model with {show(name)}; {near(name, margins)}")
+        return names
+
+    def read_velocities(value: Any) -> tuple[float, ...]:
+        if not isinstance(value, list) or len(value) != len(model.coordinates):
+            raise ValueError(f"must be a list of {len(model.coordinates)} numbers, got {show(value)}")
+        return tuple(read_number(item) for item in value)
+
+    return {
+        **{name: read_angle if model.unit_of(name) == "rad" else read_number for name in model.coordinates},
+        "velocity": read_velocities if len(model.coordinates) > 1 else read_number,
+        "periods": read_within(read_number, above=0.0),
+        "duration": read_within(read_number, above=0.0),
+        "tol": read_within(read_number, at_least=1e-15, at_most=1e-6),
+        "time": read_number,
+        "side": _read_side,
+        "stop_at": read_margins,
+        "samples": read_within(read_whole, at_least=2, at_most=10_000_000),
+    }
 
 
-def _positive(value: Any) -> float:
-    number = read_number(value)
-    if number <= 0:
-        raise ValueError(f"must be above 0, got {show(value)}")
-    return number
-
-
-def _tolerance(value: Any) -> float:
-    number, (least, most) = read_number(value), TOLERANCES
-    if not least <= number <= most:
-        raise ValueError(f"must lie in [{least:g}, {most:g}], got {show(value)}")
-    return number
-
-
-def _side(value: Any) -> int:
+def _read_side(value: Any) -> int:
     number = read_number(value)
     if number not in (1, -1):
         raise ValueError(f"must be 1 (theta > 0) or -1 (theta < 0), got {show(value)}")
     return int(number)
-
-
-def _samples(value: Any) -> int:
-    number = read_whole(value)
-    if not 2 <= number <= 10_000_000:
-        raise ValueError(f"must lie in [2, 10000000], got {show(value)}")
-    return number
-
-
-def _margins(known: tuple[str, ...]) -> Any:
-    def read(value: Any) -> tuple[str, ...]:
-        from saltus.errors import near
-
-        names = tuple(read_text(item) for item in (value if isinstance(value, list) else [value]))
-        for name in names:
-            if name not in known:
-                raise ValueError(f"names no margin of this model with {show(name)}; {near(name, known)}")
-        return names
-
-    return read
-
-
-def _numbers(count: int) -> Any:
-    def read(value: Any) -> tuple[float, ...]:
-        if not isinstance(value, list) or len(value) != count:
-            raise ValueError(f"must be a list of {count} numbers, got {show(value)}")
-        return tuple(read_number(item) for item in value)
-
-    return read

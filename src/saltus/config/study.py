@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from saltus.config.loads import read_load
 from saltus.config.questions import QUESTIONS, Ask, read_ask
 from saltus.config.settings import Settings, read_settings
+from saltus.config.signals import read_load
 from saltus.config.source import Source, read_source
 from saltus.config.types import read_part
 from saltus.errors import MotionError, ParameterError, SweepError, TraceError, near
-from saltus.systems import Load, System, VelocityReduction
+from saltus.systems import System
 
 PARTS = ("model", "load", "impact", "simulate", *QUESTIONS)
 
@@ -81,11 +81,11 @@ def load_study(path: Path | str) -> Study:
             source.refuse((name,), f"unknown key {name!r}; {near(name, PARTS)}")
     if "model" not in tables:
         source.refuse((), 'has no [model]; begin with [model] type = "Metainterface", beta0 = "80 deg"')
-    model = read_part(source, "model", tables["model"])
-    load = read_load(source, tables["load"]) if "load" in tables else Load()
-    impact = read_part(source, "impact", tables["impact"]) if "impact" in tables else VelocityReduction()
+    parts: dict[str, Any] = {name: read_part(source, name, tables[name]) for name in ("model", "impact") if name in tables}
+    if "load" in tables:
+        parts["load"] = read_load(source, tables["load"])
     try:
-        system = System(model=model, load=load, impact=impact)
+        system = System.from_dict(parts)
     except ParameterError as error:
         source.refuse_error(error)
     settings = read_settings(source, system, tables["simulate"]) if "simulate" in tables else None

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from saltus.config.fields import build, check_table, read_text, table_of
+from saltus.config.readers import read, read_table, read_text, readers_of, show
 from saltus.config.source import Source
 from saltus.errors import ParameterError, near
 from saltus.systems import IMPACTS, MODELS, ImpactLaw, Model, register
@@ -19,28 +19,19 @@ from saltus.systems import IMPACTS, MODELS, ImpactLaw, Model, register
 EXAMPLES = {"model": "Metainterface", "impact": "VelocityReduction"}
 
 
-def read_part(source: Source, kind: str, data: Any) -> Any:
-    """The model or the impact law (`kind`) of a study: `type` and the fields of that class.
+def read_part(source: Source, kind: str, data: Any) -> dict[str, Any]:
+    """The model or the impact law (`kind`) of a study as `System.from_dict` takes it: `type` and the fields of that class.
 
     Raises:
         ParameterError: with the place of what is wrong.
     """
     if not isinstance(data, dict):
-        data = check_table(source, (kind,), data, table_of(_Typed))
+        source.refuse((kind,), f"{kind} must be a table of keys and values, got {show(data)}")
     if "type" not in data:
         source.refuse((kind,), f'{kind}.type is missing; it names the {kind}, such as type = "{EXAMPLES[kind]}"')
-    try:
-        name = read_text(data["type"])
-    except ValueError as error:
-        source.refuse((kind, "type"), f"{kind}.type {error}")
-    cls = find_class(source, kind, name)
+    cls = find_class(source, kind, read(source, (kind, "type"), data["type"], read_text))
     values = {key: value for key, value in data.items() if key != "type"}
-    return build(source, (kind,), cls, check_table(source, (kind,), values, table_of(cls)))
-
-
-@dataclasses.dataclass
-class _Typed:
-    type: str
+    return {"type": cls.__name__, **read_table(source, (kind,), values, readers_of(cls))}
 
 
 def find_class(source: Source, kind: str, name: str) -> type:

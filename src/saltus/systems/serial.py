@@ -49,6 +49,8 @@ def from_dict(kind: str, data: Any) -> Any:
 def read_signal(data: Any, where: str) -> Signal | float:
     """A number, a table of a `Harmonic` or a `Record`, or a list of them (their sum)."""
     if isinstance(data, (list, tuple)):
+        if not data:
+            raise ParameterError(f"{where} is an empty list; give at least one number, harmonic or record", where)
         terms = [read_signal(item, f"{where}.{i}") for i, item in enumerate(data)]
         return Sum(tuple(t if isinstance(t, Signal) else Constant(t) for t in terms))
     if isinstance(data, Mapping):
@@ -61,7 +63,7 @@ def build(cls: type, fields: dict[str, Any], where: str) -> Any:
     known = {f.name: f for f in dataclasses.fields(cls)}
     for name in fields:
         if name not in known:
-            raise ParameterError(f"unknown key {where}.{name} of {cls.__name__}; {near(name, known)}", f"{where}.{name}")
+            raise ParameterError(f"unknown key {where}.{name}; {near(name, known)}", f"{where}.{name}")
     for name, f in known.items():
         needed = f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
         if needed and name not in fields:
@@ -70,3 +72,5 @@ def build(cls: type, fields: dict[str, Any], where: str) -> Any:
         return cls(**fields)
     except ParameterError as error:
         raise error.inside(where) from None
+    except (ValueError, TypeError, ArithmeticError) as error:  # a class of the user's own may raise anything
+        raise ParameterError(f"{where}: {error}", where) from error

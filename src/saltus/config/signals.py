@@ -10,65 +10,45 @@ from typing import Any
 
 import numpy as np
 
-from saltus.config.fields import Text, build, check_table, read_number, show, table_of
+from saltus.config.readers import read, read_number, read_table, read_text, readers_of, show
 from saltus.config.source import Keys, Source
-from saltus.errors import ParameterError
-from saltus.systems import Constant, Harmonic, Load, Record, Signal, Sum
+from saltus.systems import Harmonic, Record
 
 
-def read_load(source: Source, data: Any) -> Load:
-    """The load of a study.
+def read_load(source: Source, data: Any) -> dict[str, Any]:
+    """The load of a study as `System.from_dict` takes it, its records read from their files.
 
     Raises:
         ParameterError: with the place of what is wrong.
     """
     if not isinstance(data, Mapping):
         source.refuse(("load",), f"load must be a table of keys and values, got {show(data)}")
-    channels = {name: read_signal(source, ("load", name), value) for name, value in data.items() if name != "frequency"}
-    frequency = _number(source, ("load", "frequency"), data["frequency"]) if "frequency" in data else None
-    for name in channels:
+    for name in data:
         if not name.isidentifier() or name.startswith("__"):
             source.refuse(("load", name), f"load has no channel {show(name)[len('the text ') :]}")
-    try:
-        return Load(frequency=frequency, **channels)
-    except ParameterError as error:
-        source.refuse_error(error)
+    return {name: _signal(source, ("load", name), value) for name, value in data.items()}
 
 
-def read_signal(source: Source, keys: Keys, data: Any) -> Signal:
+def _signal(source: Source, keys: Keys, data: Any) -> Any:
     """What one channel carries."""
-    if isinstance(data, list):
-        if not data:
-            source.refuse(keys, f"{'.'.join(keys)} is an empty list; give at least one number, harmonic or record")
-        return Sum(tuple(read_signal(source, (*keys, str(i)), item) for i, item in enumerate(data)))
-    if not isinstance(data, Mapping):
-        return Constant(_number(source, keys, data))
-    if {"file", "time", "value"} & set(data):
+    if isinstance(data, list) and keys != ("load", "frequency"):
+        return [_signal(source, (*keys, str(i)), item) for i, item in enumerate(data)]
+    if not isinstance(data, Mapping) or keys == ("load", "frequency"):
+        return read(source, keys, data, read_number)
+    if "file" in data:
         return _record(source, keys, data)
-    harmonic: Signal = build(source, keys, Harmonic, check_table(source, keys, data, table_of(Harmonic)))
-    return harmonic
+    return read_table(source, keys, data, readers_of(Record if {"time", "value"} & set(data) else Harmonic))
 
 
-def _number(source: Source, keys: Keys, value: Any) -> float:
-    try:
-        return read_number(value)
-    except ValueError as error:
-        source.refuse(keys, f"{'.'.join(keys)} {error}")
-
-
-def _record(source: Source, keys: Keys, data: Any) -> Signal:
-    if "file" not in data:
-        listed: Signal = build(source, keys, Record, check_table(source, keys, data, table_of(Record)))
-        return listed
+def _record(source: Source, keys: Keys, data: Mapping[str, Any]) -> dict[str, Any]:
+    """A record whose samples are in a file."""
     for name in ("time", "value", "source"):
         if name in data:
             source.refuse((*keys, name), f"{'.'.join(keys)} has both file and {name}; keep one of them")
-    table = table_of(Record, file=(Text, ...), time=(Any, None), value=(Any, None))
-    values = check_table(source, keys, data, table)
+    values = read_table(source, keys, data, {**readers_of(Record), "file": read_text})
     name = values.pop("file")
     time, value = read_samples(source, (*keys, "file"), name)
-    sampled: Signal = build(source, keys, Record, {**values, "time": time, "value": value, "source": name})
-    return sampled
+    return {**values, "time": time, "value": value, "source": name}
 
 
 def read_samples(source: Source, keys: Keys, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,231 @@
+"""How the values in a study file are read: a function for each kind, which refuses with the predicate of a sentence."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import math
+import re
+import typing
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import number_problem
+from saltus.config.source import Keys, Source
+from saltus.errors import near
+
+Reader = Callable[[Any], Any]  # gives the value, or raises a ValueError such as "must be a number, got true"
+Pair = tuple[float, float]
+
+ANGLE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad|°)\s*")
+SPACED = ("from", "to", "count")
+EXAMPLE = "{ from = 0, to = 0.5, count = 101 }"
+MAX_COUNT = 100_000  # A longer axis is a slip of the pen: a chart of that width takes years.
+
+
+def show(value: Any) -> str:
+    """A TOML value as a sentence shows it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        text = value if len(value) <= 40 else value[:37] + "..."
+        return "the text " + '"' + text.encode("unicode_escape").decode("ascii") + '"'
+    for kind, name in ((Mapping, "a table"), ((list, tuple), "a list"), ((datetime.date, datetime.time), "a date or a time")):
+        if isinstance(value, kind):
+            return name
+    text = repr(value) if not isinstance(value, int) or abs(value) < 10**20 else "a very large number"
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def read_number(value: Any) -> float:
+    """A finite number as a float.
+
+    Raises:
+        ValueError: for anything else, with the predicate of a sentence.
+    """
+    if isinstance(value, str):
+        raise ValueError(f"must be a number, got {show(value)}{_unquoted(value)}")
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(f"must be a number, got {show(value)}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"must be a finite number, got {show(value)}")
+    return number
+
+
+def _unquoted(text: str) -> str:
+    try:
+        finite = math.isfinite(float(text))
+    except ValueError:
+        finite = False
+    return f"; write it without quotes: {text.strip()}" if finite else ""
+
+
+def read_angle(value: Any) -> float:
+    """An angle in radians from "80 deg", "1.4 rad" or a number of radians.
+
+    Raises:
+        ValueError: for anything else, with the predicate of a sentence.
+    """
+    if not isinstance(value, str):
+        return read_number(value)
+    match = ANGLE.fullmatch(value)
+    if match is None:
+        raise ValueError(f'must be an angle such as "80 deg", "1.4 rad" or a number of radians without quotes, got {show(value)}')
+    number = read_number(float(match[1]))
+    return number if match[2] == "rad" else math.radians(number)
+
+
+def read_whole(value: Any) -> int:
+    """A whole number."""
+    number = read_number(value)
+    if number != int(number):
+        raise ValueError(f"must be a whole number, got {show(value)}")
+    return int(number)
+
+
+def read_text(value: Any) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise ValueError(f'must be text in quotes, such as "force", got {show(value)}')
+    return value
+
+
+def read_switch(value: Any) -> bool:
+    """true or false."""
+    if not isinstance(value, bool):
+        raise ValueError(f"must be true or false, got {show(value)}")
+    return value
+
+
+def read_values(value: Any) -> np.ndarray:
+    """Numbers (or angles) from a list, or from a table such as { from = 0, to = 0.5, count = 101 }."""
+    if isinstance(value, list) and value:
+        return np.array([read_angle(item) for item in value])
+    if isinstance(value, dict):
+        return _spaced(value)
+    given = "an empty list" if value == [] else show(value)
+    raise ValueError(f"must be a list of numbers or a table such as {EXAMPLE}, got {given}")
+
+
+def _spaced(table: dict[str, Any]) -> np.ndarray:
+    """`count` numbers evenly spaced between the two ends in a table."""
+    unknown = [name for name in table if name not in SPACED]
+    if unknown:
+        raise ValueError(f"has the unknown key {unknown[0]!r}; {near(str(unknown[0]), SPACED)}")
+    missing = [name for name in SPACED if name not in table]
+    if missing:
+        raise ValueError(f"needs from, to and count, such as {EXAMPLE}, and has no {' and no '.join(missing)}")
+    low, high, count = _part(table, "from", read_angle), _part(table, "to", read_angle), _part(table, "count", read_whole)
+    if not 2 <= count <= MAX_COUNT:
+        raise ValueError(f"needs a count from 2 to {MAX_COUNT}, got {show(table['count'])}")
+    if low >= high:
+        raise ValueError(f"must go from the smaller number to the larger one, got from = {low:g}, to = {high:g}")
+    return np.linspace(low, high, count)
+
+
+def _part(table: dict[str, Any], name: str, read: Callable[[Any], Any]) -> Any:
+    try:
+        return read(table[name])
+    except ValueError as error:
+        raise ValueError(f"has a {name} that {error}") from None
+
+
+def read_pair(value: Any) -> tuple[float, float]:
+    """Two numbers (or angles)."""
+    if not isinstance(value, list) or len(value) != 2:
+        raise ValueError(f"must be a list of two numbers, got {show(value)}")
+    return read_angle(value[0]), read_angle(value[1])
+
+
+def read_pairs(value: Any) -> tuple[tuple[float, float], ...]:
+    """Pairs of numbers (or angles)."""
+    if not isinstance(value, list) or not value:
+        raise ValueError(f"must be a list of pairs of numbers, got {show(value)}")
+    return tuple(read_pair(item) for item in value)
+
+
+def read_paths(value: Any) -> tuple[str, str]:
+    """Two dotted paths."""
+    if not isinstance(value, list) or len(value) != 2 or not all(isinstance(item, str) for item in value):
+        raise ValueError(f'must be two dotted paths, such as ["load.horizontal.amplitude", "load.vertical"], got {show(value)}')
+    return value[0], value[1]
+
+
+def read_within(reader: Reader, **bounds: Any) -> Reader:
+    """The reader of what `reader` gives, within the bounds of `check_number`."""
+
+    def within(value: Any) -> Any:
+        number = reader(value)
+        problem = number_problem(number, **bounds)
+        if problem is not None:
+            raise ValueError(problem)
+        return number
+
+    return within
+
+
+def read_anything(value: Any) -> Any:
+    """A value that is checked by whoever takes it."""
+    return value
+
+
+READERS: dict[Any, Reader] = {
+    float: read_number,
+    int: read_whole,
+    str: read_text,
+    bool: read_switch,
+    Pair: read_pair,
+    tuple[Pair, Pair]: read_pairs,
+    tuple[str, str]: read_paths,
+    Iterable[Pair]: read_pairs,
+    Iterable[float]: read_values,
+}  # how a file gives an argument of each type
+
+
+def reader_of(hint: Any) -> Reader | None:
+    """How a file gives a value of a type, or None where it cannot; X | None is an X that may be left out."""
+    kinds = [kind for kind in typing.get_args(hint) if kind is not type(None)]
+    return READERS.get(kinds[0] if len(kinds) == 1 and type(None) in typing.get_args(hint) else hint)
+
+
+def readers_of(cls: type) -> dict[str, Reader]:
+    """The readers of the fields of a dataclass; a field whose metadata says "rad" is an angle."""
+    hints = typing.get_type_hints(cls)
+    return {
+        f.name: read_angle if f.metadata.get("unit") == "rad" else reader_of(hints.get(f.name)) or read_anything
+        for f in dataclasses.fields(cls)
+        if f.init and not f.name.startswith("_")
+    }
+
+
+def read_table(source: Source, keys: Keys, data: Any, readers: Mapping[str, Reader]) -> dict[str, Any]:
+    """The values in the table `data` that stands at `keys`, each as its reader gives it.
+
+    Raises:
+        ParameterError: what is no table, an unknown key, a value that is refused, with its place.
+    """
+    name = ".".join(keys)
+    if not isinstance(data, Mapping):
+        source.refuse(keys, f"{name} must be a table of keys and values, got {show(data)}")
+    for key in data:
+        if key not in readers:
+            source.refuse((*keys, key), f"unknown key {name}.{key}; {near(key, readers)}")
+    return {key: read(source, (*keys, key), value, readers[key]) for key, value in data.items()}
+
+
+def read(source: Source, keys: Keys, value: Any, reader: Reader) -> Any:
+    """One value, which stands at `keys`.
+
+    Raises:
+        ParameterError: what the reader refuses, with its place.
+    """
+    try:
+        return reader(value)
+    except ValueError as error:
+        source.refuse(keys, f"{'.'.join(keys)} {error}")
