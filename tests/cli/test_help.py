@@ -25,7 +25,7 @@ def test_the_first_page_names_the_commands_and_shows_a_study(saltus, tmp_path):
     (tmp_path / "study.toml").write_text("\n".join(line.strip() for line in shown.splitlines()))
     from saltus.config import load_study
 
-    assert load_study(tmp_path / "study.toml").settings().periods == 20  # what help shows is a study
+    assert load_study(tmp_path / "study.toml").settings().arguments["periods"] == 20  # what help shows is a study
 
 
 def test_the_version(saltus):

@@ -1,75 +1,36 @@
-"""The facts that `saltus info` prints, by model, as plain text; the closed forms are those of `saltus.theory`."""
+"""What `saltus info` prints of a system: what holds for every model, then the closed forms of its own."""
 
 from __future__ import annotations
 
-import dataclasses
-import math
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
-if TYPE_CHECKING:
-    from saltus.systems import Load, Signal, System
+import numpy as np
 
-SMALL = 0.1  # rad; the start of the free vibration whose period is given where the study has none
-PHASES = 64  # instants at which a load is compared with its mirror image half a period later
+from saltus.cli.fact_blocks import Block, Row, number
+from saltus.cli.model_facts import MODEL_FACTS
+from saltus.systems import Load, Record, System
 
-
-@dataclasses.dataclass(frozen=True)
-class Block:
-    """A titled list of rows of text."""
-
-    title: str
-    rows: list[tuple[str, ...]]
-    heads: tuple[str, ...] = ()
+PHASES = 64  # Instants at which a load is compared with its mirror image: no harmonic below the 32nd can hide between them.
 
 
 def describe(system: System, start: float | None = None) -> Iterator[Block]:
-    """What is known of `system`: first what holds for every model, then what closed forms add.
+    """What is known of `system`.
 
     Args:
         start: the angle, rad, from which the period of a free vibration is wanted.
     """
-    from saltus.systems import Metainterface, RockingBlock, WallOscillator
-
-    parameters: list[tuple[str, ...]] = [(path, number(value)) for path, value in system.parameters.items()]
+    parameters: list[Row] = [(path, number(value)) for path, value in system.parameters.items()]
     yield Block("Parameters", [*parameters, ("impact law", type(system.impact).__name__)])
     yield Block("Load", _load(system))
-    model = system.model
-    if isinstance(model, Metainterface):
-        from saltus.cli.facts_metainterface import metainterface
-
-        yield from metainterface(system, start)
-    elif isinstance(model, RockingBlock):
-        yield _rocking_block(system, start)
-    elif isinstance(model, WallOscillator):
-        yield _wall_oscillator(system)
+    for model, closed_forms in MODEL_FACTS.items():
+        if isinstance(system.model, model):
+            yield from closed_forms(system, start)
 
 
-def number(value: Any) -> str:
-    """Eight digits, which is what a reader compares."""
-    return f"{float(value):.8g}"
-
-
-def angle(value: Any) -> str:
-    """An angle in both units."""
-    return f"{float(value):.8g} rad ({math.degrees(float(value)):.6g} deg)"
-
-
-def attempt(formula: Callable[[], str]) -> str:
-    """What a closed form gives, or why it does not apply."""
-    from saltus.errors import ParameterError
-
-    try:
-        return formula()
-    except ParameterError as error:
-        return f"none: {error}"
-
-
-def _load(system: System) -> list[tuple[str, ...]]:
+def _load(system: System) -> list[Row]:
     period = system.load.period
-    rows: list[tuple[str, ...]] = [
-        ("forcing period 2 pi / Omega", "none: the load has no frequency" if period is None else number(period))
-    ]
+    rows: list[Row] = [("forcing period 2 pi / Omega", "none: the load has no frequency" if period is None else number(period))]
     channels = ", ".join(system.load.channels) or "none"
     rows.append(("channels given", channels))
     rows.append(("channels that the model reads", ", ".join(system.model.channels) or "none"))
@@ -92,8 +53,6 @@ def symmetry(system: System) -> str:
 
 def _equal(load: Load, other: Load, shift: float) -> bool:
     """Whether `load` at t + shift is `other` at t in every channel."""
-    import numpy as np
-
     span = load.period or max((s.time[-1] for s in _records(load)), default=1.0)
     times = span * np.arange(PHASES) / PHASES
     for name in load.channels:
@@ -104,58 +63,4 @@ def _equal(load: Load, other: Load, shift: float) -> bool:
 
 
 def _records(load: Load) -> list[Any]:
-    from saltus.systems import Record
-
     return [term for signal in load.channels.values() for term in getattr(signal, "terms", (signal,)) if isinstance(term, Record)]
-
-
-def mean_load(load: Load) -> Load:
-    """The constant part of every force: what closed forms for constant loads can be asked about."""
-    from saltus.systems import Load
-
-    return Load(**{name: mean(signal) for name, signal in load.channels.items() if not name.startswith("ground_")})
-
-
-def mean(signal: Signal) -> float:
-    """The constant part of a signal; that of a record is 0."""
-    from saltus.systems import Constant, Harmonic, Sum
-
-    if isinstance(signal, Sum):
-        return sum(mean(term) for term in signal.terms)
-    return signal.value if isinstance(signal, Constant) else signal.mean if isinstance(signal, Harmonic) else 0.0
-
-
-def _rocking_block(system: System, start: float | None) -> Block:
-    alpha = system.get("model.alpha")
-    rows: list[tuple[str, ...]] = [
-        ("overturning equilibria, theta = +-alpha", angle(alpha)),
-        ("the block lies on its side at +-pi/2", angle(math.pi / 2)),
-        ("rest is left where |zeta''| exceeds (1 + nu'') tan(alpha)", number(math.tan(alpha))),
-        ("velocity factor of an inelastic impact (Housner)", number(system.model.inelastic_factor(1))),
-    ]
-    return Block("Closed forms", [*rows, *_rocking_periods(alpha, start or alpha / 2)])
-
-
-def _rocking_periods(alpha: float, start: float) -> list[tuple[str, ...]]:
-    from saltus.theory import rocking_period, slender_rocking_period
-
-    return [
-        (f"free rocking period from {angle(start)}", attempt(lambda: number(rocking_period(start, alpha=alpha)))),
-        ("the same for a slender block", attempt(lambda: number(slender_rocking_period(start, alpha=alpha)))),
-    ]
-
-
-def _wall_oscillator(system: System) -> Block:
-    k, c, wall = (system.get(f"model.{name}") for name in ("stiffness", "damping", "wall"))
-    rows: list[tuple[str, ...]] = []
-    if k > 0:
-        frequency, ratio = math.sqrt(k), c / (2 * math.sqrt(k))
-        rows += [("natural frequency sqrt(k)", number(frequency)), ("damping ratio c / (2 sqrt(k))", number(ratio))]
-        if ratio < 1:
-            rows.append(("free period away from the wall", number(2 * math.pi / (frequency * math.sqrt(1 - ratio**2)))))
-        force = mean(system.load.channels["force"]) if "force" in system.load.channels else 0.0
-        place = force / k
-        held = f"on the wall, x = {number(wall)}" if place >= wall else f"x = {number(place)}"
-        rows.append(("equilibrium under the mean force", held))
-    rows.append(("rests on the wall while the force exceeds k d", number(k * wall)))
-    return Block("Closed forms", rows)

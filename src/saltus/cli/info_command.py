@@ -7,7 +7,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from saltus.cli.facts import Block, describe
+from saltus.cli.fact_blocks import Block
+from saltus.cli.facts import describe
 
 LEAST_START = 1e-6  # rad; below it a free vibration is too small to speak of
 
@@ -20,7 +21,7 @@ def print_info(path: Path) -> None:
     console = Console(highlight=False)
     console.print(f"[bold]{type(study.system.model).__name__}[/] ", end="")
     console.print(f"from {path}", markup=False, soft_wrap=True)
-    theta = study.simulate.state.get("theta", 0.0) if study.simulate else 0.0
+    theta = study.simulate.arguments.get("theta", 0.0) if study.simulate else 0.0
     start = theta if abs(theta) >= LEAST_START else None
     for block in describe(study.system, start):
         console.print()

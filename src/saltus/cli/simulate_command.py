@@ -59,11 +59,12 @@ def long_samples(study: Study) -> Any:
     """The times at which to keep the states of a motion too long to be kept whole, or None for one that is not."""
     import numpy as np
 
-    settings, period = study.settings(), study.system.load.period
-    span = settings.duration if settings.periods is None else settings.periods * (period or 1.0)
-    if span is None or span / (period or 2 * np.pi) <= LONG:
+    given, period = study.settings().arguments, study.system.load.period
+    span = given["periods"] * (period or 1.0) if "periods" in given else given["duration"]
+    if span / (period or 2 * np.pi) <= LONG:
         return None
-    return np.linspace(settings.time, settings.time + span, settings.samples or MOST_SAMPLES)
+    start = given.get("time", 0.0)
+    return np.linspace(start, start + span, study.settings().samples or MOST_SAMPLES)
 
 
 def sample_times(motion: Motion, samples: int | None) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from saltus.config.readers import Reader, read_angle, read_number, read_table, read_text, read_whole, read_within, show
@@ -14,23 +14,10 @@ from saltus.systems import Model, System
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """How a study is simulated; what is None is left to `saltus.simulate`."""
+    """How a study is simulated."""
 
-    state: dict[str, float] = field(default_factory=dict)  # the coordinates at the start, by name
-    velocity: float | tuple[float, ...] = 0.0
-    periods: float | None = None  # of the load; or else
-    duration: float | None = None  # in the dimensionless time tau
-    tol: float | None = None
-    time: float = 0.0  # at the start
-    side: int | None = None
-    stop_at: tuple[str, ...] = ()  # the margins that end the motion
+    arguments: dict[str, Any]  # of `saltus.simulate`, the system apart
     samples: int | None = None  # written to motion.nc, evenly spaced
-
-    def arguments(self) -> dict[str, Any]:
-        """The keyword arguments of `saltus.simulate`, the system apart."""
-        given = {name: getattr(self, name) for name in ("periods", "duration", "tol", "side")}
-        given = {name: value for name, value in given.items() if value is not None}
-        return {**self.state, "velocity": self.velocity, "time": self.time, "stop_at": self.stop_at, **given}
 
 
 def read_settings(source: Source, system: System, data: Any) -> Settings:
@@ -39,11 +26,9 @@ def read_settings(source: Source, system: System, data: Any) -> Settings:
     Raises:
         ParameterError: with the place of what is wrong.
     """
-    coordinates = system.model.coordinates
     values = read_table(source, ("simulate",), data, _readers(system.model, margin_names(system)))
     _check_horizon(source, system, values)
-    state = {name: values.pop(name, 0.0) for name in coordinates}
-    return Settings(state=state, **values)
+    return Settings(samples=values.pop("samples", None), arguments={**dict.fromkeys(system.model.coordinates, 0.0), **values})
 
 
 def margin_names(system: System) -> tuple[str, ...]:

@@ -51,7 +51,7 @@ class Study:
         """
         from saltus.flow import simulate
 
-        return self.answer(Ask(kind="simulate", options=self.settings().arguments()), simulate, **more)
+        return self.answer(Ask(kind="simulate", options=self.settings().arguments), simulate, **more)
 
     def answer(self, ask: Ask, function: Callable[..., Any], **more: Any) -> Any:
         """`function(system, ...)` with the arguments of a question, and `more`.

@@ -1,14 +1,14 @@
-"""The closed forms that `saltus info` prints for a metainterface."""
+"""The closed forms that `saltus info` prints, by the type of the model."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
-from saltus.cli.facts import SMALL, Block, angle, attempt, mean_load, number
+from saltus.cli.fact_blocks import Block, Row, angle, attempt, mean, mean_load, number
 from saltus.errors import ParameterError
-from saltus.systems import Metainterface, System, VelocityReduction
+from saltus.systems import Metainterface, Model, RockingBlock, System, VelocityReduction, WallOscillator
 from saltus.theory import (
     critical_horizontal,
     equilibria,
@@ -16,13 +16,17 @@ from saltus.theory import (
     high_frequency_onset,
     linear_period,
     peaks,
+    rocking_period,
+    slender_rocking_period,
     subcritical_vertical,
     unloaded_fold,
     vibrations,
 )
 
+SMALL = 0.1  # rad; the start of the free vibration whose period is given where the study has none
 
-def metainterface(system: System, start: float | None) -> Iterator[Block]:
+
+def _metainterface(system: System, start: float | None) -> Iterator[Block]:
     """Equilibria under the mean load, vibrations and periods, critical loads, limits of the mechanism."""
     model = system.model
     assert isinstance(model, Metainterface)
@@ -35,7 +39,7 @@ def metainterface(system: System, start: float | None) -> Iterator[Block]:
 
 
 def _equilibria(system: System) -> Block:
-    rows: list[tuple[str, ...]] = []
+    rows: list[Row] = []
     for e in equilibria(system):
         place = "" if e.within_line else "beyond the straight line"
         rows.append((number(e.theta), f"{math.degrees(e.theta):.6g}", e.stability.value, number(e.energy), place))
@@ -46,7 +50,7 @@ def _equilibria(system: System) -> Block:
 
 
 def _vibrations(system: System, model: Metainterface, start: float) -> Block:
-    rows: list[tuple[str, ...]] = []
+    rows: list[Row] = []
     try:
         for name, v in zip(("lower", "upper"), vibrations(system), strict=True):
             rows.append((f"apparent frequency, {name} layer", f"{number(v.frequency)}, damping ratio {number(v.damping_ratio)}"))
@@ -71,7 +75,7 @@ def _alike(model: Metainterface) -> bool:
 
 def _critical_loads(system: System, model: Metainterface, frequency: float | None) -> Block:
     beta0, vertical = model.beta0, float(system.load.vertical(0.0))
-    rows: list[tuple[str, ...]] = [
+    rows: list[Row] = [
         ("Hcr = |V / tan(beta0)|, the undeformed state is lost", attempt(lambda: number(critical_horizontal(beta0, vertical))))
     ]
     if _alike(model) and beta0 < math.pi / 2:
@@ -93,3 +97,46 @@ def _limits(model: Metainterface) -> Block:
         "Limits of the mechanism, |theta|",
         [("straight line, pi - beta0", angle(opening)), ("kinematic limit, 2 (pi - beta0)", angle(2 * opening))],
     )
+
+
+def _rocking_block(system: System, start: float | None) -> Iterator[Block]:
+    """Overturning, rest, and the free periods."""
+    alpha = system.get("model.alpha")
+    rows: list[Row] = [
+        ("overturning equilibria, theta = +-alpha", angle(alpha)),
+        ("the block lies on its side at +-pi/2", angle(math.pi / 2)),
+        ("rest is left where |zeta''| exceeds (1 + nu'') tan(alpha)", number(math.tan(alpha))),
+        ("velocity factor of an inelastic impact (Housner)", number(system.model.inelastic_factor(1))),
+    ]
+    yield Block("Closed forms", [*rows, *_rocking_periods(alpha, start or alpha / 2)])
+
+
+def _rocking_periods(alpha: float, start: float) -> list[Row]:
+    return [
+        (f"free rocking period from {angle(start)}", attempt(lambda: number(rocking_period(start, alpha=alpha)))),
+        ("the same for a slender block", attempt(lambda: number(slender_rocking_period(start, alpha=alpha)))),
+    ]
+
+
+def _wall_oscillator(system: System, start: float | None) -> Iterator[Block]:
+    """Frequency, damping ratio and rest."""
+    k, c, wall = (system.get(f"model.{name}") for name in ("stiffness", "damping", "wall"))
+    rows: list[Row] = []
+    if k > 0:
+        frequency, ratio = math.sqrt(k), c / (2 * math.sqrt(k))
+        rows += [("natural frequency sqrt(k)", number(frequency)), ("damping ratio c / (2 sqrt(k))", number(ratio))]
+        if ratio < 1:
+            rows.append(("free period away from the wall", number(2 * math.pi / (frequency * math.sqrt(1 - ratio**2)))))
+        force = mean(system.load.channels["force"]) if "force" in system.load.channels else 0.0
+        place = force / k
+        held = f"on the wall, x = {number(wall)}" if place >= wall else f"x = {number(place)}"
+        rows.append(("equilibrium under the mean force", held))
+    rows.append(("rests on the wall while the force exceeds k d", number(k * wall)))
+    yield Block("Closed forms", rows)
+
+
+MODEL_FACTS: dict[type[Model], Callable[[System, float | None], Iterator[Block]]] = {
+    Metainterface: _metainterface,
+    RockingBlock: _rocking_block,
+    WallOscillator: _wall_oscillator,
+}

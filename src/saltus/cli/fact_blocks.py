@@ -1,0 +1,52 @@
+"""The blocks of text that `saltus info` prints, and how numbers stand in them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+from saltus.errors import ParameterError
+from saltus.systems import Constant, Harmonic, Load, Signal, Sum
+
+Row = tuple[str, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Block:
+    """A titled list of rows of text."""
+
+    title: str
+    rows: list[Row]
+    heads: Row = ()
+
+
+def number(value: Any) -> str:
+    """Eight digits, which is what a reader compares."""
+    return f"{float(value):.8g}"
+
+
+def angle(value: Any) -> str:
+    """An angle in both units."""
+    return f"{float(value):.8g} rad ({math.degrees(float(value)):.6g} deg)"
+
+
+def attempt(formula: Callable[[], str]) -> str:
+    """What a closed form gives, or why it does not apply."""
+    try:
+        return formula()
+    except ParameterError as error:
+        return f"none: {error}"
+
+
+def mean_load(load: Load) -> Load:
+    """The constant part of every force: what closed forms for constant loads can be asked about."""
+    return Load(**{name: mean(signal) for name, signal in load.channels.items() if not name.startswith("ground_")})
+
+
+def mean(signal: Signal) -> float:
+    """The constant part of a signal; that of a record is 0."""
+    if isinstance(signal, Sum):
+        return sum(mean(term) for term in signal.terms)
+    return signal.value if isinstance(signal, Constant) else signal.mean if isinstance(signal, Harmonic) else 0.0
