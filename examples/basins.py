@@ -9,7 +9,7 @@ system = saltus.System(
     model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
     load=saltus.Load(frequency=2.4, horizontal=saltus.Harmonic(amplitude=1.0), vertical=-0.5),
 )
-found = find_attractors(system, region=(2.0, 2.0))
+found = find_attractors(system, window=((-2.0, 2.0), (-2.0, 2.0)))
 print(found)
 
 grid = np.linspace(-2.0, 2.0, 101)

@@ -8,16 +8,20 @@ import inspect
 import math
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
 from saltus.errors import ParameterError
 
+if TYPE_CHECKING:
+    from saltus.systems import System
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
 RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
+HALF_WIDTH = 1.5  # of the window that is taken where none is given: about the size of the motions that the paper shows
 
 
 def check_number(name: str, value: Any, **bounds: Any) -> None:
@@ -143,6 +147,48 @@ def check_along(system: Any, path: str, values: Iterable[float], name: str) -> N
             system.with_({path: float(value)})
         except ParameterError as error:
             raise ParameterError(f"{name} reach beyond what the system allows: {error}", name) from None
+
+
+Rectangle = tuple[tuple[float, float], tuple[float, float]]  # bounds of the coordinate, and of the velocity
+
+
+class Window(NamedTuple):
+    """A rectangle of the state plane, by the bounds of the first coordinate and of its velocity."""
+
+    coordinate: tuple[float, float]
+    velocity: tuple[float, float]
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Its middle, (2,)."""
+        return np.asarray(self).mean(axis=1)
+
+    @property
+    def half(self) -> np.ndarray:
+        """Its half widths, (2,)."""
+        return 0.5 * np.diff(np.asarray(self), axis=1)[:, 0]
+
+    def scaled(self, states: np.ndarray) -> np.ndarray:
+        """States (..., 2) in half widths from the middle."""
+        return np.asarray((states - self.centre) / self.half)
+
+
+def check_window(window: Any, system: System) -> Window:
+    """A window of the state plane; that of half widths 1.5 around the contact, or around 0 without one, for None.
+
+    Raises:
+        ParameterError: what is no pair of bounds for the coordinate and one for the velocity.
+    """
+    if window is None:
+        contact = float(system.model.contact) if system.model.sides else 0.0
+        return Window((contact - HALF_WIDTH, contact + HALF_WIDTH), (-HALF_WIDTH, HALF_WIDTH))
+    try:
+        bounds = np.asarray(window, dtype=float)
+    except (TypeError, ValueError):
+        bounds = np.empty(0)
+    if bounds.shape != (2, 2) or not np.isfinite(bounds).all() or not (bounds[:, 0] < bounds[:, 1]).all():
+        raise ParameterError(f"window must be ((least, largest coordinate), (least, largest velocity)), got {window!r}", "window")
+    return Window(*map(tuple, bounds.tolist()))
 
 
 def check_states(name: str, states: Any) -> np.ndarray:

@@ -46,7 +46,7 @@ def test_the_shares_are_those_of_the_cells(picture: xarray.Dataset) -> None:
 
 
 def test_sampled_fractions_agree_with_the_area() -> None:
-    sampled = find_attractors(SYSTEM, starts=256, region=(2.0, 2.0)).of(1)
+    sampled = find_attractors(SYSTEM, starts=256, window=((-2.0, 2.0), (-2.0, 2.0))).of(1)
     middles = -2.0 + 4.0 * (np.arange(60) + 0.5) / 60
     area = basins_of_attraction(SYSTEM, theta=middles, velocity=middles)["cells"].sel(attractor=1)
     assert abs(float(area) - sampled.fraction) < 3.0 * sampled.error
@@ -101,7 +101,9 @@ def test_the_basins_of_mirrored_equilibria_are_mirror_images() -> None:
 
 def test_a_grid_of_its_own_keeps_to_the_side_of_the_wall() -> None:
     system = walled()
-    picture = basins_of_attraction(system, found=find_attractors(system, starts=8, region=(0.5, 0.5)), velocity=[0.0], x=None)
+    picture = basins_of_attraction(
+        system, found=find_attractors(system, starts=8, window=((0.5, 1.5), (-0.5, 0.5))), velocity=[0.0], x=None
+    )
     assert picture["x"].values.max() <= 1.0
     assert (picture["label"].values == 1).all()
 
@@ -122,11 +124,11 @@ def test_cells_of_a_chaotic_attractor_are_told_from_those_of_a_cycle() -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ({"theta": [1.0, 0.0]}, "increasing"),
+        ({"theta": [1.0, 0.0]}, "that rise"),
         ({"x": [0.0]}, "no coordinate 'x'"),
         ({"periods": 3}, "periods"),
         ({"within": 0.0}, "within"),
-        ({"velocity": [np.nan]}, "increasing"),
+        ({"velocity": [np.nan]}, "that rise"),
     ],
 )
 def test_senseless_grids_are_refused(arguments: dict, says: str) -> None:

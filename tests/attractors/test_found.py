@@ -88,7 +88,7 @@ def test_under_a_constant_load_they_are_rest_and_the_stable_equilibria() -> None
 
 
 def test_an_oscillator_that_never_reaches_its_wall_has_one_attractor_and_its_closed_form() -> None:
-    found = find_attractors(walled(), starts=32, region=(2.0, 2.0))
+    found = find_attractors(walled(), starts=32, window=((-1.0, 3.0), (-2.0, 2.0)))
     (member,) = found
     assert member.amplitude == pytest.approx(0.2 / abs(1.0 - 1.3**2 + 0.13j), rel=1e-10)
     assert float(found.to_xarray()["multiplier"][0]) == pytest.approx(math.exp(-0.1 * math.pi / 1.3), rel=1e-9)
@@ -174,7 +174,7 @@ def test_chaos_and_a_periodic_motion_coexist() -> None:
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: find_attractors(forced(), region=(1.0, 0.0)), "half widths"),
+        (lambda: find_attractors(forced(), window=(1.0, 0.0)), "window must be"),
         (lambda: find_attractors(forced(), starts=0), "starts"),
         (lambda: find_attractors(forced(), max_period=40), "max_period"),
         (lambda: find_attractors(forced(), also=[[1.0, np.inf]]), "also"),

@@ -146,7 +146,7 @@ REFUSED = {
         "phase_portrait.window must be a list of two numbers",
     ),
     "beyond": (WALL + "[phase_portrait]\nstarts = [[2, 0]]\n", ", line 7", "[2.0, 0.0] is beyond the contact"),
-    "region": (FORCED + "[attractors]\nregion = [1, -1]\n", ", line 10", "attractors.region must be two half widths above 0"),
+    "window of states": (FORCED + "[attractors]\nwindow = [[1, -1], [0, 1]]\n", ", line 10", "attractors.window must be ((least"),
     "path": (FORCED + '[response_spectrum]\npath = "load.frequenzy"\n', ", line 10", "did you mean 'load.frequency'?"),
     "bounds": (
         FORCED + "[bifurcation_diagram]\nbounds = [2, 1]\n",

@@ -23,7 +23,15 @@ def island():
     """The detached loop of period 3 at Hhat = 0.5."""
     system = spectra.under_force(amplitude=0.5)
     return response_spectrum(
-        system, spectra.FREQUENCY, (2.4, 3.0), max_period=3, values=[2.7], starts=16, region=(4.0, 4.0), repelling=0, switch=False
+        system,
+        spectra.FREQUENCY,
+        (2.4, 3.0),
+        max_period=3,
+        values=[2.7],
+        starts=16,
+        window=spectra.WINDOW,
+        repelling=0,
+        switch=False,
     )
 
 

@@ -8,11 +8,11 @@ from saltus import ParameterError, WallOscillator
 from saltus.studies.diagram.bands import Band, Bands, Tried, band_dataset, chaotic_bands
 from saltus.systems import Harmonic, Load, System
 
-REGION = (4.0, 4.0)
+WINDOW = ((-4.0, 4.0), (-4.0, 4.0))
 
 
 def bands(system, path, bounds, count=9, starts=4):
-    return chaotic_bands(system, path, bounds, count=count, starts=starts, region=REGION)
+    return chaotic_bands(system, path, bounds, count=count, starts=starts, window=WINDOW)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_results_do_not_depend_on_the_run(quasi_periodic_band):
         ({"bounds": (0.5, np.nan)}, "the smaller one first"),
         ({"count": 0}, "count must"),
         ({"starts": 1.5}, "starts must be a whole number"),
-        ({"region": 3}, "region must be two half widths"),
+        ({"window": 3}, "window must be"),
         ({"system": System(model=forced(1.0).model, load=Load(vertical=-0.5))}, "give the Load a frequency"),
     ],
 )

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from shared_systems import forced
 
+from saltus.checks import check_window
 from saltus.errors import ParameterError
 from saltus.orbits import find_orbit, search_orbits
 from saltus.studies.chart import chart as charts
@@ -56,7 +57,9 @@ def test_every_motion_is_a_stable_orbit_to_newtons_method(W):
 @pytest.mark.parametrize(("W", "horizontal"), [(1.0, 0.07), (1.0, 0.2), (4.0, 0.2), (4.0, 0.07)])
 def test_a_cell_has_what_a_search_from_other_states_finds(W, horizontal):
     here = row(W).sel(horizontal=horizontal, vertical=-0.5)
-    found = search_orbits(forced(H=horizontal, W=W), V, [-0.5], max_period=6, starts=60, region=(2.0, 2.0), seed=7, repelling=0)
+    found = search_orbits(
+        forced(H=horizontal, W=W), V, [-0.5], max_period=6, starts=60, window=((-2.0, 2.0), (-2.0, 2.0)), seed=7, repelling=0
+    )
     known = sorted(orbit.amplitude for orbit in found.orbits if orbit.stable and orbit.amplitude >= charts.LEAST)
     assert known
     own = [amplitude for amplitude, *_ in motions(here)]
@@ -78,7 +81,11 @@ def test_without_a_horizontal_load_motions_are_the_deformed_equilibria():
 
 def test_motions_are_followed_from_cell_to_cell_where_nothing_else_leads_to_them():
     horizontal = np.linspace(0.02, 0.1, 17)
-    options = {"vertical": [-0.5], "starts": 1, "region": (0.02, 0.02)}  # states that are captured below Hcr = 0.088
+    options = {
+        "vertical": [-0.5],
+        "starts": 1,
+        "window": ((-0.02, 0.02), (-0.02, 0.02)),
+    }  # states that are captured below Hcr = 0.088
     alone = [int(stability_chart(forced(1.0), horizontal=[value], **options)["count"][0, 0]) for value in horizontal[:6]]
     assert sum(alone) == 0
     together = stability_chart(forced(1.0), horizontal=horizontal, **options)
@@ -179,8 +186,8 @@ def test_tracks_that_come_together_go_on_as_one_that_stands_for_all():
     assert len(apart.cell) == 5
 
 
-def test_starts_fill_the_region_and_what_is_close_to_the_contact():
-    states = starts(forced(1.0), 12, (2.0, 1.0), 3)
+def test_starts_fill_the_window_and_what_is_close_to_the_contact():
+    states = starts(forced(1.0), 12, check_window(((-2.0, 2.0), (-1.0, 1.0)), forced(1.0)), 3)
     assert (np.abs(states) <= [2.0, 1.0]).all()
     assert np.abs(states[::2, 0]).max() > 1.0
     assert np.abs(states[-1]).max() <= 0.02
@@ -189,9 +196,9 @@ def test_starts_fill_the_region_and_what_is_close_to_the_contact():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"horizontal": [0.2, 0.1]}, "horizontal must be rising"),
-        ({"vertical": []}, "vertical must be rising"),
-        ({"vertical": "many"}, "vertical must be rising"),
+        ({"horizontal": [0.2, 0.1]}, "horizontal must be numbers that rise"),
+        ({"vertical": []}, "vertical must be numbers that rise"),
+        ({"vertical": "many"}, "vertical must be numbers that rise"),
         ({"paths": (H, H)}, "two parameters"),
         ({"paths": (H, "load.vertikal")}, "vertikal"),
         ({"max_period": 17}, "at most 16"),
@@ -201,7 +208,7 @@ def test_starts_fill_the_region_and_what_is_close_to_the_contact():
         ({"rows": 0}, "rows"),
         ({"periods": 0}, "periods"),
         ({"seed": -1}, "seed"),
-        ({"region": (1.0, -1.0)}, "region"),
+        ({"window": (1.0, -1.0)}, "window"),
         ({"paths": ("model.beta0", V), "horizontal": [1.0, 4.0]}, "beta0"),
     ],
 )

@@ -52,9 +52,9 @@ GOOD = {"path": FREQUENCY, "bounds": (0.5, 1.5)}
         ({"values": []}, "values must be numbers"),
         ({"values": 1.0}, "values must be numbers"),
         ({"values": ["a"]}, "values must be numbers"),
-        ({"region": 1.0}, "region must be two"),
-        ({"region": (1.0, -1.0)}, "region must be two"),
-        ({"region": (1.0, math.inf)}, "region must be two"),
+        ({"window": 1.0}, "window must be"),
+        ({"window": ((1.0, -1.0), (-1.0, 1.0))}, "window must be"),
+        ({"window": ((-1.0, math.inf), (-1.0, 1.0))}, "window must be"),
         ({"progress": 3}, "progress must be a function"),
     ],
 )

@@ -11,9 +11,8 @@ import numpy as np
 from saltus.attractors.attractor import REST, Attractor, Attractors, Target
 from saltus.attractors.attractors_dataset import coordinate, provenance
 from saltus.attractors.find import find_attractors
-from saltus.checks import check_number
+from saltus.checks import Rectangle, check_number
 from saltus.errors import ParameterError
-from saltus.orbits import REGION
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ def attractors_along(
     path: str,
     values: Iterable[float],
     *,
-    region: tuple[float, float] = REGION,
+    window: Rectangle | None = None,
     starts: int = 128,
     max_period: int = 16,
     seed: int = 0,
@@ -62,7 +61,7 @@ def attractors_along(
         system: what moves.
         path: dotted path of the parameter.
         values: of the parameter, increasing or decreasing: identities are kept from each to the next.
-        region, starts, max_period, seed, tol: as for `attractors`.
+        window, starts, max_period, seed, tol: as for `attractors`.
         known: branches along the same parameter, whose stable orbits count at every value.
         threshold: the largest relative distance of one and the same attractor at neighbouring values.
         progress: called with the fraction done.
@@ -83,7 +82,7 @@ def attractors_along(
     for i, value in enumerate(grid):
         here = find_attractors(
             system.with_({path: float(value)}),
-            region=region,
+            window=window,
             starts=starts,
             max_period=max_period,
             seed=seed,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import Window
 from saltus.orbits import PeriodicOrbit
 from saltus.systems import System
 
@@ -136,7 +137,7 @@ class Attractors:
     states: np.ndarray  # (n, 2): the initial states that were sampled
     assigned: np.ndarray  # (n,): the label of the attractor on which each ends, or UNDECIDED
     carried: np.ndarray  # (k,): the same of the further states that were given
-    region: tuple[float, float]
+    window: Window  # of the initial states
     seed: int
     tol: float
     reasons: tuple[str, ...]  # why motions are undecided

@@ -28,7 +28,7 @@ def attractors_dataset(found: Attractors) -> xarray.Dataset:
     }
     attributes = provenance(found.system, "attractors") | {
         "tol": found.tol,
-        "region": list(found.region),
+        "window": np.ravel(found.window).tolist(),
         "seed": found.seed,
         "undecided": found.undecided,
         "reasons": list(found.reasons),

@@ -1,4 +1,4 @@
-"""The attractors of a system: found from a region of initial states, certified, counted, and joined with the known orbits."""
+"""The attractors of a system: found from a window of initial states, certified, counted, and joined with the known orbits."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from saltus.attractors.attractor import REST, UNDECIDED, Attractors
 from saltus.attractors.registry import FAILED, OPEN, Collection
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.checks import check_count, check_number, check_states, checked_by
+from saltus.checks import Rectangle, check_count, check_number, check_states, check_window, checked_by
 from saltus.errors import ParameterError
 from saltus.flow import find_recurrence
-from saltus.orbits import REGION, Branch, PeriodicOrbit, check_region, initial_states
+from saltus.orbits import Branch, PeriodicOrbit, initial_states
 from saltus.systems import System
 
 FIRST, SECOND = 400, 4000  # forcing periods in which motions may settle; those that have not then get the second
@@ -23,14 +23,14 @@ MOST_VERDICTS = 8  # of motions that never settle: each takes seconds
 
 
 def _check(
-    system: System, region: Any, starts: int, max_period: int, seed: int, known: Any, also: Any, tol: float, progress: object
+    system: System, window: Any, starts: int, max_period: int, seed: int, known: Any, also: Any, tol: float, progress: object
 ) -> None:
     with_clock(system)
     check_states("also", also)
     check_count("starts", starts, 1)
     check_count("max_period", max_period, 1, 16)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
-    check_region(region)
+    check_window(window, system)
     check_count("seed", seed, 0)
     _known(system, known)
 
@@ -39,7 +39,7 @@ def _check(
 def find_attractors(
     system: System,
     *,
-    region: tuple[float, float] = REGION,
+    window: Rectangle | None = None,
     starts: int = 256,
     max_period: int = 16,
     seed: int = 0,
@@ -48,7 +48,7 @@ def find_attractors(
     tol: float = 1e-11,
     progress: Callable[[float], object] | None = None,
 ) -> Attractors:
-    """The attractors on which motions from a region of initial states at phase 0 end, each certified, with its share of them.
+    """The attractors on which motions from a window of initial states at phase 0 end, each certified, with its share of them.
 
     Rest is one by proof (`capture_speed`, or no load that ever pulls); a cycle, by its own equations, solved to rounding, with
     multipliers inside the unit circle; what never settles, by the verdict of `classify`, if areas shrink. What none bears out is
@@ -57,8 +57,8 @@ def find_attractors(
 
     Args:
         system: what moves: any model of one coordinate, under a load with a frequency or a constant one.
-        region: half widths, of the coordinate and of its velocity, of the rectangle around the contact (or 0) that is covered
-            evenly by initial states.
+        window: of the state plane, ((least, largest coordinate), (least, largest velocity)), covered evenly by initial states; by
+            default that of half widths 1.5 around the contact, or around 0 without one.
         starts: how many.
         max_period: the longest period of a cycle, at most 16.
         seed: shifts the states.
@@ -71,11 +71,11 @@ def find_attractors(
         ParameterError: several coordinates, a load that never repeats, known orbits of another system, numbers without meaning.
     """
     clock, further = with_clock(system), check_states("also", also)
-    widths = check_region(region)
+    area = check_window(window, system)
     given = _known(system, known)
     say = progress or (lambda _: None)
     say(0.0)
-    states = initial_states(clock, starts, widths, seed)
+    states = initial_states(clock, starts, area, seed)
     collection = Collection(clock)
     for orbit in given:
         collection.add_orbit(orbit)
@@ -86,7 +86,7 @@ def find_attractors(
     ends = np.array([label_of.get(int(place), UNDECIDED) for place in places], dtype=int)
     members = collection.members(label_of, counts, starts)
     say(1.0)
-    return Attractors(system, members, states, ends[:starts], ends[starts:], widths, seed, tol, tuple(collection.reasons))
+    return Attractors(system, members, states, ends[:starts], ends[starts:], area, seed, tol, tuple(collection.reasons))
 
 
 def _places(

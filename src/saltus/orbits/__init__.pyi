@@ -6,7 +6,7 @@ from .newton import solve
 from .orbit import PeriodicOrbit
 from .problem import Problem
 from .resting import RestingOrbit
-from .search import EVEN, REGION, Search, check_region, initial_states, same_orbit, search_orbits
+from .search import EVEN, Search, initial_states, same_orbit, search_orbits
 from .signature import Signature
 from .special import Evidence, SpecialPoint
 from .special_curve import Locus
@@ -17,7 +17,6 @@ from .verify import defects
 
 __all__ = [
     "EVEN",
-    "REGION",
     "STEP",
     "Branch",
     "Cascade",
@@ -30,7 +29,6 @@ __all__ = [
     "Search",
     "Signature",
     "SpecialPoint",
-    "check_region",
     "continue_orbit",
     "continue_special",
     "defects",

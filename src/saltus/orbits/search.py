@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_count
+from saltus.checks import Rectangle, Window, check_count, check_window
 from saltus.errors import ParameterError
 from saltus.flow import RECURRENCE, Recurrence, find_recurrence
 from saltus.orbits.find import orbit_from
@@ -17,7 +17,6 @@ from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.systems import System
 
-REGION = (1.5, 1.5)  # half widths of the region of initial states: of the first coordinate and of its velocity
 SETTLE = 200  # forcing periods before the motion is taken to have settled
 TRANSIENT = 24  # forcing periods of each motion in which near returns are looked for
 RETURN = 0.15  # distance of a near return from which Newton's method is tried for an orbit that repels
@@ -51,7 +50,7 @@ class Search:
     values: np.ndarray  # of the parameter
     starts: int  # at each value
     max_period: int  # forcing periods
-    region: tuple[float, float]
+    window: Window  # of the state plane
     seed: int
     unsettled: np.ndarray  # (values,): how many motions did not settle on an orbit of up to so many periods: slow or chaotic;
     at_rest: np.ndarray  # (values,): how many came to rest
@@ -62,7 +61,7 @@ class Search:
         stable = sum(orbit.stable for orbit in self.orbits)
         return (
             f"Search({len(self.orbits)} orbits, {stable} of them stable, of periods {kinds}; from {self.starts} states in "
-            f"{self.region} at each of {len(self.values)} values of {self.path}, seed {self.seed})"
+            f"{tuple(self.window)} at each of {len(self.values)} values of {self.path}, seed {self.seed})"
         )
 
 
@@ -73,31 +72,31 @@ def search_orbits(
     *,
     max_period: int = 6,
     starts: int = 48,
-    region: tuple[float, float] = REGION,
+    window: Rectangle | None = None,
     seed: int = 0,
     repelling: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Search:
     """Periodic orbits of up to `max_period` forcing periods at several values of a parameter, each once for each value.
 
-    Initial states are spread evenly (a sequence of low discrepancy) over the region around the contact, or around 0 for a
-    model without one. Motions that settle lead to the attracting orbits. Returns of the motions near to where they were, on
-    their way or in chaos, are first guesses for Newton's method, which finds repelling ones, of up to `repelling` forcing
-    periods (by default `max_period`; 0 looks for none).
+    Initial states are spread evenly (a sequence of low discrepancy) over a window of the state plane, by default that of half
+    widths 1.5 around the contact, or around 0 for a model without one. Motions that settle lead to the attracting orbits.
+    Returns of the motions near to where they were, on their way or in chaos, are first guesses for Newton's method, which finds
+    repelling ones, of up to `repelling` forcing periods (by default `max_period`; 0 looks for none).
 
     Raises:
         ParameterError: an unknown parameter, no values, an effort without meaning.
     """
     for name, number in (("max_period", max_period), ("starts", starts)):
         check_count(name, number, 1)
-    region = check_region(region)
+    area = check_window(window, system)
     system.get(path)
     grid = np.atleast_1d(np.asarray(list(values), dtype=float))
     if not grid.size or not np.isfinite(grid).all():
         raise ParameterError(f"values must be numbers of {path} at which to search, got {grid.tolist()}", "values")
     if len(system.model.coordinates) > 1:
         raise ParameterError("search_orbits works on models with one coordinate; use find_orbit from your own states")
-    states = initial_states(system, starts, region, seed)
+    states = initial_states(system, starts, area, seed)
     early, late = _follow(system, path, grid, states, max_period)
     assert late.extrema is not None
     excursion = np.abs(late.extrema - _contact(system)[0]).max(axis=(1, 2))
@@ -120,32 +119,20 @@ def search_orbits(
             progress((i + 1) / len(grid))
     columns = np.array(settled, dtype=float).reshape(-1, 4).T
     dots = Settled(columns[0], columns[1].astype(int), columns[2], columns[3])
-    return Search(path, tuple(found), grid, starts, max_period, region, seed, unsettled, at_rest, dots)
+    return Search(path, tuple(found), grid, starts, max_period, area, seed, unsettled, at_rest, dots)
 
 
-def check_region(region: Any) -> tuple[float, float]:
-    """The half widths of a region of initial states: two finite numbers above 0."""
-    try:
-        widths = tuple(float(x) for x in region)
-    except (TypeError, ValueError):
-        widths = ()
-    if len(widths) != 2 or not all(0.0 < w < np.inf for w in widths):
-        raise ParameterError(
-            f"region must be two half widths above 0, of the coordinate and of the velocity, got {region!r}", "region"
-        )
-    return widths[0], widths[1]
-
-
-def initial_states(system: System, count: int, region: tuple[float, float], seed: int) -> np.ndarray:
-    """(count, 2): coordinates and velocities spread over the region, on the side of the contact where motions are."""
+def initial_states(system: System, count: int, window: Window, seed: int) -> np.ndarray:
+    """(count, 2): coordinates and velocities spread over a window; those beyond a one-sided contact are reflected at it."""
     offset = np.random.default_rng(seed).random(2)
     points = 2.0 * ((offset + np.arange(1, count + 1)[:, None] * EVEN) % 1.0) - 1.0
-    states = points * np.asarray(region)
+    contact = _contact(system)
+    states = points * window.half + (window.centre - contact)
     model = system.model
     if len(model.sides) == 1:
         inward = np.sign(float(model.gap(model.contact + 1.0, model.sides[0])))
         states[:, 0] = inward * np.abs(states[:, 0])
-    return states + np.array([_contact(system)[0], 0.0])
+    return np.asarray(states + contact)
 
 
 def _contact(system: System) -> np.ndarray:

@@ -14,14 +14,15 @@ from saltus.attractors.attractors_dataset import attractor_table, coordinate, la
 from saltus.attractors.basins.labelling import label_states
 from saltus.attractors.find import find_attractors
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.checks import check_axis, check_count, check_number, checked_by
+from saltus.checks import Window, check_axis, check_count, check_number, check_window, checked_by
 from saltus.errors import ParameterError
-from saltus.orbits import REGION
 from saltus.systems import System, reversed_system
 
 if TYPE_CHECKING:
     import xarray
 
+CELLS = 201  # along an axis for which no numbers are given
+NARROWEST = 1e-6  # half width of a window around a grid of one point
 PERIODS = 500
 WITHIN = 1e-2
 MOST_NEW = 64  # states of cells that end nowhere known from which new attractors are looked for, at a time
@@ -75,7 +76,7 @@ def basins_of_attraction(
 
     Args:
         system: what moves, as for `attractors`.
-        velocity: the velocities of the grid, increasing; by default 201 over the region of `found`, or of `attractors`.
+        velocity: the velocities of the grid, increasing; by default 201 over the window of `found`, or of `attractors`.
         found: the attractors and their labels; by default those that `attractors` finds, over the grid.
         periods: the most forcing periods of each motion.
         within: that distance, in the larger of coordinate and velocity.
@@ -99,8 +100,7 @@ def basins_of_attraction(
     say = progress or (lambda _: None)
     say(0.0)
     if found is None:
-        widths = tuple(float(max(np.abs(a - m).max(), 1e-6)) for a, m in zip(grid[::-1], _middle(clock), strict=True))
-        found = find_attractors(system, region=(widths[0], widths[1]), tol=tol, progress=lambda done: say(0.1 * done))
+        found = find_attractors(system, window=_around(clock, grid), tol=tol, progress=lambda done: say(0.1 * done))
     if compute is None:
         label, time = _all_cells(clock, found.targets, grid, periods, within, tol, lambda done: say(0.1 + 0.8 * done))
     else:
@@ -234,8 +234,11 @@ def _relabelled(new: list[Attractor], first: int) -> list[Attractor]:
     ]
 
 
-def _middle(system: System) -> tuple[float, float]:
-    return (float(system.model.contact) if system.model.sides else 0.0), 0.0
+def _around(system: System, grid: Grid) -> Window:
+    """The least window around the contact that holds a grid."""
+    contact = check_window(None, system).centre[0]
+    wide, fast = (float(max(np.abs(a - m).max(), NARROWEST)) for a, m in ((grid[1], contact), (grid[0], 0.0)))
+    return Window((contact - wide, contact + wide), (-fast, fast))
 
 
 def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: Attractors | None) -> Grid:
@@ -246,13 +249,13 @@ def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: 
             raise ParameterError(
                 f"{type(system.model).__name__} has no coordinate {other!r}; give {name}=... and velocity=...", other
             )
-    widths = REGION if found is None else found.region
-    place, _ = _middle(system)
-    along = place + widths[0] * np.linspace(-1.0, 1.0, 201)
+    window = check_window(None if found is None else found.window, system)
+    along = window.centre[0] + window.half[0] * np.linspace(-1.0, 1.0, CELLS)
     if system.model.sides:
         along = along[np.max([np.asarray(system.model.gap(along, s)) for s in system.model.sides], axis=0) >= 0.0]
-    speeds = widths[1] * np.linspace(-1.0, 1.0, 201) if velocity is None else velocity
-    return check_axis("velocity", speeds), check_axis(name, coordinates.get(name, along))
+    speeds = window.centre[1] + window.half[1] * np.linspace(-1.0, 1.0, CELLS) if velocity is None else velocity
+    places = coordinates.get(name)
+    return check_axis("velocity", speeds), check_axis(name, along if places is None else places)
 
 
 def _dataset(

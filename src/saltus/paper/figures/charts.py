@@ -22,7 +22,7 @@ from saltus.plots import (
     styled,
 )
 
-REGION = (2.0, 2.0)  # of the initial states
+WINDOW = ((-2.0, 2.0), (-2.0, 2.0))  # of the initial states
 LOWEST = -2.0  # V
 WIDEST = 0.5  # Hhat
 FAST = 2.0  # Omega from which the closed form of the onset is drawn too
@@ -57,7 +57,7 @@ def panel(
 
     here = system(beta0, damping, frequency)
     horizontal, vertical = np.linspace(0.0, widest, size), np.linspace(LOWEST, 0.0, size)
-    tree = bordered_chart(here, curves=curves, horizontal=horizontal, vertical=vertical, **({"region": REGION} | options))
+    tree = bordered_chart(here, curves=curves, horizontal=horizontal, vertical=vertical, **({"window": WINDOW} | options))
     tree["static"].attrs |= {"what": "quasi-static borders", "saltus_version": tree["chart"].attrs["saltus_version"]}
     tree.attrs = {"system": here.to_json(), "beta0_degrees": beta0, "damping": damping, "frequency": frequency}
     return tree

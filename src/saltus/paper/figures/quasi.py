@@ -27,7 +27,9 @@ def compute(windows: Mapping[str, tuple[float, float]] = WINDOWS, count: int = C
     systems = {"a": spectra.under_force(amplitude=0.2), "b": spectra.on_ground(amplitude=0.5)}
     panels = {}
     for name, window in windows.items():
-        found = chaotic_bands(systems[name], spectra.FREQUENCY, window, count=count, starts=starts, region=(1.0, 1.0))
+        found = chaotic_bands(
+            systems[name], spectra.FREQUENCY, window, count=count, starts=starts, window=((-1.0, 1.0), (-1.0, 1.0))
+        )
         tree = xr.DataTree.from_dict(found.to_datasets())
         tree.attrs = {"system": systems[name].to_json(), "bounds": list(window), "torus": excludes_tori(systems[name]) or ""}
         panels[name] = tree

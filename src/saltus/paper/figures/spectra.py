@@ -7,7 +7,10 @@ from typing import Any
 
 from saltus.paper.figures import motions
 
-REGION = (4.0, 4.0)  # of the states from which motions are searched: large ones attract little of what starts nearer to rest
+WINDOW = (
+    (-4.0, 4.0),
+    (-4.0, 4.0),
+)  # of the states from which motions are searched: large ones attract little of what starts nearer to rest
 BETA0, DAMPING, VERTICAL = 80.0, 0.1, -0.5  # degrees, C, Vbar
 FREQUENCY, AMPLITUDE = "load.frequency", "load.horizontal.amplitude"
 
@@ -44,7 +47,7 @@ def spectrum(system: Any, bounds: tuple[float, float], **options: Any) -> Any:
     """The response spectrum of a system over its frequency as a panel, in units of theta_st or theta_eq, with knots and jumps."""
     from saltus.studies import response_spectrum
 
-    tree = panel(response_spectrum(system, FREQUENCY, bounds, **({"region": REGION} | options)), scale=static_scale(system))
+    tree = panel(response_spectrum(system, FREQUENCY, bounds, **({"window": WINDOW} | options)), scale=static_scale(system))
     return with_groups(tree, {"knots": motions.knots(tree), "jumps": motions.jumps(tree)})
 
 
@@ -52,7 +55,7 @@ def diagram(system: Any, bounds: tuple[float, float], **options: Any) -> Any:
     """The bifurcation diagram of a system over the amplitude of the horizontal load as a panel, in radians."""
     from saltus.studies import bifurcation_diagram
 
-    return panel(bifurcation_diagram(system, AMPLITUDE, bounds, **({"region": REGION} | options)), scale=1.0)
+    return panel(bifurcation_diagram(system, AMPLITUDE, bounds, **({"window": WINDOW} | options)), scale=1.0)
 
 
 def static_scale(system: Any) -> float:

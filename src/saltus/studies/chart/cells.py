@@ -1,6 +1,6 @@
 """The cells of a stability chart: which stable motions there are under each pair of values of two parameters.
 
-Every cell is tried from states spread over a region, then from the motions of its neighbours, until these add nothing new.
+Every cell is tried from states spread over a window, then from the motions of its neighbours, until these add nothing new.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import Window, check_window
 from saltus.flow import simulate_many
 from saltus.orbits import initial_states
 from saltus.systems import System
 
 MOTIONS = 8  # kept of each cell, the largest ones
-INNERMOST = 1e-2  # every other start lies in a smaller copy of the region, down to this part of it
+INNERMOST = 1e-2  # every other start lies in a smaller copy of the window, down to this part of it
 STAGES = (1 / 20, 1 / 20, 1 / 10, 4 / 5)  # of the forcing periods, after which motions that have come together go on as one
 AT_ONCE, FEWER_STAGES = 500, (1 / 10, 9 / 10)  # for no more tracks than so many
 PATIENCE, FEW = 4, 3  # times the periods for what is left of a cell, if no more than so many: slow, and not chaotic
@@ -94,16 +95,18 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
         parameters={path: values.ravel() for path, values in zip(arguments["paths"].values(), grid, strict=True)},
         **{name: arguments[name] for name in ("max_period", "least", "periods", "tol", "threads")},
     )
-    states = starts(task.system, arguments["starts"], tuple(arguments["region"]), arguments["seed"])
+    states = starts(
+        task.system, arguments["starts"], check_window(np.reshape(arguments["window"], (2, 2)), task.system), arguments["seed"]
+    )
     found = settle(task, np.repeat(np.arange(task.size), len(states)), np.tile(states, (task.size, 1)))
     motions = from_neighbours(task, found, grid[0].shape)
     made = table(found, motions, task.size)
     return {name: values.reshape(*grid[0].shape, *values.shape[1:]) for name, values in made.items()}
 
 
-def starts(system: System, count: int, region: tuple[float, float], seed: int) -> np.ndarray:
-    """(count, 2): states spread over the region, every other one drawn in towards the contact, the last of them to 1 %."""
-    states = initial_states(system, count, region, seed)
+def starts(system: System, count: int, window: Window, seed: int) -> np.ndarray:
+    """(count, 2): states spread over the window, every other one drawn in towards the contact, the last of them to 1 %."""
+    states = initial_states(system, count, window, seed)
     contact = np.array([float(system.model.contact) if system.model.sides else 0.0, 0.0])
     inner = states[1::2]
     inner[:] = contact + (inner - contact) * np.geomspace(1.0, INNERMOST, len(inner) + 1)[1:, None]

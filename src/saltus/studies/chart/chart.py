@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_along, check_axis, check_count, check_number, check_path, checked_by
+from saltus.checks import Rectangle, check_along, check_axis, check_count, check_number, check_path, check_window, checked_by
 from saltus.errors import ParameterError
-from saltus.orbits import REGION, check_region
 from saltus.studies.chart.cells import MOTIONS
 from saltus.systems import System
 
@@ -56,7 +55,7 @@ def stability_chart(
     paths: tuple[str, str] = ("load.horizontal.amplitude", "load.vertical"),
     max_period: int = LONGEST,
     starts: int = STARTS,
-    region: tuple[float, float] = REGION,
+    window: Rectangle | None = None,
     least: float = LEAST,
     periods: int | None = None,
     tol: float = TOL,
@@ -69,7 +68,7 @@ def stability_chart(
 ) -> xarray.Dataset:
     """The largest amplitude of the stable motions beside rest, and their number, over the plane of two parameters (Figs. 14, 15).
 
-    In every cell motions are followed from `starts` initial states, spread evenly over the region and drawn in towards the
+    In every cell motions are followed from `starts` initial states, spread evenly over the window and drawn in towards the
     contact, and from every stable motion of the neighbouring cells of the same chunk, until that adds nothing new. So a motion
     is followed to where its stability ends, even where next to nothing leads to it. Deformed equilibria, under no
     horizontal load, are motions too.
@@ -82,7 +81,7 @@ def stability_chart(
         horizontal, vertical: the values along the two axes, by default 101 from 0 to 0.5 and from -2 to 0.
         paths: the dotted paths of the parameters along them.
         max_period: the longest period of a motion, in forcing periods; what repeats later counts as unsettled.
-        starts, region, seed: initial states, as `search_orbits` takes them.
+        starts, window, seed: initial states, as `search_orbits` takes them.
         least: the smallest amplitude that counts.
         periods: forcing periods after which a motion that has not settled counts as unsettled; by default what the damping takes.
         tol: the error of a step, see `simulate_many`.
@@ -110,7 +109,7 @@ def stability_chart(
         paths=paths,
         max_period=max_period,
         starts=starts,
-        region=region,
+        window=window,
         least=least,
         periods=settling(system) if periods is None else periods,
         tol=tol,
@@ -137,7 +136,8 @@ def plan(system: System, horizontal: Any, vertical: Any, *, paths: tuple[str, st
     axes = {"vertical": check_axis("vertical", vertical), "horizontal": check_axis("horizontal", horizontal)}
     check_options(system, paths, axes, rows=rows, **options)
     named = {"vertical": paths[1], "horizontal": paths[0]}
-    arguments = {"system": system.to_json(), "paths": named, **options, "region": list(options["region"]), "threads": None}
+    options["window"] = np.ravel(check_window(options["window"], system)).tolist()
+    arguments = {"system": system.to_json(), "paths": named, **options, "threads": None}
     said = {"title": "stability chart computed by saltus", "saltus_version": __version__, **arguments}
     return Plan(
         function=CELLS,
@@ -193,7 +193,7 @@ def check_options(system: Any, paths: Any, axes: dict[str, np.ndarray], **option
         raise ParameterError(f"max_period must be at most 16 forcing periods, got {options['max_period']}", "max_period")
     check_number("least", options["least"], above=0.0)
     check_number("tol", options["tol"], at_least=1e-15, at_most=1e-6)
-    check_region(options["region"])
+    check_window(options["window"], system)
 
 
 def monostable(chart: xarray.Dataset) -> xarray.DataArray:

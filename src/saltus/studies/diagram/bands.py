@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import largest_exponents
-from saltus.checks import check_count
+from saltus.checks import Rectangle, Window, check_count, check_window
 from saltus.flow import simulate_many
-from saltus.orbits import REGION, check_region, initial_states
+from saltus.orbits import initial_states
 from saltus.progress import silent
 from saltus.studies.checks import check_diagram
 from saltus.systems import System
@@ -102,7 +102,7 @@ def chaotic_bands(
     *,
     count: int = 121,
     starts: int = 8,
-    region: tuple[float, float] = REGION,
+    window: Rectangle | None = None,
     seed: int = 0,
     progress: Callable[[float], object] | None = None,
 ) -> Bands:
@@ -120,7 +120,7 @@ def chaotic_bands(
         system: what moves, with one coordinate, under a load with a frequency.
         path, bounds: dotted path of the parameter, and its range.
         count: of values, evenly from the first bound to the last.
-        starts, region, seed: initial states, as `search_orbits` takes them.
+        starts, window, seed: initial states, as `search_orbits` takes them.
         progress: called with the fraction done.
 
     Raises:
@@ -128,9 +128,9 @@ def chaotic_bands(
     """
     bounds = check_diagram(system, path, bounds, starts=starts, seed=seed)
     check_count("count", count, 1)
-    region = check_region(region)
+    window = check_window(window, system)
     say = progress or (lambda share: None)
-    search = _Search(system, path, starts, region, seed)
+    search = _Search(system, path, starts, window, seed)
     tried = search.spread(search.at(np.linspace(*bounds, count), progress=lambda share: say(0.7 * share)))
     say(0.8)
     bands = search.edges(tried)
@@ -143,13 +143,13 @@ class _Search:
     system: System
     path: str
     starts: int
-    region: tuple[float, float]
+    window: Window
     seed: int
     states: np.ndarray = field(init=False)
     asked: set[tuple[int, int]] = field(default_factory=set)  # from which value of the grid to which chaos was carried on
 
     def __post_init__(self) -> None:
-        self.states = initial_states(self.system, self.starts, self.region, self.seed)
+        self.states = initial_states(self.system, self.starts, self.window, self.seed)
 
     def at(
         self, values: np.ndarray, states: np.ndarray | None = None, progress: Callable[[float], object] | None = None

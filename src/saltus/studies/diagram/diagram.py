@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_bounds, check_number, checked_by
+from saltus.checks import Rectangle, check_bounds, check_number, check_window, checked_by
 from saltus.errors import ParameterError
-from saltus.orbits import REGION, STEP, check_region, search_orbits
+from saltus.orbits import STEP, search_orbits
 from saltus.studies.checks import check_diagram
 from saltus.studies.diagram.bands import chaotic_bands
 from saltus.studies.diagram.branch_set import Atlas
@@ -26,12 +26,12 @@ SEARCHED, FOLLOWED, CONFIRMED = 0.3, 0.7, 0.9  # shares of the work done after t
 
 
 def _check(
-    system: System, path: str, bounds: Any, values: Any, region: Any, step: float, switch: bool, progress: object, **efforts: int
+    system: System, path: str, bounds: Any, values: Any, window: Any, step: float, switch: bool, progress: object, **efforts: int
 ) -> None:
     bounds = check_diagram(system, path, bounds, **efforts)
     check_number("step", step, above=0.0)
     _values(bounds, values)
-    check_region(region)
+    check_window(window, system)
     if not (progress is None or callable(progress)):
         raise ParameterError(f"progress must be a function of the fraction done and of what is being done, got {progress!r}")
 
@@ -45,7 +45,7 @@ def orbit_diagram(
     max_period: int = 6,
     values: Iterable[float] | None = None,
     starts: int = STARTS,
-    region: tuple[float, float] = REGION,
+    window: Rectangle | None = None,
     seed: int = 0,
     repelling: int = 1,
     switch: bool = True,
@@ -66,7 +66,7 @@ def orbit_diagram(
         path: dotted path of the parameter.
         bounds: its range.
         max_period: the longest period, in forcing periods.
-        values, starts, region, seed: where is searched, see `search_orbits`; values within the bounds.
+        values, starts, window, seed: where is searched, see `search_orbits`; values within the bounds.
         repelling: up to which period repelling orbits are searched for.
         switch: whether branches are followed that are born at special points.
         step: the longest step along a branch.
@@ -86,7 +86,7 @@ def orbit_diagram(
         ParameterError: an argument without meaning.
     """
     low, high = check_bounds(bounds)
-    grid, region = _values((low, high), values), check_region(region)
+    grid = _values((low, high), values)
     say = progress or (lambda share, what: None)
     say(0.0, "searching")
     found = search_orbits(
@@ -95,7 +95,7 @@ def orbit_diagram(
         grid,
         max_period=max_period,
         starts=starts,
-        region=region,
+        window=window,
         seed=seed,
         repelling=repelling,
         progress=lambda share: say(SEARCHED * share, "searching"),
@@ -106,7 +106,7 @@ def orbit_diagram(
         lambda share: say(SEARCHED + (FOLLOWED - SEARCHED) * share, f"following, {len(atlas.branches)} branches"),
     )
     say(FOLLOWED, "looking for chaos")
-    chaos = chaotic_bands(system, path, (low, high), count=bands, region=region, seed=seed) if bands else None
+    chaos = chaotic_bands(system, path, (low, high), count=bands, window=window, seed=seed) if bands else None
     say(CONFIRMED, "confirming")
     tree = diagram_tree(system, atlas.branches, found, (low, high), chaos, max_period=max_period, left=atlas.left)
     say(1.0, "done")

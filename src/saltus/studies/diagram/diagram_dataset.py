@@ -32,7 +32,7 @@ def diagram_tree(
         "coordinate": system.model.coordinates[0],
         "bounds": list(bounds),
         "starts": found.starts,
-        "region": list(found.region),
+        "window": np.ravel(found.window).tolist(),
         "seed": found.seed,
         "saltus": saltus.__version__,
         **facts,
