@@ -5,12 +5,13 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 BENCH_READY := $(VENV)/.ready-bench
 
-.PHONY: help reproduce test thorough lint bench lock clean
+.PHONY: help reproduce test thorough release-check lint bench lock clean
 
 help:
 	@echo "make reproduce   compute and draw the paper into results/"
 	@echo "make test        lint, type-check and run the tests"
 	@echo "make thorough    run the tests that take minutes each: many structures, many random cases, whole figures"
+	@echo "make release-check   compute the whole paper anew and judge every claim at full size"
 	@echo "make bench       measure speed against other integrators, side by side"
 	@echo "make lint        ruff and mypy only"
 	@echo "make lock        renew both locks from pyproject.toml"
@@ -25,6 +26,9 @@ test: $(READY)
 
 thorough: $(READY)
 	$(BIN)/python -m pytest -m thorough
+
+release-check: $(READY)
+	$(BIN)/python -m saltus.paper.release_check
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 import xarray as xr
+from claim_verdicts import verdicts
 from spectrum_cases import branch, diagram
 
 from saltus.paper import Verdict
-from saltus.paper.claims import statements_chaos
 from saltus.paper.figures.spectra import under_force
+from saltus.paper.measures import chaos_measures
 
 
 def panel(*spans, wandering=(), bounds=(0.0, 3.0), stable=True):
@@ -31,16 +32,11 @@ def panel(*spans, wandering=(), bounds=(0.0, 3.0), stable=True):
     return tree
 
 
-def verdicts(claims):
-    return {claim.id: claim.verdict for claim in claims}
-
-
 def test_what_the_paper_calls_quasi_periodic_is_chaos_by_erratum_22_or_nothing():
-    amplitudes = {"a": 0.2, "f": 3.0}
     small, large = panel((0.36, 0.39)), panel((1.0, 1.8))
-    found = verdicts(statements_chaos.force_spectra({"a": small, "f": large}, amplitudes))
+    found = verdicts(chaos_measures.force_spectra({0.2: small, 3.0: large}))
     assert found["fig09-quasi-periodic"] is Verdict.ERRATUM
-    empty = verdicts(statements_chaos.force_spectra({"a": panel(), "f": large}, amplitudes))
+    empty = verdicts(chaos_measures.force_spectra({0.2: panel(), 3.0: large}))
     assert empty["fig09-quasi-periodic"] is Verdict.DISAGREES
 
 
@@ -55,13 +51,14 @@ def test_what_the_paper_calls_quasi_periodic_is_chaos_by_erratum_22_or_nothing()
 )
 def test_chaos_widens_with_the_load(spans, verdict):
     amplitudes = {"c": 1.0, "e": 2.0, "f": 3.0}
-    data = {name: panel(*spans[name]) for name in amplitudes}
-    assert verdicts(statements_chaos.force_spectra(data, amplitudes))["fig09-chaos"] is verdict
+    panels = {load: panel(*spans[name]) for name, load in amplitudes.items()}
+    assert verdicts(chaos_measures.force_spectra(panels))["fig09-chaos"] is verdict
 
 
 @pytest.mark.parametrize(("stable", "verdict"), [(True, Verdict.AGREES), (False, Verdict.DISAGREES)])
 def test_a_band_is_pierced_by_a_stable_motion_alone(stable, verdict):
-    assert statements_chaos.pierced("x", "here", panel((1.0, 1.5), stable=stable), "Ω").verdict is verdict
+    one = chaos_measures.pierced(panel((1.0, 1.5), stable=stable), load=3.0)
+    assert verdicts({"fig09-pierced": one}) == {"fig09-pierced": verdict}
 
 
 @pytest.mark.parametrize(
@@ -74,8 +71,7 @@ def test_a_band_is_pierced_by_a_stable_motion_alone(stable, verdict):
     ],
 )
 def test_chaos_at_high_frequency_lasts_or_is_a_transient_by_erratum_31(small, large, verdict):
-    claims = statements_chaos.ground_spectra({"a": small, "b": large}, {"a": 0.25, "b": 0.5})
-    assert verdicts(claims)["fig10-chaos"] is verdict
+    assert verdicts(chaos_measures.ground_spectra({0.25: small, 0.5: large}))["fig10-chaos"] is verdict
 
 
 @pytest.mark.parametrize(
@@ -87,13 +83,12 @@ def test_chaos_at_high_frequency_lasts_or_is_a_transient_by_erratum_31(small, la
     ],
 )
 def test_chaos_begins_at_larger_loads_for_larger_frequencies_above_the_resonance(frequencies, first, verdict):
-    data = {name: panel((start, start + 0.3)) for name, start in zip(frequencies, first, strict=True)}
-    assert verdicts(statements_chaos.force_diagrams("fig12", data, frequencies))["fig12-shift"] is verdict
+    panels = {frequency: panel((start, start + 0.3)) for frequency, start in zip(frequencies.values(), first, strict=True)}
+    assert verdicts({"fig12-shift": chaos_measures.shifts(panels)}) == {"fig12-shift": verdict}
 
 
 @pytest.mark.parametrize(
     ("spans", "verdict"), [([(1.0, 1.2), (2.0, 2.2)], Verdict.AGREES), ([(1.0, 1.2)], Verdict.DISAGREES), ([], Verdict.DISAGREES)]
 )
 def test_two_regions_of_chaos_are_parted_by_stable_motions(spans, verdict):
-    claims = statements_chaos.force_diagrams("fig11", {"a": panel(*spans)}, {"a": 1.0})
-    assert verdicts(claims)["fig11-two-regions"] is verdict
+    assert verdicts(chaos_measures.force_diagrams({1.0: panel(*spans)}))["fig11-two-regions"] is verdict

@@ -5,11 +5,12 @@ import functools
 import numpy as np
 import pytest
 import xarray as xr
+from claim_verdicts import claims_of, verdicts
 from picture_checks import check_provenance, clipped
 
 from saltus.files import write_dataset
 from saltus.paper import FIGURES, Verdict
-from saltus.paper.claims import chart_measures, statements_charts
+from saltus.paper.measures import chart_areas, chart_measures
 from saltus.plots.chart import draw_stability_chart
 from saltus.studies.chart.with_borders import static_borders
 from saltus.theory import high_frequency_onset, is_monostable, unloaded_fold
@@ -67,24 +68,24 @@ def test_the_static_border_is_that_of_the_equilibria():
 
 def test_shares_lost_are_shares_of_cells():
     panel = data()["f"]
-    here = chart_measures.cells(panel)
+    here = chart_areas.chart_cells(panel)
     by_hand = [
         (int(panel["chart"]["count"].sel(vertical=v, horizontal=h)) > 0)
-        for v in here["vertical"]
-        for h in here["horizontal"]
+        for v in here.vertical
+        for h in here.horizontal
         if is_monostable(np.deg2rad(80), h, v)
     ]
-    assert chart_measures.lost(panel) == pytest.approx(np.mean(by_hand))
-    assert here["vertical"].max() < 0 < here["horizontal"].min()
+    assert chart_areas.lost(panel) == pytest.approx(np.mean(by_hand))
+    assert here.vertical.max() < 0 < here.horizontal.min()
 
 
 def test_the_onset_read_from_curves_is_the_closed_form_and_so_is_the_share():
     panel, rows = data()["f"], np.linspace(-1.3, -0.3, 7)
     closed = [high_frequency_onset(4.0, beta0=np.deg2rad(80), vertical=float(v), damping=0.1, order=2) for v in rows]
-    np.testing.assert_allclose(chart_measures.onset(panel, rows), closed, rtol=0.02)
-    share = chart_measures.lost_by_curves(panel)
+    np.testing.assert_allclose(chart_areas.onset(panel, rows), closed, rtol=0.02)
+    share = chart_areas.lost_by_curves(panel)
     assert 0.93 < share < 1.0  # the onset is C pi^3 / (24 Omega) = 3.2 % of Hcr
-    assert np.isnan(chart_measures.onset(panel, np.array([-3.0]))).all()
+    assert np.isnan(chart_areas.onset(panel, np.array([-3.0]))).all()
 
 
 @pytest.mark.thorough
@@ -92,7 +93,7 @@ def test_statements_on_parameters_compare_charts_of_the_same_cells():
     reference = QUICK["d"] | {"widest": 0.04}
     quick = {"a": reference | {"beta0": 60.0}, "b": reference | {"damping": 0.05}, "reference": reference}
     made = FIGURES["fig15"].compute(panels=quick, size=9, curves=2, starts=4)
-    claims = {claim.id: claim for claim in statements_charts.over_parameters(made)}
+    claims = claims_of(chart_measures.over_parameters(made))
     assert claims["fig15-damping-domain"].verdict is Verdict.AGREES
     assert len(claims) == 5
     picture = FIGURES["fig15"].draw(made)
@@ -120,5 +121,5 @@ def test_agreement_is_never_one_on_nothing(total, looked, agrees):
     )
     panel = xr.DataTree.from_dict({"chart": xr.Dataset(), "disagreements": differ})
     panel.attrs["frequency"] = 1.0
-    claim = statements_charts.agreement("fig14", xr.DataTree(children={"a": panel}))
-    assert (claim.verdict is Verdict.AGREES) is agrees
+    one = chart_measures.agreement(xr.DataTree(children={"a": panel}))
+    assert (verdicts({"fig14-agreement": one})["fig14-agreement"] is Verdict.AGREES) is agrees

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from spectrum_cases import branch, diagram, folded, loop
 
-from saltus.paper.claims import features
+from saltus.paper.measures import spectrum_features as features
 
 
 def test_the_main_branch_is_the_longest_one_of_period_one():

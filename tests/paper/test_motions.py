@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from saltus.flow import simulate, simulate_many
-from saltus.paper.claims.features import detached, main_branch
 from saltus.paper.figures import motions, spectra
+from saltus.paper.measures.spectrum_features import detached, main_branch
 from saltus.studies import response_spectrum
 
 KNOT = 0.84881863  # Omega at Hhat = 0.5

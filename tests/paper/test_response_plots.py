@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from spectrum_cases import branch, diagram, folded, loop
 
+from saltus.branch_lines import smooth_lines
 from saltus.plots import conventions as style
 from saltus.plots import response
 
@@ -28,7 +29,7 @@ def axes():
 
 
 def test_runs_of_one_stability_meet_at_the_fold_between_them():
-    runs = list(response.pieces(folded()))
+    runs = list(smooth_lines(folded()))
     assert [stable for stable, _, _ in runs] == [True, False, True]
     for (_, x, y), (_, u, v), fold in zip(runs[:-1], runs[1:], [(2.0, 2.0), (1.5, 1.1)], strict=True):
         assert (x[-1], y[-1]) == pytest.approx(fold)
@@ -37,10 +38,10 @@ def test_runs_of_one_stability_meet_at_the_fold_between_them():
 
 def test_the_line_passes_every_point_and_leaves_the_range_of_its_neighbours_nowhere():
     data = folded()
-    x, y = (np.concatenate(parts) for parts in zip(*[(x, y) for _, x, y in response.pieces(data)], strict=True))
+    x, y = (np.concatenate(parts) for parts in zip(*[(x, y) for _, x, y in smooth_lines(data)], strict=True))
     for point in zip(data["parameter"].values, data["amplitude"].values, strict=True):
         assert np.hypot(x - point[0], y - point[1]).min() < 1e-12
-    (_, first, _), (_, second, _), _ = response.pieces(data)
+    (_, first, _), (_, second, _), _ = smooth_lines(data)
     assert (first.max(), second.max(), second.min()) == pytest.approx((2.0, 2.0, 1.5))
     assert y.max() == pytest.approx(2.1)
     assert y.min() == pytest.approx(0.4)
@@ -48,7 +49,7 @@ def test_the_line_passes_every_point_and_leaves_the_range_of_its_neighbours_nowh
 
 def test_a_smooth_curve_looks_smooth_between_its_points():
     angle = np.linspace(0, 2 * np.pi, 41)
-    (run,) = response.pieces(branch(1.5 + np.cos(angle), 2 + np.sin(angle), np.ones(41)))
+    (run,) = smooth_lines(branch(1.5 + np.cos(angle), 2 + np.sin(angle), np.ones(41)))
     assert np.abs(np.hypot(run[1] - 1.5, run[2] - 2) - 1).max() < 1.5e-3
     chords = 1 - np.cos(np.pi / 40)
     assert chords > 1.5e-3
@@ -56,7 +57,7 @@ def test_a_smooth_curve_looks_smooth_between_its_points():
 
 def test_a_grazing_keeps_its_corner():
     data = branch([0, 1, 2, 2, 1, 0], [0, 1, 2, 2, 3, 4], np.ones(6), crossings=[2, 2, 2, 6, 6, 6])
-    one, two = response.pieces(data)
+    one, two = smooth_lines(data)
     for _, x, y in (one, two):
         corner = (x[-1], y[-1]) if (x[-1], y[-1]) == (2, 2) else (x[0], y[0])
         assert corner == (2, 2)
@@ -65,7 +66,7 @@ def test_a_grazing_keeps_its_corner():
 
 
 def test_without_a_special_point_runs_meet_in_the_middle():
-    first, second = response.pieces(branch([0, 1, 2, 3], [1, 1, 2, 2], [1, 1, 0, 0]))
+    first, second = smooth_lines(branch([0, 1, 2, 3], [1, 1, 2, 2], [1, 1, 0, 0]))
     assert (first[1][-1], first[2][-1]) == (second[1][0], second[2][0]) == (1.5, 1.5)
 
 

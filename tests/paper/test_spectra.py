@@ -2,12 +2,13 @@
 
 import pytest
 import xarray as xr
+from claim_verdicts import claims_of
 from picture_checks import check_provenance, clipped
 from spectrum_cases import branch, diagram, folded, loop
 
 from saltus.files import write_dataset
 from saltus.paper import FIGURES, Verdict
-from saltus.paper.claims.statements_spectra import coexistence
+from saltus.paper.measures.response_measures import coexistence
 
 pytestmark = pytest.mark.thorough  # searches and branches for five figures
 QUICK = {
@@ -60,7 +61,8 @@ def test_coexistence_is_judged_by_the_motions_beyond_twice_the_critical_load(oth
     single = branch([0.0, 3.0], [0.1, 1.0], [1, 1])
     tree = diagram(single, *others)
     tree.attrs["critical"] = 0.25
-    assert coexistence("fig99", {"a": tree}, {"a": "here"}).verdict is verdict
+    assert claims_of({"fig11-coexistence": coexistence({1.0: tree})})["fig11-coexistence"].verdict is verdict
     leaning = diagram(folded())
     leaning.attrs["critical"] = 0.25
-    assert "1 at 2 Hcr, 2 at" in coexistence("fig99", {"a": leaning}, {"a": "here"}).evidence
+    claim = claims_of({"fig11-coexistence": coexistence({1.0: leaning})})["fig11-coexistence"]
+    assert "1 at 2 Hcr, 2 at" in claim.evidence

@@ -6,8 +6,9 @@ import pytest
 from saltus.errors import ParameterError
 from saltus.paper import PaperFigure, reproduce
 from saltus.paper import up_to_date as state
-from saltus.paper.claims.claim import check
-from saltus.paper.provenance import dataset, tree
+from saltus.paper.claims import claim
+from saltus.paper.claims.claim_tables import ClaimEntry, claim_tables
+from saltus.paper.figure_data import dataset, tree
 from saltus.plots.conventions import new_figure
 
 calls = []
@@ -24,12 +25,12 @@ def draw(data):
     return figure
 
 
-def claims(data):
-    return [check("line", "here", "it rises", printed=bool((np.diff(data["line"]["y"]) > 0).all()), evidence="differences")]
+def measure(data):
+    return {"line": claim.measured(bool((np.diff(data["line"]["y"]) > 0).all()))}
 
 
 def figure(**changes):
-    parts = {"name": "fig99", "title": "A line", "caption": "A line.", "compute": compute, "draw": draw, "claims": claims}
+    parts = {"name": "fig99", "title": "A line", "caption": "A line.", "compute": compute, "draw": draw, "measure": measure}
     return PaperFigure(**{**parts, **changes})
 
 
@@ -37,7 +38,10 @@ def figure(**changes):
 def registry(monkeypatch):
     calls.clear()
     figures = {"fig99": figure()}
-    monkeypatch.setattr("saltus.paper.FIGURES", figures)
+    monkeypatch.setattr("saltus.paper.parts.FIGURES", figures)
+    tables = claim_tables() | {"fig99": {"line": ClaimEntry(place="here", statement="it rises", evidence="differences")}}
+    for module in (claim, state):
+        monkeypatch.setattr(module, "claim_tables", lambda: tables)
     return figures
 
 

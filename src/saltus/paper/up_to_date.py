@@ -7,6 +7,7 @@ import hashlib
 import importlib.util
 import json
 from collections.abc import Iterable
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,17 +15,19 @@ from typing import Any
 import saltus
 from saltus.files import write_text
 from saltus.paper.claims.claim import Claim, Verdict
+from saltus.paper.claims.claim_tables import claim_tables
 from saltus.paper.figures.figure import PaperFigure
 
 FOLDER = ".saltus"  # inside the output folder
 
 
 def key(figure: PaperFigure) -> str:
-    """A fingerprint of saltus' version, of the sources of the figure and of what it imports of saltus, and of its parameters."""
+    """A fingerprint of saltus' version, the sources of the figure and of all it imports of saltus, its parameters and claims."""
     digest = hashlib.sha256(saltus.__version__.encode())
     for module in sorted(closure(figure.module)):
         digest.update(module.encode() + b"\0" + _source(module) + b"\0")
-    digest.update(json.dumps(dict(figure.parameters), sort_keys=True).encode())
+    claims = {id: asdict(entry) for id, entry in claim_tables().get(figure.name, {}).items()}
+    digest.update(json.dumps([dict(figure.parameters), claims], sort_keys=True).encode())
     return digest.hexdigest()
 
 

@@ -15,9 +15,7 @@ from .response import (
     draw_zoom,
     highest,
     lowest,
-    pieces,
     response_legend,
-    runs,
 )
 from .rocking import draw_errors, draw_jump, draw_periods
 from .time_histories import draw_histories
@@ -62,9 +60,7 @@ __all__ = [
     "lowest",
     "new_figure",
     "panel_label",
-    "pieces",
     "response_legend",
-    "runs",
     "style",
     "styled",
 ]

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from saltus.branch_lines import branches_of
 from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure, styled
-from saltus.plots.response import branches, draw_bands, draw_limits, draw_response, response_legend
+from saltus.plots.response import draw_bands, draw_limits, draw_response, response_legend
 
 NAMES = {
     "load.frequency": r"frequency $\Omega$",
@@ -51,7 +52,7 @@ def draw_diagram(tree: Any) -> Figure:
 
 def _top(tree: Any, low: float, high: float) -> float:
     """The largest amplitude within the bounds, or 1 where there is none."""
-    inside = [branch["amplitude"].values[_within(branch["parameter"].values, low, high)] for branch in branches(tree)]
+    inside = [branch["amplitude"].values[_within(branch["parameter"].values, low, high)] for _, branch in branches_of(tree)]
     found = [float(values.max()) for values in inside if values.size]
     dots = tree["attractors"]["amplitude"].values
     return max([*found, *dots[np.isfinite(dots)], 0.0]) or 1.0

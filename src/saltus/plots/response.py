@@ -6,17 +6,15 @@ They are drawn from the DataTree of a study: children `branch_...` (see `saltus.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from saltus.branch_lines import branches_of, smooth_lines
 from saltus.plots.conventions import INK, LIMIT, LIMIT_LINE, STABLE_LINE, UNSTABLE_LINE
 
-DENSER = 6  # parts into which a step of a branch is divided when it is drawn
 PLACES, AROUND = 24, 0.05  # tried for an inset along each side, and what its ticks take, in shares of the axes
 LEAST_MARK = 1.5  # mm between two marks of one kind: nearer ones are left to the zooms and to the data
-CHANGES = ("LP", "PD", "BPC", "GR", "NS")  # the kinds at which the number or the stability of motions can change
 
 QSB_LINE: dict[str, Any] = {"color": "#7b2d9b", "linestyle": (0, (3, 2)), "linewidth": 1.0}
 FARTHEST_LINE: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (1, 1.2)), "linewidth": 1.2}
@@ -39,13 +37,6 @@ MARK_NAMES = {
 }
 
 
-def branches(spectrum: Any) -> Iterator[Any]:
-    """The branches of a spectrum, as Datasets, in order."""
-    for name in sorted(spectrum.children):
-        if name.startswith("branch_"):
-            yield spectrum[name].to_dataset()
-
-
 def highest(spectrum: Any, low: float, high: float, quantity: str = "amplitude") -> float:
     """The largest value of a quantity on all branches between two values of the parameter."""
     return max(float(values.max()) for values in _inside(spectrum, low, high, quantity) if values.size)
@@ -57,76 +48,17 @@ def lowest(spectrum: Any, low: float, high: float, quantity: str = "amplitude") 
 
 
 def _inside(spectrum: Any, low: float, high: float, quantity: str) -> Iterator[np.ndarray]:
-    for branch in branches(spectrum):
+    for _, branch in branches_of(spectrum):
         x = branch["parameter"].values
         yield branch[quantity].values[(x >= low) & (x <= high)]
 
 
 def draw_branches(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
     """Every branch, stable motions in solid blue, unstable ones in dashed red; `quantity` in units of `scale`."""
-    for branch in branches(spectrum):
-        for stable, x, y in pieces(branch, quantity):
+    for _, branch in branches_of(spectrum):
+        for stable, x, y in smooth_lines(branch, quantity):
             line = STABLE_LINE if stable else UNSTABLE_LINE
             ax.plot(x, y / scale, zorder=3.2 if stable else 3.0, **line)
-
-
-def pieces(branch: Any, quantity: str = "amplitude") -> Iterator[tuple[bool, np.ndarray, np.ndarray]]:
-    """A branch as runs (stable, parameter, quantity) that meet at the special points where the stability changes.
-
-    Between their points they are monotone cubics of the length along them, so that a line that is smooth looks it.
-    """
-    for stable, _, run in runs(branch, quantity):
-        yield stable, *_smooth(run)
-
-
-def runs(branch: Any, quantity: str = "amplitude") -> Iterator[tuple[bool, range, np.ndarray]]:
-    """The runs that `pieces` draws: (stable, which points of the branch, the line's own points (n, 2)).
-
-    They are cut where the stability changes and at every grazing, where curves have corners.
-    """
-    x, y = np.asarray(branch["parameter"].values), np.asarray(branch[quantity].values)
-    stable, impacts = np.asarray(branch["stable"].values, dtype=bool), branch["impact_count"].values
-    turned = stable[1:] != stable[:-1]
-    cuts = [int(cut) + 1 for cut in np.flatnonzero(turned | (impacts[1:] != impacts[:-1]))]
-    turns = {cut: [_between(branch, quantity, cut)] if turned[cut - 1] else [] for cut in cuts}
-    for first, last in pairwise([0, *cuts, len(x)]):
-        points = [(x[k], y[k]) for k in range(first, last)]
-        before = turns.get(first, []) or [(x[first - 1], y[first - 1])] * (first > 0)
-        yield bool(stable[first]), range(first, last), np.array([*before, *points, *turns.get(last, [])])
-
-
-def _smooth(run: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A denser row of points on the monotone cubics through the given ones, (n, 2)."""
-    from scipy.interpolate import PchipInterpolator
-
-    size = np.ptp(run, axis=0)
-    steps = np.linalg.norm(np.diff(run, axis=0) / np.where(size > 0, size, 1.0), axis=1)
-    run = run[np.append(True, steps > 1e-9)]
-    if len(run) < 3:
-        return run[:, 0], run[:, 1]
-    length = np.append(0.0, np.cumsum(steps[steps > 1e-9]))
-    shares = np.arange(DENSER) / DENSER
-    along = np.append((length[:-1, None] + np.diff(length)[:, None] * shares).ravel(), length[-1])
-    dense = PchipInterpolator(length, run)(along)
-    return dense[:, 0], dense[:, 1]
-
-
-def _between(branch: Any, quantity: str, cut: int) -> tuple[float, float]:
-    """Where the stability changes between the points cut - 1 and cut: at the special point there, or in their middle."""
-    names = ("parameter", quantity)
-    a, b = (np.array([float(branch[name][k]) for name in names]) for k in (cut - 1, cut))
-    size = np.array([np.ptp(branch[name].values) or 1.0 for name in names])
-    middle = (float(a[0] + b[0]) / 2, float(a[1] + b[1]) / 2)
-    if "kind" not in branch:
-        return middle
-    known = np.isin(branch["kind"].values, CHANGES)
-    places = np.stack([branch[f"special_{name}"].values[known] for name in names], axis=1)
-    if not len(places):
-        return middle
-    detour = np.linalg.norm((places - a) / size, axis=1) + np.linalg.norm((places - b) / size, axis=1)
-    best = int(detour.argmin())
-    near = detour[best] < 3 * np.linalg.norm((b - a) / size) + 1e-3
-    return (float(places[best, 0]), float(places[best, 1])) if near else middle
 
 
 def draw_special(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
@@ -148,7 +80,7 @@ def draw_special(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: flo
 def special_places(spectrum: Any, kind: str, quantity: str = "amplitude") -> np.ndarray:
     """(parameter, quantity) of the special points of a kind on all branches, (n, 2)."""
     rows = [np.empty((0, 2))]
-    for branch in branches(spectrum):
+    for _, branch in branches_of(spectrum):
         if "kind" in branch:
             here = branch["kind"].values == kind
             columns = (branch[f"special_{name}"].values[here] for name in ("parameter", quantity))
@@ -222,8 +154,8 @@ def free_place(
     """Where in the axes an inset of a size (shares of the axes) covers least of the branches and lines."""
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
     marks = [np.empty((0, 2))]
-    for branch in branches(spectrum):
-        for _, x, y in pieces(branch, quantity):
+    for _, branch in branches_of(spectrum):
+        for _, x, y in smooth_lines(branch, quantity):
             marks.append(np.stack([(x - left) / (right - left), (y / scale - low) / (high - low)], axis=1))
     points = np.concatenate(marks)
     lines = [(line.get_ydata()[0] - low) / (high - low) for line in ax.get_lines() if len(set(line.get_ydata())) == 1]

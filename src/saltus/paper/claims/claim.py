@@ -1,12 +1,19 @@
-"""A claim: one number or statement of the paper beside what is computed here, and the verdict that follows."""
+"""A claim: a number or statement of the paper, what a figure measured for it, and the verdict that follows.
+
+What the paper says stands in the tables beside this file (see `claim_tables`); a figure or section gives one `Measured` for each
+of its claims, and `judge` joins both.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
 from decimal import Decimal
 from enum import StrEnum
 from typing import Any
+
+from saltus.errors import SaltusError, near
+from saltus.paper.claims.claim_tables import ClaimEntry, claim_tables
 
 
 class Verdict(StrEnum):
@@ -19,7 +26,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """One row of the table of claims. `compare` and `check` make it, so that the verdict is always computed."""
+    """One row of the table of claims. `judge` makes it, so that the verdict is always computed."""
 
     id: str
     where: str  # equation label, section or figure
@@ -40,64 +47,90 @@ class Claim:
         return f"{self.verdict} {self.erratum}" if self.verdict is Verdict.ERRATUM else str(self.verdict)
 
 
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What was computed for one claim.
+
+    A claim with a printed number has one `outcome`, the number found. For a formula or statement the outcome is a residual that
+    must vanish, or whether it holds, as printed and, where there is an erratum, as `corrected`.
+    """
+
+    outcome: float | bool
+    corrected: float | bool | None
+    fields: Mapping[str, Any]  # of the template of the evidence
+
+
+Measures = Mapping[str, Measured | None]  # by the claim's id; None where the data at hand cannot bear on it
+
+
+def measured(outcome: float | bool, corrected: float | bool | None = None, /, **fields: Any) -> Measured:
+    """A `Measured` with the fields of the claim's evidence."""
+    return Measured(outcome, corrected, fields)
+
+
+def with_fields(fields: Mapping[str, Any], measures: Mapping[str, Measured]) -> dict[str, Measured]:
+    """The measures with fields that all of their evidence may name."""
+    return {id: replace(one, fields={**fields, **one.fields}) for id, one in measures.items()}
+
+
+def judge(part: str, measures: Measures) -> list[Claim]:
+    """The claims of a part of the paper, such as "fig04", in the order of its table.
+
+    Raises:
+        SaltusError: a claim of the table that was not measured, or a measured one that is in no table.
+    """
+    entries = claim_tables().get(part, {})
+    missing, unknown = entries.keys() - measures.keys(), measures.keys() - entries.keys()
+    if missing:
+        raise SaltusError(f"{part} did not measure its claims {', '.join(sorted(missing))}")
+    if unknown:
+        raise SaltusError("; ".join(f"{part} has no claim {id!r}; {near(id, entries)}" for id in sorted(unknown)))
+    return [judge_claim(id, entry, one) for id, entry in entries.items() if (one := measures[id]) is not None]
+
+
+def judge_claim(id: str, entry: ClaimEntry, measured: Measured) -> Claim:
+    """One claim: a number against the printed one, or a formula or statement by its residual or whether it holds."""
+    paper, value, verdict = (_compared if entry.printed is not None else _checked)(entry, measured)
+    return Claim(
+        id=id,
+        where=entry.place,
+        statement=entry.statement,
+        paper=paper,
+        value=value,
+        verdict=verdict,
+        evidence=entry.evidence_text(measured.fields),
+        erratum=entry.erratum,
+    )
+
+
+def _compared(entry: ClaimEntry, measured: Measured) -> tuple[str, str, Verdict]:
+    """Numbers agree within one unit of the last printed digit, so that a digit may have been rounded or cut."""
+    unit = f" {entry.unit}" if entry.unit else ""
+    verdict = Verdict.DISAGREES
+    if _same_number(measured.outcome, entry.printed):
+        verdict = Verdict.AGREES
+    elif _same_number(measured.outcome, entry.corrected):
+        verdict = Verdict.ERRATUM
+    return f"{entry.printed}{unit}", f"{measured.outcome:.6g}{unit}", verdict
+
+
+def _same_number(value: float, printed: str | None) -> bool:
+    return printed is not None and abs(value - float(printed)) < printed_unit(printed) * (1 + 1e-9)
+
+
 def printed_unit(printed: str) -> float:
     """One unit in the last digit of a printed number: 0.001 for "2.405"."""
     return float(Decimal(1).scaleb(int(Decimal(printed).as_tuple().exponent)))
 
 
-def compare(
-    id: str,
-    where: str,
-    statement: str,
-    *,
-    printed: str,
-    value: float,
-    evidence: str,
-    unit: str = "",
-    corrected: str | None = None,
-    erratum: int | None = None,
-) -> Claim:
-    """A printed number against a computed one: they agree within one unit of the last printed digit (rounded or cut).
-
-    Where they do not, and the erratum's `corrected` number does, the verdict is "agrees with erratum N".
-    """
-    text = f"{value:.6g}{f' {unit}' if unit else ''}"
-    verdict = Verdict.DISAGREES
-    if abs(value - float(printed)) < printed_unit(printed) * (1 + 1e-9):
-        verdict = Verdict.AGREES
-    elif corrected is not None and abs(value - float(corrected)) < printed_unit(corrected) * (1 + 1e-9):
-        verdict = Verdict.ERRATUM
-    paper = f"{printed}{f' {unit}' if unit else ''}"
-    return Claim(
-        id=id, where=where, statement=statement, paper=paper, value=text, verdict=verdict, evidence=evidence, erratum=erratum
-    )
-
-
-def check(
-    id: str,
-    where: str,
-    statement: str,
-    *,
-    printed: float | bool,
-    evidence: str,
-    corrected: float | bool | None = None,
-    tolerance: float = 1e-9,
-    erratum: int | None = None,
-) -> Claim:
-    """A printed formula or statement, and the erratum's: each a residual that must vanish, or whether it holds."""
-    as_printed = _holds(printed, tolerance)
-    as_corrected = corrected is not None and _holds(corrected, tolerance)
-    verdict = Verdict.AGREES if as_printed else Verdict.ERRATUM if as_corrected and erratum else Verdict.DISAGREES
-    return Claim(
-        id=id,
-        where=where,
-        statement=statement,
-        paper="as stated" if corrected is None else f"as printed: {_text(printed)}",
-        value=_text(printed) if corrected is None else f"corrected: {_text(corrected)}",
-        verdict=verdict,
-        evidence=evidence,
-        erratum=erratum,
-    )
+def _checked(entry: ClaimEntry, measured: Measured) -> tuple[str, str, Verdict]:
+    """A residual vanishes within the tolerance; the erratum counts only where the claim as printed fails."""
+    printed, corrected = measured.outcome, measured.corrected
+    agrees, mended = (one is not None and _holds(one, entry.tolerance) for one in (printed, corrected))
+    verdict = Verdict.AGREES if agrees else Verdict.ERRATUM if mended and entry.erratum else Verdict.DISAGREES
+    if corrected is None:
+        return "as stated", _outcome_text(printed), verdict
+    return f"as printed: {_outcome_text(printed)}", f"corrected: {_outcome_text(corrected)}", verdict
 
 
 def _holds(outcome: float | bool, tolerance: float) -> bool:
@@ -108,7 +141,7 @@ def _is_bool(outcome: Any) -> bool:
     return isinstance(outcome, bool) or type(outcome).__name__ == "bool"
 
 
-def _text(outcome: float | bool) -> str:
+def _outcome_text(outcome: float | bool) -> str:
     return ("holds" if outcome else "does not hold") if _is_bool(outcome) else f"residual {float(outcome):.1e}"
 
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim
-from saltus.paper.figures.figure import PaperFigure
-from saltus.paper.provenance import TOLERANCE, dataset, tree
+from saltus.paper.figure_data import TOLERANCE, dataset, scalar_dataset, tree
+from saltus.paper.figures.figure import paper_figure
+from saltus.paper.sections.rocking_block import block, measure, residuals
 from saltus.plots import DOUBLE_COLUMN, draw_errors, draw_jump, draw_periods, new_figure, panel_label, styled
 
 ANGLES = (5.0, 20.0, 45.0)  # alpha, degrees
@@ -20,13 +20,6 @@ def compute(samples: int = 160) -> Any:
     """Periods over theta0 / alpha by every formula and by simulation; the energy jump over the ground's velocity."""
     groups = {"period": _periods(samples), "jump": _jump(np.deg2rad(JUMP["alpha"]), JUMP["e"]), "checks": _checks()}
     return tree(groups, what="the rigid rocking block (appendix A), times in 1/p", tol=TOLERANCE)
-
-
-def block(alpha: float, e: float = 1.0) -> Any:
-    """A free block of slenderness `alpha` (rad)."""
-    from saltus.systems import RockingBlock, System, VelocityReduction
-
-    return System(model=RockingBlock(alpha=alpha), impact=VelocityReduction(e))
 
 
 def _periods(samples: int) -> Any:
@@ -104,9 +97,7 @@ def _model_jump(alpha: float, e: float, ground: float) -> float:
 
 def _checks() -> Any:
     """Residuals of the appendix's formulas as printed and as corrected, on random states."""
-    from saltus.paper.claims.rocking_checks import residuals
-
-    return dataset({name: ((), value) for name, value in residuals(np.random.default_rng(1)).items()}, what="residuals")
+    return scalar_dataset(residuals(np.random.default_rng(1)), what="residuals")
 
 
 @styled
@@ -122,27 +113,4 @@ def draw(data: Any) -> Any:
     return figure
 
 
-def claims(data: Any) -> list[Claim]:
-    """The appendix, with errata 10, 11, 12 and 17."""
-    from saltus.paper.claims.rocking_checks import judge
-
-    return judge(data)
-
-
-FIGURE = PaperFigure(
-    name="appendix",
-    title="Appendix: the rocking block",
-    caption=(
-        "(a) Period p T₀ of free rocking over θ₀/α: lines, closed form; dots, simulated motion; dashed, the "
-        "slender block's arccosh, "
-        "one curve for all α. (b) Relative errors of the two approximations: the short-time one (dotted) holds "
-        "for θ₀ ≪ α, the arccosh "
-        "(dashed) for slender blocks and any θ₀ < α (erratum 17). (c) Energy jump at an impact over the ground's "
-        "velocity (α = 20°, "
-        "e = 0.8): line, formula; dots, from the kinetic energies; in the shaded range the energy grows, outside it either "
-        "condition holds (erratum 12)."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("appendix", compute=compute, draw=draw, measure=measure)

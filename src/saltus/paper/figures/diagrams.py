@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from saltus.paper.figure_data import scalar_dataset
 from saltus.paper.figures import spectra
 from saltus.paper.figures.panels import each
-from saltus.paper.provenance import dataset
 from saltus.plots import (
     DOUBLE_COLUMN,
     draw_critical,
@@ -50,7 +50,7 @@ def undeformed(system: Any, critical: float) -> Any:
     moved = np.maximum(ends["overall_largest_theta"].values, -ends["overall_smallest_theta"].values)
     late = np.maximum(ends["largest_theta"].values, -ends["smallest_theta"].values)
     values = {"held_below": int(moved[0] == 0.0), "held_above": int(moved[1] == 0.0), "later": float(late[1].max())}
-    return dataset({name: ((), value) for name, value in values.items()}, what="rest beside Hcr", system=system)
+    return scalar_dataset(values, what="rest beside Hcr", system=system)
 
 
 @styled

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim, check
-from saltus.paper.figures.figure import PaperFigure
+from saltus.paper.claims.claim import Measured, measured
+from saltus.paper.figure_data import TOLERANCE, tree
+from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.portrait import circled, portrait, system
-from saltus.paper.provenance import TOLERANCE, tree
 from saltus.plots import SINGLE_COLUMN, draw_space, new_figure, styled
 
 STARTS = [(2.3, 0.0), (-2.38, 0.0), (2.5, 0.0)]
@@ -37,7 +37,7 @@ def draw(data: Any) -> Any:
     return figure
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """The three attractors, the falling energy, the corner at the plane theta = 0."""
     space = data["space"]
     stable = space["equilibrium"].values[space["stable"].values.astype(bool)]
@@ -45,37 +45,16 @@ def claims(data: Any) -> list[Claim]:
     reached = {int(np.argmin(abs(stable - end))) for end in ends}
     energy = space["energy"].values
     rise = float(max(np.nanmax(np.diff(e[np.isfinite(e)])) for e in energy))
-    return [
-        check(
-            "fig01c-attractors",
-            "Fig. 1c",
-            "The nonconservative metainterface is tristable: its motions end at one of three attractors",
-            printed=len(reached) == 3 and bool(max(min(abs(stable - end)) for end in ends) < 0.1),
-            evidence=f"from θ = {[s[0] for s in STARTS]} at rest the motions end at θ = {ends.round(3).tolist()} "
-            f"(τ = {DURATION:g}); "
-            f"they circle {[len(c) for c in circled(space)]} attractors",
+    return {
+        "fig01c-attractors": measured(
+            len(reached) == 3 and bool(max(min(abs(stable - end)) for end in ends) < 0.1),
+            starts=[s[0] for s in STARTS],
+            ends=ends.round(3).tolist(),
+            duration=DURATION,
+            circled=[len(c) for c in circled(space)],
         ),
-        check(
-            "fig01c-energy",
-            "Fig. 1c",
-            "Viscous damping takes energy all the time",
-            printed=bool(rise < 1e-13),
-            evidence=f"largest rise of energy between samples {rise:.1e}, total loss {np.nanmax(energy) - np.nanmin(energy):.4f}",
-        ),
-    ]
+        "fig01c-energy": measured(bool(rise < 1e-13), rise=rise, loss=np.nanmax(energy) - np.nanmin(energy)),
+    }
 
 
-FIGURE = PaperFigure(
-    name="fig01c",
-    title="Fig. 1c: motions in the space of rotation, velocity and energy",
-    caption=(
-        "Motions of the tristable metainterface under a constant vertical load (data of Fig. 4c: k = 1, m = 0, V "
-        "= −1.5/sin β₀, C = 0.1, "
-        "e = 1) in the space of rotation, angular velocity and total energy, from three starts (diamonds) to the "
-        "three attractors (dots). "
-        "Grey plane: the discontinuity θ = 0. Thin black: the potential energy, at θ' = 0."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig01c", compute=compute, draw=draw, measure=measure)

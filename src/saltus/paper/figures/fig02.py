@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim
-from saltus.paper.figures.figure import PaperFigure
-from saltus.paper.provenance import dataset, tree
+from saltus.paper.figure_data import dataset, tree
+from saltus.paper.figures.figure import paper_figure
 from saltus.plots import (
     DOUBLE_COLUMN,
     draw_cell,
@@ -75,23 +74,4 @@ def draw(data: Any) -> Any:
     return figure
 
 
-def claims(data: Any) -> list[Claim]:
-    """The kinematics is judged in `claims_kinematics`."""
-    return []
-
-
-FIGURE = PaperFigure(
-    name="fig02",
-    title="Fig. 2: the unit cell",
-    caption=(
-        "(a) Undeformed and (b) deformed unit cell, computed from its kinematics (α₀ = 38°, β₀ = 75°; θ₁ = 12°, "
-        "θ₂ = −8°). Each layer is "
-        "a parallelogram of rigid bars with a visco-elastic hinge (A in the lower, B in the upper layer) and a "
-        "slider amid its diagonal. "
-        "βⱼ = β₀ + |θⱼ| (erratum 2); φⱼ is the misalignment at the slider. Grey dashed: direction of the undeformed bar; "
-        "dotted: line joining the ends of a diagonal. The paper's text does not say at which corner A and B sit."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig02", compute=compute, draw=draw)

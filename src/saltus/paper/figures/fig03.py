@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim, check
-from saltus.paper.figures.figure import PaperFigure
-from saltus.paper.provenance import TOLERANCE, dataset, tree
+from saltus.paper.claims.claim import Measured, measured
+from saltus.paper.figure_data import TOLERANCE, dataset, tree
+from saltus.paper.figures.figure import paper_figure
 from saltus.plots import DOUBLE_COLUMN, draw_history, draw_phase, new_figure, panel_label, styled
 
 SPAN = 1.5  # of time before the impact
@@ -59,7 +59,7 @@ def draw(data: Any) -> Any:
     return figure
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """The square-root law and the singular velocity."""
     d = data["approach"]
     near = d["to_go"].values < 1e-4
@@ -68,44 +68,19 @@ def claims(data: Any) -> list[Claim]:
     ratio = d["phi_small"].values / d["phi"].values - 1
     product = 2 * d.attrs["psi"] / d.attrs["sin_beta0"] * d["phi"].values * abs(d["phi_velocity"].values)
     velocity = abs(d["theta_velocity"].values)
-    return [
-        check(
-            "fundamental-property",
-            "fundamentalproperty",
-            "|θ| ≈ ψ φ² / sin β₀ for small φ",
-            printed=float(ratio[-1]),
-            tolerance=1e-6,
-            evidence=f"relative error of φ {abs(ratio[0]):.1e} at θ = {d['theta'].values[0]:.3f}, {abs(ratio[-1]):.1e} at "
-            f"θ = {d['theta'].values[-1]:.1e}",
+    return {
+        "fundamental-property": measured(
+            float(ratio[-1]),
+            error_at_start=abs(ratio[0]),
+            theta_at_start=d["theta"].values[0],
+            error_at_end=abs(ratio[-1]),
+            theta_at_end=d["theta"].values[-1],
         ),
-        check(
-            "fundamental-velocity",
-            "fundamentalvelocity",
-            "|θ'| ≈ 2 ψ |φ| |φ'| / sin β₀ for small φ",
-            printed=float(product[-1] / velocity[-1] - 1),
-            tolerance=1e-6,
-            evidence=f"exact rates {d['to_go'].values[-1]:.0e} before the impact of a simulated motion",
+        "fundamental-velocity": measured(float(product[-1] / velocity[-1] - 1), to_go=d["to_go"].values[-1]),
+        "phi-singular": measured(
+            bool(abs(slope + 0.5) < 1e-3), slope=slope, to_go=to_go[-1], phi_velocity=rate[-1], theta_velocity=-velocity[-1]
         ),
-        check(
-            "phi-singular",
-            "Fig. 3",
-            "The velocity of φ is infinite at an impact that θ meets with a finite one",
-            printed=bool(abs(slope + 0.5) < 1e-3),
-            evidence=f"φ' grows like (τ* − τ)^{slope:.5f} down to τ* − τ = {to_go[-1]:.0e}, where φ' = {rate[-1]:.3g} and "
-            f"θ' = {-velocity[-1]:.4f}",
-        ),
-    ]
+    }
 
 
-FIGURE = PaperFigure(
-    name="fig03",
-    title="Fig. 3: misalignment and difference angle at an impact",
-    caption=(
-        "Approach to an impact at τ*, from an exact motion (β₀ = 80°, α₀ = 45°, C = 0.1, V = −0.5, from θ = 0.4 at rest). "
-        "(a) |φ| and |θ| over time; (b) their phase portraits. The velocity of φ grows without bound as φ → 0, "
-        "that of θ does not."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig03", compute=compute, draw=draw, measure=measure)

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim, check, compare
-from saltus.paper.figures.figure import PaperFigure
+from saltus.paper.claims.claim import Measured, measured
+from saltus.paper.figure_data import TOLERANCE, tree
+from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.portrait import BETA0, VERTICAL, circled, portrait, system
-from saltus.paper.provenance import TOLERANCE, tree
 from saltus.plots import DOUBLE_COLUMN, draw_portrait, new_figure, panel_label, styled
 
 BOUND = 2.55  # rad, a little outside the axes
@@ -52,7 +52,7 @@ def _corner_error(group: Any) -> float:
     return float(np.abs(jumps[np.isfinite(jumps)] - 2 * VERTICAL * np.cos(BETA0)).max())
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """The fixed points, and what the text says of each panel."""
     a, b, c = data["a"], data["b"], data["c"]
     stable = a["equilibrium"].values[a["stable"].values.astype(bool)]
@@ -63,98 +63,39 @@ def claims(data: Any) -> list[Claim]:
     ends = c["end"].values
     left = float(np.abs(b["end"].values[outer_b]).max())
     nearest = sorted({round(float(stable[np.argmin(abs(stable - end))]), 4) for end in ends})
-    return [
-        compare("fig04-load", "section 5.2", "V̄ = −1.5 / sin β₀", printed="-1.523", value=VERTICAL, evidence="β₀ = 80°"),
-        compare(
-            "fig04-theta-i",
-            "section 5.2",
-            "θ_I = −θ_II for k = 1",
-            printed="1.462",
-            unit="rad",
-            value=float(stable[-1]),
-            evidence=f"root of P'(θ) = 0; θ_II = {stable[0]:.6f}",
+    return {
+        "fig04-load": measured(VERTICAL),
+        "fig04-theta-i": measured(float(stable[-1]), theta_ii=stable[0]),
+        "fig04-tristable": measured(
+            len(stable) == 3 and stable[0] < 0 == stable[1] < stable[2],
+            equilibria=np.round(a["equilibrium"].values, 5).tolist(),
+            stable=stable.round(5).tolist(),
         ),
-        check(
-            "fig04-tristable",
-            "section 5.2",
-            "Three stable equilibria: θ = 0, θ_I > 0 and θ_II < 0",
-            printed=len(stable) == 3 and stable[0] < 0 == stable[1] < stable[2],
-            evidence=f"equilibria {np.round(a['equilibrium'].values, 5).tolist()}, stable {stable.round(5).tolist()}",
+        "fig04-feasible": measured(
+            len(stable) == 3 and bool(np.abs(stable).max() < float(a["line_limit"])),
+            theta_i=np.rad2deg(stable[-1]),
+            line_limit=np.rad2deg(float(a["line_limit"])),
         ),
-        check(
-            "fig04-feasible",
-            "section 1",
-            "Three stable attractors exist within the feasible range of deformations",
-            printed=len(stable) == 3 and bool(np.abs(stable).max() < float(a["line_limit"])),
-            evidence=f"|θ_I| = {np.rad2deg(stable[-1]):.2f}°, before the straight line at "
-            f"{np.rad2deg(float(a['line_limit'])):.0f}°",
+        "fig04a-regions": measured(
+            sorted({len(r) for r in rounds_a}) == [1, 3] and _closed(a), motions=len(rounds_a), circled=[len(r) for r in rounds_a]
         ),
-        check(
-            "fig04a-regions",
-            "Fig. 4a",
-            "Without losses a motion goes round one attractor inside its separatrix, and round all three outside",
-            printed=sorted({len(r) for r in rounds_a}) == [1, 3] and _closed(a),
-            evidence=f"attractors circled by the {len(rounds_a)} motions: {[len(r) for r in rounds_a]}; each "
-            "separatrix ends at a saddle",
+        "fig04a-one-layer": measured(bool(wrong.max() == 0), shares=wrong.round(3).tolist()),
+        "fig04a-energy": measured(_energy_drift(a), duration=DURATIONS["a"]),
+        "fig04-corner": measured(_corner_error(a), jump=float(np.nanmax(a["corner"]))),
+        "fig04b-loops": measured(
+            _loop_shift(a, b) + max(_drift(b, i) for i in inner_b), motions=len(inner_b), impacts=int(b["impacts"][inner_b].sum())
         ),
-        check(
-            "fig04a-one-layer",
-            "Fig. 4a",
-            "In these motions one layer stays closed while the other is open",
-            printed=bool(wrong.max() == 0),
-            evidence=f"share of the time in which the closed layer's reaction has the wrong sign: {wrong.round(3).tolist()}",
+        "fig04b-decay": measured(left < 1e-6, motions=len(outer_b), largest=left, duration=DURATIONS["b"]),
+        "fig04c-attractors": measured(
+            bool(max(np.min(abs(stable - end)) for end in ends) < 0.1), motions=len(ends), attractors=nearest
         ),
-        check(
-            "fig04a-energy",
-            "Fig. 4a",
-            "The system without losses is conservative",
-            printed=_energy_drift(a),
-            tolerance=1e-12,
-            evidence=f"largest change of energy along the motions, τ up to {DURATIONS['a']:g}",
+        "fig04c-rounds": measured(
+            min(rounds_c) == 3,
+            min(rounds_c) < 3 and bool(np.nanmax(abs(c["theta"].values)) <= max(abs(t) for t, _ in STARTS["c"]) + 1e-12),
+            circled=rounds_c,
+            largest=np.nanmax(abs(c["theta"].values)),
         ),
-        check(
-            "fig04-corner",
-            "section 5.2",
-            "Trajectories have a discontinuous tangent at θ = 0",
-            printed=_corner_error(a),
-            evidence=f"θ'' of the simulated motions jumps by {float(np.nanmax(a['corner'])):.6f} at an impact with θ' > 0, "
-            "that is 2 V cos β₀ (erratum 4)",
-        ),
-        check(
-            "fig04b-loops",
-            "Fig. 4b",
-            "Loss at impacts leaves the regions around θ_I and θ_II as they were, with periodic motion",
-            printed=_loop_shift(a, b) + max(_drift(b, i) for i in inner_b),
-            tolerance=1e-9,
-            evidence=f"shift of the separatrix loops, and energy drift of {len(inner_b)} motions inside them; they have "
-            f"{int(b['impacts'][inner_b].sum())} impacts",
-        ),
-        check(
-            "fig04b-decay",
-            "Fig. 4b",
-            "Loss at impacts makes every other motion decay to the undeformed state",
-            printed=left < 1e-6,
-            evidence=f"{len(outer_b)} motions, |θ| ≤ {left:.1e} at τ = {DURATIONS['b']:g}; no separatrix closes around θ = 0",
-        ),
-        check(
-            "fig04c-attractors",
-            "Fig. 4c",
-            "With viscous damping every motion decays to one of the three attractors",
-            printed=bool(max(np.min(abs(stable - end)) for end in ends) < 0.1),
-            evidence=f"the {len(ends)} motions end near {nearest}",
-        ),
-        check(
-            "fig04c-rounds",
-            "Fig. 4c",
-            "With viscous damping each trajectory circles all three attractors for some time, and none is bounded",
-            printed=min(rounds_c) == 3,
-            corrected=min(rounds_c) < 3
-            and bool(np.nanmax(abs(c["theta"].values)) <= max(abs(t) for t, _ in STARTS["c"]) + 1e-12),
-            erratum=27,
-            evidence=f"attractors circled: {rounds_c}; the largest |θ| after the start is the start itself, "
-            f"{np.nanmax(abs(c['theta'].values)):.3f} rad: the energy only falls",
-        ),
-    ]
+    }
 
 
 def _closed(panel: Any) -> bool:
@@ -180,19 +121,4 @@ def _loop_shift(first: Any, second: Any) -> float:
     return shift
 
 
-FIGURE = PaperFigure(
-    name="fig04",
-    title="Fig. 4: phase portraits of the symmetric system",
-    caption=(
-        "Phase portraits for k = 1, m = 0, β₀ = 80°, V = −1.5/sin β₀: (a) C = 0, e = 1; (b) C = 0, e = 0.8; (c) "
-        "C = 0.1, e = 1. Blue: "
-        "motions; grey dashed: separatrices, computed as the stable manifolds of the saddles; filled: stable, "
-        "open: unstable fixed "
-        "points; grey line: impact at θ = 0, where velocities jump in (b); green: straight line at |θ| = π − β₀ "
-        "= 100° (erratum 19). Decaying motions are drawn until they come close to their attractor; in (b) the "
-        "manifolds that separate no two attractors are left out."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig04", compute=compute, draw=draw, measure=measure)

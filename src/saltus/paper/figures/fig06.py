@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim, check
-from saltus.paper.figures.figure import PaperFigure
-from saltus.paper.provenance import TOLERANCE, dataset, tree
+from saltus.paper.claims.claim import Measured, measured
+from saltus.paper.figure_data import TOLERANCE, dataset, tree
+from saltus.paper.figures.figure import paper_figure
 from saltus.plots import DOUBLE_COLUMN, draw_histories, new_figure, panel_label, styled
 
 STIFFNESS = (1.0, 4.0, 16.0, 100.0)
@@ -87,7 +87,7 @@ def draw(data: Any) -> Any:
     return figure
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """Peaks and periods, and erratum 7."""
     from saltus.theory import unloaded_period
 
@@ -99,67 +99,43 @@ def claims(data: Any) -> list[Claim]:
     change = velocity["energy_ratio"].values
     limits = [float(unloaded_period(k, m)) for k, m in ((1e12, 0.0), (1e-12, 0.0), (1.0, 1e12))]
     periods = max(float(np.abs(d["period"] / d["period_theory"] - 1).max()) for d in (a, velocity, energy))
-    return [
-        check(
-            "fig06-peaks",
-            "section 5.3",
-            "Without loads and with m = 0, θ_max = |θ_min| / √k, so P_R = 1/√k for k ≥ 1",
-            printed=float(np.abs(ratios["a"] / a["ratio_theory"].values - 1).max()),
-            evidence=f"simulated peaks for k = {list(STIFFNESS)}",
+    return {
+        "fig06-peaks": measured(
+            float(np.abs(ratios["a"] / a["ratio_theory"].values - 1).max()), stiffness_ratios=list(STIFFNESS)
         ),
-        check(
-            "fig06-balance-sign",
-            "section 5.3",
-            "Without loads θ_max = −√k θ_min",
-            printed=float(np.abs(a["peak"].values / (-THETA0 * np.sqrt(a["stiffness_ratio"].values)) - 1).max()),
-            corrected=float(np.abs(a["peak"].values / (-THETA0 / np.sqrt(a["stiffness_ratio"].values)) - 1).max()),
-            erratum=6,
-            evidence="simulated peaks against θ_max = |θ_min| / √k",
+        "fig06-balance-sign": measured(
+            float(np.abs(a["peak"].values / (-THETA0 * np.sqrt(a["stiffness_ratio"].values)) - 1).max()),
+            float(np.abs(a["peak"].values / (-THETA0 / np.sqrt(a["stiffness_ratio"].values)) - 1).max()),
         ),
-        check(
-            "fig06-period",
-            "period_case1, period_case2",
-            "T0 = π (1 + √((1+m)/k)), whatever the amplitude",
-            printed=periods,
-            evidence="time between the first and the third impact of 12 simulated motions, with e = 1 and with r = 1",
+        "fig06-period": measured(periods),
+        "fig06-period-limits": measured(
+            bool(limits[0] - np.pi < 1e-5 and limits[1] > 1e5 and limits[2] > 1e5),
+            stiff=limits[0],
+            soft=limits[1],
+            heavy=limits[2],
+            largest=STIFFNESS[-1],
+            simulated=float(a["period"][-1]),
         ),
-        check(
-            "fig06-period-limits",
-            "section 5.3",
-            "T0 → π for k → ∞, and grows without bound for k → 0 or m → ∞",
-            printed=bool(limits[0] - np.pi < 1e-5 and limits[1] > 1e5 and limits[2] > 1e5),
-            evidence=f"T0 = {limits[0]:.7f} at k = 10¹², {limits[1]:.3g} at k = 10⁻¹², {limits[2]:.3g} at m = 10¹²; simulated at "
-            f"k = {STIFFNESS[-1]:g}: {float(a['period'][-1]):.6f}",
+        "fig06-mass": measured(
+            shift,
+            bool(right < 1e-9 and kept < 1e-9),
+            mass_ratios=list(MASSES),
+            ratios=ratios["b_velocity"].round(6).tolist(),
+            right=right,
+            kept=kept,
         ),
-        check(
-            "fig06-mass",
-            "section 5.3",
-            "P_R does not depend on m",
-            printed=shift,
-            corrected=bool(right < 1e-9 and kept < 1e-9),
-            erratum=7,
-            evidence=f"m = {list(MASSES)}: with e = 1 P_R = {ratios['b_velocity'].round(6).tolist()}, that is min(√((1+m)/k), "
-            f"√(k/(1+m))) within {right:.0e}; with r = 1 it stays within {kept:.0e}",
-        ),
-        check(
-            "fig06-conservative",
-            "section 5.3",
-            "With e = 1 and C = 0 the energy is conserved for m > 0",
-            printed=float(np.abs(change - 1).max()),
-            corrected=float(np.abs(change / (1 + velocity["mass_ratio"].values) - 1).max())
+        "fig06-conservative": measured(
+            float(np.abs(change - 1).max()),
+            float(np.abs(change / (1 + velocity["mass_ratio"].values) - 1).max())
             + float(np.abs(energy["energy_ratio"].values - 1).max()),
-            erratum=7,
-            evidence=f"from upper to lower layer e = 1 multiplies the energy by {change.round(9).tolist()} = 1 + m, and back; "
-            "r = 1 keeps it",
+            changes=change.round(9).tolist(),
         ),
-        check(
-            "fig06-fast-side",
-            "section 5.3",
-            "For large m (or small k) the share of the period with θ < 0 vanishes",
-            printed=bool((np.diff(np.pi / velocity["period"].values) < 0).all()),
-            evidence=f"shares {(np.pi / velocity['period'].values).round(4).tolist()} for m = {list(MASSES)}",
+        "fig06-fast-side": measured(
+            bool((np.diff(np.pi / velocity["period"].values) < 0).all()),
+            shares=(np.pi / velocity["period"].values).round(4).tolist(),
+            mass_ratios=list(MASSES),
         ),
-    ]
+    }
 
 
 def _ratio(panel: Any) -> np.ndarray:
@@ -167,16 +143,4 @@ def _ratio(panel: Any) -> np.ndarray:
     return np.minimum(ratio, 1 / ratio)
 
 
-FIGURE = PaperFigure(
-    name="fig06",
-    title="Fig. 6: bouncing-like time histories",
-    caption=(
-        "Time histories without loads over τ/T0(k, m), from θ_min at rest (β₀ = 80°, C = 0): (a) m = 0, e = 1 "
-        "and k ≥ 1; (b) k = 1 "
-        "and m ≥ 0. With m > 0 a continuous velocity (e = 1) changes the energy at each impact and the peaks grow "
-        "with √(1+m); the energy-conserving impact (r = 1) keeps them (erratum 7)."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig06", compute=compute, draw=draw, measure=measure)

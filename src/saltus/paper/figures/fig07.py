@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim, check
-from saltus.paper.figures.figure import PaperFigure
-from saltus.paper.provenance import TOLERANCE, dataset, tree
+from saltus.paper.claims.claim import Measured, measured
+from saltus.paper.figure_data import TOLERANCE, dataset, scalar_dataset, scalars, tree
+from saltus.paper.figures.figure import paper_figure
 from saltus.plots import DOUBLE_COLUMN, draw_family, new_figure, panel_label, styled
 
 ANGLES = (2.0, 4.0, 6.0, 8.0, 10.0)  # degrees
@@ -87,7 +87,7 @@ def _balance(stiffness: float = 5.0, vertical: float = -0.5, theta0: float = np.
         "other_side_theta_max": -theta0,
         "other_side_theta_min": simulated_peak(reference, -theta0),
     }
-    return dataset({name: ((), value) for name, value in values.items()}, what="simulated peaks", system=reference)
+    return scalar_dataset(values, what="simulated peaks", system=reference)
 
 
 @styled
@@ -105,9 +105,9 @@ def draw(data: Any) -> Any:
     return figure
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """The balance (erratum 6), the monotonic decrease, the limit, the reciprocity."""
-    b = {name: float(value) for name, value in data["balance"].to_dataset().items()}
+    b = scalars(data["balance"])
     k, v, low, high, b0 = b["stiffness_ratio"], b["vertical"], b["theta_min"], b["theta_max"], np.deg2rad(80.0)
     printed = k * low**2 / 2 - v * np.sin(b0 + low) - (high**2 / 2 - v * np.sin(b0 - high))
     corrected = k * high**2 / 2 - v * np.sin(b0 + high) - (low**2 / 2 - v * np.sin(b0 + abs(low)))
@@ -117,65 +117,24 @@ def claims(data: Any) -> list[Claim]:
     last = max(float(data[p]["ratio"][:, -1].max()) for p in "ab")
     twin = b["twin_theta_max"] / -b["twin_theta_min"]
     here, there = high / -low, b["other_side_theta_max"] / -b["other_side_theta_min"]
-    return [
-        check(
-            "pot-balance",
-            "pot_balance",
-            "The two peaks of conservative motion match their potential energies",
-            printed=printed,
-            corrected=corrected,
-            erratum=6,
-            tolerance=1e-11,
-            evidence=f"k = {k:g}, V = {v:g}: simulated from θ_min = {low:.6f} the motion turns at θ_max = {high:.12f}",
+    return {
+        "pot-balance": measured(printed, corrected, k=k, v=v, theta_min=low, theta_max=high),
+        "pot-balance-side": measured(
+            min(here, 1 / here) - min(there, 1 / there),
+            bool(abs(min(here, 1 / here) - min(there, 1 / there)) > 1e-6),
+            v=v,
+            k=k,
+            upper_first=min(here, 1 / here),
+            lower_first=min(there, 1 / there),
         ),
-        check(
-            "pot-balance-side",
-            "pot_balance, Fig. 7",
-            "P_R is a function of V and k for a given |θ₀|, whichever side starts",
-            printed=min(here, 1 / here) - min(there, 1 / there),
-            corrected=bool(abs(min(here, 1 / here) - min(there, 1 / there)) > 1e-6),
-            erratum=6,
-            evidence=f"simulated, |θ₀| = 10°, V = {v:g}, k = {k:g}: P_R = {min(here, 1 / here):.6f} if the upper layer starts, "
-            f"{min(there, 1 / there):.6f} if the lower one does",
+        "fig07-unloaded": measured(float(np.abs(unloaded - unloaded["stiffness_ratio"] ** -0.5).max())),
+        "fig07-simulated": measured(deviation, motions=sum(data[p]["simulated"].size for p in "ab")),
+        "fig07-monotonic": measured(falls, curves=data["a"].sizes["curve"] + data["b"].sizes["curve"], largest_k=LARGEST),
+        "fig07-limit": measured(
+            bool(last * np.sqrt(LARGEST) < 3), largest=last, largest_k=LARGEST, scaled=last * np.sqrt(LARGEST)
         ),
-        check(
-            "fig07-unloaded",
-            "quasi-bounce-peak",
-            "Without load P_R = min{1/√k, √k}",
-            printed=float(np.abs(unloaded - unloaded["stiffness_ratio"] ** -0.5).max()),
-            evidence="largest deviation of the energy balance at V = 0 over the curve",
-        ),
-        check(
-            "fig07-simulated",
-            "Fig. 7",
-            "The peak ratio of the balance is that of the motion",
-            printed=deviation,
-            tolerance=1e-10,
-            evidence=f"{sum(data[p]['simulated'].size for p in 'ab')} simulated motions, largest relative deviation of P_R",
-        ),
-        check(
-            "fig07-monotonic",
-            "Fig. 7",
-            "P_R decreases monotonically with k ≥ 1",
-            printed=falls,
-            evidence=f"all {data['a'].sizes['curve'] + data['b'].sizes['curve']} curves over k = 1 to {LARGEST:g}",
-        ),
-        check(
-            "fig07-limit",
-            "section 5.3",
-            "P_R vanishes for k → ∞ with V < 0 too",
-            printed=bool(last * np.sqrt(LARGEST) < 3),
-            evidence=f"P_R ≤ {last:.4f} at k = {LARGEST:g} on every curve, P_R √k ≤ {last * np.sqrt(LARGEST):.3f}",
-        ),
-        check(
-            "reciprocity",
-            "Prprop",
-            "P_R(V, k) from θ_min equals P_R(V/k, 1/k) from θ_max = |θ_min|",
-            printed=min(here, 1 / here) - min(twin, 1 / twin),
-            tolerance=1e-10,
-            evidence="both motions simulated",
-        ),
-    ]
+        "reciprocity": measured(min(here, 1 / here) - min(twin, 1 / twin)),
+    }
 
 
 def _deviation(panel: Any) -> float:
@@ -183,16 +142,4 @@ def _deviation(panel: Any) -> float:
     return float(np.abs(panel["simulated"].values / theory - 1).max())
 
 
-FIGURE = PaperFigure(
-    name="fig07",
-    title="Fig. 7: peak ratio of bouncing-like motion",
-    caption=(
-        "Peak ratio P_R over the stiffness ratio k (β₀ = 80°, m = 0, C = 0, e = 1) for motions that start at "
-        "rest with θ₀ < 0, the upper "
-        "layer open: with V < 0 the other start gives another ratio (erratum 6). (a) V = −0.5, θ₀ = −2° to −10°; (b) θ₀ = −5°, "
-        "V = 0 to −1. Lines: energy balance; dots: peaks of the simulated motion. The curve of V = 0 is 1/√k."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig07", compute=compute, draw=draw, measure=measure)

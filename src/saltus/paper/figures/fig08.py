@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim, check
-from saltus.paper.figures.figure import PaperFigure
-from saltus.paper.provenance import dataset, tree
+from saltus.paper.claims.claim import Measured, measured, with_fields
+from saltus.paper.figure_data import dataset, scalar_dataset, scalars, tree
+from saltus.paper.figures.figure import paper_figure
 from saltus.plots import DOUBLE_COLUMN, draw_domain, draw_path, new_figure, panel_label, styled
 
 SEGMENTS = ((0.05, -0.5, 0.0), (0.2, -0.7, 0.0), (0.16, -1.2, 0.0))  # Hhat, Vbar, Vhat of load (i)
@@ -110,7 +110,7 @@ def _numbers() -> Any:
         "count_at_rest_above": count_unloaded(beta0, unloaded_fold(beta0)[0] + 1e-3),
         "count_at_rest_below": count_unloaded(beta0, unloaded_fold(beta0)[0] - 1e-3),
     }
-    return dataset({name: ((), value) for name, value in values.items()}, what="numbers of erratum 23")
+    return scalar_dataset(values, what="numbers of erratum 23")
 
 
 def count_unloaded(beta0: float, vertical: float) -> int:
@@ -137,71 +137,31 @@ def draw(data: Any) -> Any:
     return figure
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """The domain (erratum 23) and the paths."""
-    numbers = {name: float(value) for name, value in data["numbers"].to_dataset().items()}
-    paths_i, paths_iii = data["i"], data["iii"]
-    printed_alone = numbers["count_above_fold"] == 1 or numbers["fold"] >= numbers["critical"]
-    counts = f"{numbers['count_below_fold']:.0f} equilibria just below, {numbers['count_above_fold']:.0f} just above"
-    wrong = int((paths_i["within_printed"] & ~paths_i["within"]).sum())
-    return [
-        check(
-            "fig08-domain",
-            "Fig. 8, section 6",
-            "The undeformed state is the only equilibrium wherever V cos β₀ < −|H| sin β₀",
-            printed=bool(printed_alone),
-            corrected=numbers["count_below_fold"] == 1
-            and numbers["count_above_fold"] > 1
-            and numbers["fold"] < numbers["critical"],
-            erratum=23,
-            evidence=f"β₀ = 80°, V = −1.2: fold of deformed equilibria at H = {numbers['fold']:.5f} ({counts}), below Hcr = "
-            f"{numbers['critical']:.5f}; {wrong} of the drawn paths lies in the printed domain but not in the true one",
+    n, i, iii = scalars(data["numbers"]), data["i"], data["iii"]
+    below_critical = n["fold"] < n["critical"]
+    found = {
+        "fig08-domain": measured(
+            n["count_above_fold"] == 1 or not below_critical,
+            n["count_below_fold"] == 1 and n["count_above_fold"] > 1 and below_critical,
+            wrong_paths=int((i["within_printed"] & ~i["within"]).sum()),
         ),
-        check(
-            "fig08-domain-without-h",
-            "Fig. 8, section 6",
-            "Without a horizontal load, the undeformed state alone is an equilibrium for every V cos β₀ < 0",
-            printed=numbers["count_at_rest_below"] == 1,
-            corrected=numbers["count_at_rest_above"] == 1 and numbers["count_at_rest_below"] > 1,
-            erratum=23,
-            evidence=f"deformed equilibria exist for V < {numbers['lowest_80']:.5f} at β₀ = 80° and V < "
-            f"{numbers['lowest_60']:.5f} at 60°",
+        "fig08-domain-without-h": measured(
+            n["count_at_rest_below"] == 1, n["count_at_rest_above"] == 1 and n["count_at_rest_below"] > 1
         ),
-        check(
-            "fig08-paths",
-            "Fig. 8",
-            "By its amplitude, a loading path lies within the monostable domain or leaves it",
-            printed=_both(paths_i["within"].values) and _both(paths_iii["within"].values),
-            evidence=f"(i): within {paths_i['within'].values.tolist()}; (iii): within {paths_iii['within'].values.tolist()}",
+        "fig08-paths": measured(
+            _both(i["within"].values) and _both(iii["within"].values),
+            within_i=i["within"].values.tolist(),
+            within_iii=iii["within"].values.tolist(),
         ),
-        check(
-            "fig08-critical",
-            "section 6",
-            "The undeformed state is held exactly where V cos β₀ < −|H| sin β₀",
-            printed=numbers["held_below"] == 1 and numbers["held_above"] == 0,
-            evidence="simulated from θ = 0 at rest under H = 0.999 Hcr and 1.001 Hcr, Hcr = |V / tan β₀| = "
-            f"{numbers['critical']:.5f} (β₀ = 80°, V = −1.2)",
-        ),
-    ]
+        "fig08-critical": measured(n["held_below"] == 1 and n["held_above"] == 0),
+    }
+    return with_fields(n, found)
 
 
 def _both(flags: np.ndarray) -> bool:
     return bool(flags.any() and not flags.all())
 
 
-FIGURE = PaperFigure(
-    name="fig08",
-    title="Fig. 8: loading paths and the quasi-static monostable domain",
-    caption=(
-        "Loading paths for β₀ = 80°: (a) load (i), horizontal force at constant vertical load; (b) load (iii), "
-        "both forces. Blue solid: "
-        "paths within the monostable domain (shaded); red dashed: paths that leave it. The paper's border V cos β₀ = −|H| sin β₀ "
-        "(thin solid) is where the undeformed state is lost; for V < −sin β₀ the domain ends earlier, at a fold "
-        "of deformed equilibria "
-        "(heavy dotted, erratum 23), so that in the hatched region, which the paper counts as monostable, deformed equilibria "
-        "coexist with the undeformed one. The path at V = −1.2 lies in the printed domain and not in the true one."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig08", compute=compute, draw=draw, measure=measure)

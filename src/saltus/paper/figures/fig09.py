@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from saltus.paper.claims import statements_chaos
-from saltus.paper.claims.claim import Claim
-from saltus.paper.claims.statements_spectra import force_spectra
+from saltus.paper.claims.claim import Measured
 from saltus.paper.figures import spectra
-from saltus.paper.figures.figure import PaperFigure
+from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.panels import each
+from saltus.paper.measures import chaos_measures, response_measures
 from saltus.plots import (
     DOUBLE_COLUMN,
     draw_limits,
@@ -73,25 +72,10 @@ def zoom(ax: Any, tree: Any, window: tuple[float, float]) -> None:
     draw_zoom(ax, tree, (0.40, 0.44), (*window, 0.45 * top, 1.06 * top), scale=scale)
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured | None]:
     """Every feature that the text names."""
-    amplitudes = {name: AMPLITUDES[name] for name in data.children}
-    return [*force_spectra(data, amplitudes), *statements_chaos.force_spectra(data, amplitudes)]
+    panels = {AMPLITUDES[name]: tree for name, tree in data.children.items()}
+    return {**response_measures.force_spectra(panels), **chaos_measures.force_spectra(panels)}
 
 
-FIGURE = PaperFigure(
-    name="fig09",
-    title="Fig. 9: response spectra under load (i)",
-    caption=(
-        "Largest rotation over one period of the motion, in units of the quasi-static θ_st, against the frequency of the "
-        "horizontal force H = Ĥ sin Ωτ at V = −0.5, β₀ = 80°, C = 0.1. Stable motions are solid blue, unstable ones dashed red; "
-        "every branch is one of the exact non-smooth equation, followed through its grazings. Dots are attractors that direct "
-        "simulation from many starts settled on. Green: the straight line at 100° (erratum 19), dash-dotted, and the kinematic "
-        "limit at 200° (erratum 20), dotted, beyond which solutions of the equation are no motions of the mechanism. Insets: "
-        "superharmonic resonances. Motions of up to 6 forcing periods. Orange: bands in which a motion is chaotic; "
-        "none is quasi-periodic (erratum 22)."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig09", compute=compute, draw=draw, measure=measure)

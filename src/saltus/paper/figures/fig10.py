@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from saltus.paper.claims import statements_chaos
-from saltus.paper.claims.claim import Claim
-from saltus.paper.claims.features import main_branch
-from saltus.paper.claims.statements_spectra import ground_spectra
+from saltus.paper.claims.claim import Measured
 from saltus.paper.figures import spectra
 from saltus.paper.figures.fig09 import draw_panel
-from saltus.paper.figures.figure import PaperFigure
+from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.panels import each
+from saltus.paper.measures import chaos_measures, response_measures
+from saltus.paper.measures.spectrum_features import main_branch
 from saltus.plots import DOUBLE_COLUMN, draw_zoom, highest, new_figure, response_legend, styled
 
 AMPLITUDES = {"a": 0.25, "b": 0.5}  # zetahat
@@ -49,21 +48,10 @@ def zoom(ax: Any, tree: Any) -> None:
     draw_zoom(ax, tree, (0.34, 0.38), (*window, 0.0, 0.6 * highest(tree, *window) / scale), scale=scale)
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured | None]:
     """Every feature that the text names."""
-    amplitudes = {name: AMPLITUDES[name] for name in data.children}
-    return [*ground_spectra(data, amplitudes), *statements_chaos.ground_spectra(data, amplitudes)]
+    panels = {AMPLITUDES[name]: tree for name, tree in data.children.items()}
+    return {**response_measures.ground_spectra(panels), **chaos_measures.ground_spectra(panels)}
 
 
-FIGURE = PaperFigure(
-    name="fig10",
-    title="Fig. 10: response spectra under load (ii)",
-    caption=(
-        "As Fig. 9, under the horizontal ground motion ζ = ζ̂ sin Ωτ, in units of θ_eq = arccos(cos β₀ − ζ̂) − β₀. Below the "
-        "frequency at which the main branch begins the ground's acceleration is too small for any motion but rest; insets: what "
-        "lies between."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig10", compute=compute, draw=draw, measure=measure)

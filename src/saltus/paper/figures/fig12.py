@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from saltus.paper.claims import statements_chaos
-from saltus.paper.claims.claim import Claim
-from saltus.paper.claims.statements_spectra import force_diagrams
+from saltus.paper.claims.claim import Measured
 from saltus.paper.figures import diagrams
-from saltus.paper.figures.figure import PaperFigure
+from saltus.paper.figures.figure import paper_figure
+from saltus.paper.measures import chaos_measures, response_measures
 
 FREQUENCIES = {"a": 2.0, "b": 4.0}  # Omega
 LARGEST = {2.0: 5.0, 4.0: 9.0}  # Hhat, by Omega: beyond the first chaos
@@ -25,17 +24,10 @@ def draw(data: Any) -> Any:
     return diagrams.draw(data, FREQUENCIES, zoomed=0.6)
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured | None]:
     """Every feature that the text names."""
-    frequencies = {name: FREQUENCIES[name] for name in data.children}
-    return [*force_diagrams("fig12", data, frequencies), *statements_chaos.force_diagrams("fig12", data, frequencies)]
+    panels = {FREQUENCIES[name]: tree for name, tree in data.children.items()}
+    return {**response_measures.force_diagrams("fig12", panels), "fig12-shift": chaos_measures.shifts(panels)}
 
 
-FIGURE = PaperFigure(
-    name="fig12",
-    title="Fig. 12: bifurcation diagrams under load (i), Ω = 2 and 4",
-    caption=("As Fig. 11, for two higher frequencies."),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig12", compute=compute, draw=draw, measure=measure)

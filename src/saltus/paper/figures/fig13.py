@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim
-from saltus.paper.claims.statements_spectra import both_diagram
+from saltus.paper.claims.claim import Measured
+from saltus.paper.figure_data import TOLERANCE, dataset
 from saltus.paper.figures import spectra
 from saltus.paper.figures.diagrams import LEAST, frame
-from saltus.paper.figures.figure import PaperFigure
-from saltus.paper.provenance import TOLERANCE, dataset
+from saltus.paper.figures.figure import paper_figure
+from saltus.paper.measures.response_measures import both_diagram
 from saltus.plots import DOUBLE_COLUMN, FAINT, draw_response, highest, lowest, new_figure, response_legend, styled
 
 LARGEST = 3.0  # Hhat
@@ -70,20 +70,9 @@ def draw(data: Any) -> Any:
     return figure
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """The loss of symmetry, and what else the text says."""
-    return both_diagram(data)
+    return both_diagram(data["a"], data["mirror"])
 
 
-FIGURE = PaperFigure(
-    name="fig13",
-    title="Fig. 13: bifurcation diagram under load (iii)",
-    caption=(
-        "Largest (above) and least rotation (below) over one period of the motion against Ĥ under H = Ĥ sin Ωτ and "
-        "V = V̄ + V̂ cos Ωτ, V̄ = −0.5, V̂ = 0.25, Ω = 1, β₀ = 80°, C = 0.1; lines, dots and bands as in Fig. 11. The load is no "
-        "longer symmetric, and no motion is its own mirror image."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig13", compute=compute, draw=draw, measure=measure)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from saltus.paper.claims.claim import Claim
-from saltus.paper.claims.statements_charts import over_parameters
+from saltus.paper.claims.claim import Measured
 from saltus.paper.figures import charts
-from saltus.paper.figures.figure import PaperFigure
+from saltus.paper.figures.figure import paper_figure
+from saltus.paper.measures.chart_measures import over_parameters
 
 REFERENCE = "reference"  # Fig. 14 (d) again, which all are compared with
 PANELS: dict[str, dict[str, Any]] = {
@@ -27,19 +27,9 @@ def draw(data: Any) -> Any:
     return charts.draw(data.filter(lambda node: REFERENCE not in node.path.split("/")), columns=2, height=175.0)
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """The statements of the text on Fig. 15."""
     return over_parameters(data)
 
 
-FIGURE = PaperFigure(
-    name="fig15",
-    title="Fig. 15: stability charts for another angle, less and more damping",
-    caption=(
-        "As Fig. 14 for Ω = 1: (a) β₀ = 60°, C = 0.1; (b) β₀ = 80°, C = 0.05; (c) β₀ = 80°, C = 0.15. The reference, β₀ = 80° "
-        "and C = 0.1, is Fig. 14 (d)."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("fig15", compute=compute, draw=draw, measure=measure)

@@ -1,12 +1,15 @@
-"""What a part of the paper is: a computation, a picture drawn from its dataset alone, and the claims it bears on."""
+"""What a part of the paper is: a computation, a picture drawn from its dataset alone, and what it measures for its claims."""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
 from typing import Any
 
-from saltus.paper.claims.claim import Claim
+from saltus.paper.claims.claim import Claim, Measures, judge
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -15,7 +18,7 @@ class PaperFigure:
 
     1. `compute(**parameters)` returns an xarray DataTree: every number behind the picture, with units;
     2. `draw(data)` returns a matplotlib Figure from that data alone, or is None where there is nothing to draw;
-    3. `claims(data)` returns the statements that the data bears on, again from the data alone;
+    3. `measure(data)` returns the numbers for its claims, again from the data alone; the tables of claims hold the rest;
     4. `table(data)`, where given, returns Markdown.
     """
 
@@ -23,7 +26,7 @@ class PaperFigure:
     title: str
     caption: str
     compute: Callable[..., Any]
-    claims: Callable[[Any], list[Claim]]
+    measure: Callable[[Any], Measures] = lambda data: {}
     draw: Callable[[Any], Any] | None = None
     table: Callable[[Any], str] | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
@@ -33,7 +36,22 @@ class PaperFigure:
         """The module that computes it."""
         return self.compute.__module__
 
+    def claims(self, data: Any) -> list[Claim]:
+        """The claims that the data bears on, each with its verdict."""
+        return judge(self.name, self.measure(data))
+
     def files(self) -> list[str]:
         """The names of its outputs."""
         kinds = [".nc"] + ([".png", ".pdf"] if self.draw else []) + ([".md"] if self.table else [])
         return [self.name + kind for kind in kinds]
+
+
+def paper_figure(name: str, **parts: Any) -> PaperFigure:
+    """A `PaperFigure` with its title and caption from `captions.toml`."""
+    words = _captions()[name]
+    return PaperFigure(name=name, title=words["title"], caption=words["caption"], **parts)
+
+
+@cache
+def _captions() -> dict[str, dict[str, str]]:
+    return tomllib.loads((files("saltus.paper.figures") / "captions.toml").read_text(encoding="utf-8"))

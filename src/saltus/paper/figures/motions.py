@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.features import detached, main_branch, turning
-from saltus.paper.provenance import dataset
-from saltus.plots import pieces, runs
+from saltus.branch_lines import branch_lines, smooth_lines
+from saltus.paper.figure_data import dataset
+from saltus.paper.measures.spectrum_features import detached, main_branch, turning
 
 PHASES = 361  # over one forcing period
 BEYOND = 3e-3  # relative distance past a fold at which a motion is let go: nearer to it motions linger where the orbit was
@@ -68,7 +68,7 @@ def _stable_steps(branch: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The drawn line where it is stable: starts of its steps, their differences (n, 2), and the nearest points of the branch."""
     places = np.stack([branch["parameter"].values, branch["amplitude"].values], axis=1)
     starts, steps, near = [np.empty((0, 2))], [np.empty((0, 2))], [np.empty(0, dtype=int)]
-    for (stable, x, y), (_, points, _) in zip(pieces(branch), runs(branch), strict=True):
+    for (stable, x, y), (_, points, _) in zip(smooth_lines(branch), branch_lines(branch), strict=True):
         if stable:
             line, own = np.stack([x, y], axis=1), places[points.start : points.stop]
             distance = np.linalg.norm((line[:-1, None] - own) / np.ptp(places, axis=0), axis=2)

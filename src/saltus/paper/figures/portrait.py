@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from saltus.paper.figure_data import TOLERANCE, dataset
 from saltus.paper.figures.manifolds import Manifold, manifold
 from saltus.paper.figures.sampling import curve, padded
-from saltus.paper.provenance import TOLERANCE, dataset
 from saltus.systems import Load, Metainterface, System, VelocityReduction
 from saltus.theory import Equilibrium, equilibria, total_energy
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim, check
+from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figures import spectra
-from saltus.paper.figures.figure import PaperFigure
+from saltus.paper.figures.figure import paper_figure
 from saltus.plots import DOUBLE_COLUMN, FAINT, POINTS, STABLE, UNSTABLE, draw_bands, new_figure, panel_label, styled
 
 WINDOWS = {"a": (0.35, 0.42), "b": (0.405, 0.475)}  # Omega
@@ -74,39 +74,25 @@ def _exponents(ax: Any, tree: Any) -> None:
         )  # fmt: skip
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured | None]:
     """Both bands are chaos between periodic motions, not tori."""
-    return [_resolved(name, tree) for name, tree in data.children.items()]
+    return {f"quasi-{name}": _resolved(data[name]) if name in data.children else None for name in WINDOWS}
 
 
-def _resolved(name: str, tree: Any) -> Claim:
-    bands, table = tree["bands"], tree["exponents"]
-    chaotic = table["chaotic"].values.astype(bool)
-    periodic = int((~chaotic & ~table["undecided"].values.astype(bool)).any(axis=1).sum())
-    spans = ", ".join(f"{float(low):.5f} to {float(high):.5f}" for low, high in zip(bands["low"], bands["high"], strict=True))
+def _resolved(panel: Any) -> Measured:
+    bands, table, reason = panel["bands"], panel["exponents"], panel.attrs["torus"]
+    chaotic, undecided = (table[kind].values.astype(bool) for kind in ("chaotic", "undecided"))
+    periodic = int((~chaotic & ~undecided).any(axis=1).sum())
     largest = float(np.max(bands["exponent"].values, initial=-np.inf))
-    return check(
-        f"quasi-{name}",
-        "Fig. 9a" if name == "a" else "Fig. 10b",
-        "The response is quasi-periodic here",
-        printed=not tree.attrs["torus"],
-        corrected=bool(tree.attrs["torus"]) and largest > 0.0 and periodic > 0,
-        erratum=22,
-        evidence=f"{tree.attrs['torus']}; chaotic at Ω = {spans or 'none'}, λ up to {largest:.4f}, "
-        f"at rest or periodic at {periodic} of {chaotic.shape[0]} frequencies (some beside chaos)",
+    return measured(
+        not reason,
+        bool(reason) and largest > 0.0 and periodic > 0,
+        reason=reason,
+        bands=[{"low": low, "high": high} for low, high in zip(bands["low"].values, bands["high"].values, strict=True)],
+        largest=largest,
+        periodic=periodic,
+        frequencies=chaotic.shape[0],
     )
 
 
-FIGURE = PaperFigure(
-    name="quasi",
-    title="The bands called quasi-periodic, resolved (erratum 22)",
-    caption=(
-        "The windows in which the paper finds quasi-periodic motions. Above: the angle at phase 0 of the load in the last 64 "
-        "periods of motions from many starts. Below: their largest Lyapunov exponent per unit of time with its 95 % interval, "
-        "blue where it is proved to be chaos, red and open where it is undecided; what repeats itself or rests has none. Orange: "
-        "bands of chaos."
-    ),
-    compute=compute,
-    draw=draw,
-    claims=claims,
-)
+FIGURE = paper_figure("quasi", compute=compute, draw=draw, measure=measure)

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim, check
-from saltus.paper.figures.figure import PaperFigure
-from saltus.paper.provenance import dataset, tree
+from saltus.paper.claims.claim import Measured, measured, with_fields
+from saltus.paper.figure_data import dataset, tree
+from saltus.paper.figures.figure import paper_figure
 
 OPEN = -0.3  # rad, theta_2 of the examples with both layers deformed
 EXAMPLES: tuple[tuple[float, tuple[float, float], float], ...] = (
@@ -117,48 +117,17 @@ def _pretty(text: Any) -> str:
     return out
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """The table's scenarios, and erratum 16."""
-    rows = data["rows"]
+    rows, refused = data["rows"], bool(data["angles"]["refused"])
     same = all((rows[a].values == rows[b].values).all() for a, b in (("named", "scenario"), ("named_after", "deformed_after")))
     last = {name: float(rows[name][-1]) for name in ("impulse", "impulse_if_unchanged", "velocity_before_2", "velocity_after_2")}
-    return [
-        check(
-            "table1-scenarios",
-            "Table 1",
-            "An impact leads to no bouncing, bouncing or partial bouncing, by the number of deformed layers before and after",
-            printed=bool(same),
-            evidence=f"{rows.sizes['row']} computed states are named {rows['named'].values.tolist()}",
-        ),
-        check(
-            "table1-angles",
-            "Table 1",
-            "The angle |θⱼ| after an impact differs from θ*, the one before",
-            printed=not bool(data["angles"]["refused"]),
-            corrected=bool(data["angles"]["refused"]),
-            erratum=16,
-            evidence=f"`controtrot` makes angles continuous: {data['angles'].attrs['what']}",
-        ),
-        check(
-            "table1-other-layer",
-            "impact_condition2, Table 1",
-            "Bouncing leaves the velocity of the other, open layer unchanged",
-            printed=last["impulse_if_unchanged"],
-            corrected=last["impulse"],
-            erratum=16,
-            tolerance=1e-12,
-            evidence=f"M₁₂ ≠ 0: an unchanged θ₂' needs an impulse of {last['impulse_if_unchanged']:.4f} on the "
-            "layer that is not hit; its "
-            f"balance takes θ₂' from {last['velocity_before_2']:.4f} to {last['velocity_after_2']:.4f}",
-        ),
-    ]
+    found = {
+        "table1-scenarios": measured(bool(same), states=rows.sizes["row"], named=rows["named"].values.tolist()),
+        "table1-angles": measured(not refused, refused, refusal=data["angles"].attrs["what"]),
+        "table1-other-layer": measured(last["impulse_if_unchanged"], last["impulse"]),
+    }
+    return with_fields(last, found)
 
 
-FIGURE = PaperFigure(
-    name="table1",
-    title="Table 1: impact scenarios",
-    caption="Impact scenarios when the s-th layer impacts, as corrected by erratum 16, with a computed example of each row.",
-    compute=compute,
-    claims=claims,
-    table=table,
-)
+FIGURE = paper_figure("table1", compute=compute, table=table, measure=measure)

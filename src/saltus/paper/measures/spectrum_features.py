@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from saltus.plots import pieces, runs
+from saltus.branch_lines import branch_lines, branches_of, smooth_lines
 
 PROMINENT = 0.05  # of the highest amplitude, by which a resonance rises above the valleys beside it
 FREE_ENDS = ("closes", "bound")  # of a branch that hangs on no other
-
-
-def named_branches(spectrum: Any) -> Iterator[tuple[str, Any]]:
-    """(name, Dataset) of every branch, in order."""
-    for name in sorted(spectrum.children):
-        if name.startswith("branch_"):
-            yield name, spectrum[name].to_dataset()
 
 
 def within(spectrum: Any, branch: Any) -> np.ndarray:
@@ -30,13 +22,13 @@ def within(spectrum: Any, branch: Any) -> np.ndarray:
 
 def main_branch(spectrum: Any) -> Any:
     """The period-1 branch that covers most of the range."""
-    return max((b for _, b in named_branches(spectrum) if int(b["period"][0]) == 1), key=lambda b: np.ptp(b["parameter"].values))
+    return max((b for _, b in branches_of(spectrum) if int(b["period"][0]) == 1), key=lambda b: np.ptp(b["parameter"].values))
 
 
 def detached(spectrum: Any) -> list[tuple[str, Any]]:
     """The branches that no special point ties to another one and that reach into the range, without the main one."""
     found = []
-    for name, branch in named_branches(spectrum):
+    for name, branch in branches_of(spectrum):
         free = all(str(end).startswith(FREE_ENDS) for end in np.atleast_1d(branch.attrs["ends"]))
         same = branch.equals(main_branch(spectrum))
         if branch.attrs["origin"] == "start" and free and not same and within(spectrum, branch).any():
@@ -63,11 +55,11 @@ def superharmonic(branch: Any, share: float = PROMINENT) -> np.ndarray:
 
 def amplitudes_at(branch: Any, value: float, stable: bool | None = None) -> np.ndarray:
     """The amplitudes with which the line of a branch passes a value of the parameter, of (un)stable motions only if said so."""
-    return passing(list(pieces(branch)), value, stable)
+    return passing(list(smooth_lines(branch)), value, stable)
 
 
 def passing(lines: list[Any], value: float, stable: bool | None = None) -> np.ndarray:
-    """The same of the lines of one or more branches, as `pieces` gives them."""
+    """The same of the lines of one or more branches, as `smooth_lines` gives them."""
     found = [np.empty(0)]
     for holds, x, y in lines:
         if stable in (None, holds):
@@ -85,8 +77,8 @@ def stable_motions(spectrum: Any, values: np.ndarray) -> np.ndarray:
     """How many stable periodic motions coexist at values of the parameter (n,), mirror images counted once, (n,)."""
     values = np.asarray(values, dtype=float)
     number = np.zeros(values.shape, dtype=int)
-    for _, branch in named_branches(spectrum):
-        for stable, x, _ in pieces(branch):
+    for _, branch in branches_of(spectrum):
+        for stable, x, _ in smooth_lines(branch):
             if stable:
                 number += _passes(x, values[:, None]).sum(axis=1)
     return number
@@ -107,7 +99,7 @@ def count(spectrum: Any, kind: str) -> int:
     low, high = spectrum.attrs["bounds"]
     return sum(
         int(((b["kind"] == kind) & (b["special_parameter"] >= low) & (b["special_parameter"] <= high)).sum())
-        for _, b in named_branches(spectrum)
+        for _, b in branches_of(spectrum)
         if "kind" in b
     )
 
@@ -117,6 +109,13 @@ def turning(branch: Any) -> np.ndarray:
     if "kind" not in branch:
         return np.empty(0)
     folds = branch["special_parameter"].values[branch["kind"].values == "LP"]
-    lines = list(runs(branch))
-    meets = [one[-1, 0] for (before, _, one), (after, _, _) in pairwise(lines) if before != after]
+    lines = list(branch_lines(branch))
+    meets = [one.places[-1, 0] for one, two in pairwise(lines) if one.stable != two.stable]
     return np.array([fold for fold in folds if fold in meets])
+
+
+def range_counts(spectrum: Any, samples: int) -> tuple[np.ndarray, np.ndarray]:
+    """Values spread evenly over the range, and how many stable motions there are at each."""
+    low, high = (float(bound) for bound in spectrum.attrs["bounds"])
+    values = low + (high - low) * (np.arange(samples) + 0.5) / samples
+    return values, stable_motions(spectrum, values)

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim, check
-from saltus.paper.claims.statements_dynamics import random_case
-from saltus.paper.provenance import dataset
+from saltus.paper.claims.claim import Measured, measured, with_fields
+from saltus.paper.figure_data import scalar_dataset, scalars
+from saltus.paper.sections.equations_of_motion import random_case
 
 TIME = 0.2  # of the impacts, at which every load and ground velocity has some value
 
@@ -20,7 +20,7 @@ def compute(impacts: int = 400) -> Any:
     jumps = [_jump(rng, e) for e in np.where(rng.random(impacts // 4) < 0.3, 1.0, rng.uniform(0.1, 1, impacts // 4))]
     values: dict[str, Any] = {name: max(row[name] for row in jumps) for name in jumps[0]}
     values |= {**_no_jump(), **_energies(rng, impacts), **_still_ground(), **_without_root(), **_inelastic(rng), **_pushing(rng)}
-    return dataset({name: ((), value) for name, value in values.items()}, what="impacts", impacts=impacts)
+    return scalar_dataset(values, what="impacts", impacts=impacts)
 
 
 def _jump(rng: np.random.Generator, e: float) -> dict[str, float]:
@@ -180,116 +180,22 @@ def _least_factor(model: Any, layer: int) -> float:
     return -none / (full - none)
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """Section 4."""
-    r = {name: float(value) for name, value in data.to_dataset().items()}
-    n = data.attrs["impacts"]
-    return [
-        check(
-            "accjump",
-            "accjump",
-            "The jump of the acceleration at an impact",
-            printed=r["jump_printed"],
-            corrected=r["jump_corrected"],
-            erratum=4,
-            tolerance=1e-12,
-            evidence=f"accelerations of both sides at v− and v+ = e v−, {n // 4} random impacts: each velocity "
-            "belongs to its own side",
+    r, n = scalars(data), int(data.attrs["impacts"])
+    found = {
+        "accjump": measured(r["jump_printed"], r["jump_corrected"]),
+        "accjump-symmetric": measured(r["reduced_printed"], r["reduced_corrected"]),
+        "accjump-always": measured(r["jump_vanishes"] > 1e-9, r["jump_vanishes"] < 1e-15),
+        "accjump-ground": measured(r["jump_with_ground"]),
+        "restitution": measured(r["r_printed"], r["r_corrected"]),
+        "restitution-still": measured(r["r_still"]),
+        "restitution-decrease": measured(r["sign_printed"] == 0, r["sign_corrected"] == 0),
+        "restitution-e-1": measured(r["change_at_e_1"], r["change_at_e_1"] > 1e-3),
+        "restitution-solvable": measured(
+            math.isfinite(r["root_slow"]), math.isnan(r["root_slow"]) and abs(r["restitution_fast"] - 0.6) < 1e-12
         ),
-        check(
-            "accjump-symmetric",
-            "accjump_red",
-            "The jump of the acceleration of the symmetric system",
-            printed=r["reduced_printed"],
-            corrected=r["reduced_corrected"],
-            erratum=4,
-            tolerance=1e-12,
-            evidence="−C [θ'] + 2 s cos β₀ (V − ν''), s the sign of the velocity",
-        ),
-        check(
-            "accjump-always",
-            "section 4",
-            "A jump of the acceleration is always present",
-            printed=r["jump_vanishes"] > 1e-9,
-            corrected=r["jump_vanishes"] < 1e-15,
-            erratum=4,
-            evidence=f"with e = 1 and V = ν'' it is {r['jump_vanishes']:.0e}",
-        ),
-        check(
-            "accjump-ground",
-            "accjump",
-            "The horizontal acceleration of the ground does not enter the jump",
-            printed=r["jump_with_ground"],
-            tolerance=1e-14,
-            evidence="jump with ζ'' = 2 less jump with ζ'' = 0",
-        ),
-        check(
-            "restitution",
-            "rest_def_vel",
-            "r as a function of e and of the ground's velocities",
-            printed=r["r_printed"],
-            corrected=r["r_corrected"],
-            erratum=5,
-            evidence=f"kinetic energies of both masses from `kin_eng`, {n} random impacts with any m (printed formula: m = 0)",
-        ),
-        check(
-            "restitution-still",
-            "rest_def_red",
-            "r = e² on a ground at rest (m = 0)",
-            printed=r["r_still"],
-            tolerance=1e-14,
-            evidence="both sides, e = 0.2, 0.8, 1",
-        ),
-        check(
-            "restitution-decrease",
-            "condition after rest_def_red",
-            "The kinetic energy falls exactly if [(1+e) θ' + 2 (ζ' sin β₀ + ν' cos β₀)] θ' > 0",
-            printed=r["sign_printed"] == 0,
-            corrected=r["sign_corrected"] == 0,
-            erratum=5,
-            evidence=f"wrong for {r['sign_printed']:.0f} of {n // 2} random impacts with m = 0; the corrected one for "
-            f"{r['sign_corrected']:.0f} of {n}",
-        ),
-        check(
-            "restitution-e-1",
-            "section 4",
-            "With e = 1 the kinetic energy is continuous",
-            printed=r["change_at_e_1"],
-            corrected=r["change_at_e_1"] > 1e-3,
-            erratum=5,
-            evidence=f"with ν' ≠ 0 it changes, here by {r['change_at_e_1']:.0%} in the median: the vertical "
-            "velocity of the mass turns round",
-        ),
-        check(
-            "restitution-solvable",
-            "rest_def",
-            "An energy restitution r with a moving ground gives the velocity after the impact",
-            printed=math.isfinite(r["root_slow"]),
-            corrected=math.isnan(r["root_slow"]) and abs(r["restitution_fast"] - 0.6) < 1e-12,
-            erratum=26,
-            evidence=f"β₀ = 80°, ζ' = 0.5, r = 0.6: no root of the sign of v− = 0.05; v− = 2 gives v+ = {r['root_fast']:.6f}",
-        ),
-        check(
-            "restitution-closed-form",
-            "section 4",
-            "No closed form of the restitution can be derived",
-            printed=r["inelastic"] > 1e-9,
-            corrected=max(r["inelastic"], abs(r["outside"])),
-            erratum=25,
-            tolerance=1e-12,
-            evidence="frictionless inelastic contact: θ'+ = −cos 2β₀ θ'− (over 1+m from the upper layer), here "
-            f"{r['inelastic_factor']:.6f} at "
-            f"80°, against the solved balance of both layers; {r['outside']:.0f} outside 45° to 135°",
-        ),
-        check(
-            "restitution-range",
-            "vel_red",
-            "Any velocity factor e in (0, 1] is possible at an impact without bouncing",
-            printed=r["least_e"] <= 0,
-            corrected=r["pushing"],
-            tolerance=1e-13,
-            erratum=29,
-            evidence="momentum balance of both layers: the contact of the layer that opens can only push it open, which needs "
-            f"e ≥ −cos 2β₀ (over 1+m going down), here {r['least_e']:.6f} at 80°; Fig. 4b has e = 0.8 (docs/errata.md)",
-        ),
-    ]
+        "restitution-closed-form": measured(r["inelastic"] > 1e-9, max(r["inelastic"], abs(r["outside"]))),
+        "restitution-range": measured(r["least_e"] <= 0, r["pushing"]),
+    }
+    return with_fields(r | {"impacts": n, "jumps": n // 4, "impacts_without_m": n // 2}, found)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim, check, compare
-from saltus.paper.provenance import dataset
+from saltus.paper.claims.claim import Measured, measured, with_fields
+from saltus.paper.figure_data import scalar_dataset, scalars
 
 CELLS = ((0.5, 1.2), (0.8, 1.4), (1.1, 0.9), (0.6, 1.9))  # alpha0, beta0, rad
 
@@ -18,7 +18,7 @@ def compute() -> Any:
     rows = [_cell(*angles) for angles in CELLS]
     worst = {name: max(row[name] for row in rows) for name in rows[0]}
     values = {**worst, **_limits(), **_dimensions()}
-    return dataset({name: ((), value) for name, value in values.items()}, what="residuals of the kinematics")
+    return scalar_dataset(values, what="residuals of the kinematics")
 
 
 def _cell(alpha0: float, beta0: float) -> dict[str, float]:
@@ -102,102 +102,22 @@ def _dimensions() -> dict[str, float]:
     }
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """Section 2."""
-    r = {name: float(value) for name, value in data.to_dataset().items()}
-    cells = f"{len(CELLS)} cells"
-    return [
-        check(
-            "chi",
-            "psi_lambda_chi",
-            "With χ = sin(2α₀ + β₀)/sin(α₀ + β₀), αⱼ(φⱼ = 0) = α₀",
-            printed=r["chi_printed"],
-            corrected=r["chi_corrected"],
-            erratum=1,
-            evidence=f"residual of cos α at φ = 0 over {cells}; χ needs a factor 1/2, and ψ sin²β₀ (sin(β₀²) "
-            f"leaves {r['psi_misread']:.2f})",
+    r = scalars(data)
+    found = {
+        "chi": measured(r["chi_printed"], r["chi_corrected"]),
+        "theta-definition": measured(r["theta_1_drop"] <= 0, r["theta_1_corrected"] < 1e-10),
+        "configalpha": measured(r["configalpha_printed"], r["configalpha_corrected"]),
+        "geometry": measured(max(r["bar_lengths"], r["alpha_drawn"])),
+        "configdbeta": measured(r["places"]),
+        "line-limit": measured(r["line_limit"]),
+        "kinematic-limit": measured(
+            r["second_line"] <= r["kinematic_limit"],
+            r["second_line"] > r["kinematic_limit"] and abs(r["phi_at_limit"]) < 1e-6 and r["cosine_needed_beyond"] < 0,
         ),
-        check(
-            "theta-definition",
-            "definition of θⱼ",
-            "θⱼ = (−1)ʲ (βⱼ − β₀), so that θ₁ ≥ 0",
-            printed=r["theta_1_drop"] <= 0,
-            corrected=r["theta_1_corrected"] < 1e-10,
-            erratum=2,
-            evidence=f"as printed θ₁ falls to −{r['theta_1_drop']:.3f} rad where βⱼ > β₀; θⱼ = −(−1)ʲ (βⱼ − β₀) "
-            "gives the angles back",
-        ),
-        check(
-            "configalpha",
-            "configalpha",
-            "αⱼ(θⱼ) in closed form agrees with αⱼ(φⱼ)",
-            printed=r["configalpha_printed"],
-            corrected=r["configalpha_corrected"],
-            erratum=3,
-            evidence=f"residual of cos α against `gen_conf` over {cells}, openings up to 0.95 of the straight line",
-        ),
-        check(
-            "geometry",
-            "gen_conf",
-            "The bars keep their lengths and the diagonals their angles αⱼ in every configuration",
-            printed=max(r["bar_lengths"], r["alpha_drawn"]),
-            evidence=f"constructed positions of all bars, {cells}",
-        ),
-        check(
-            "configdbeta",
-            "configdbeta",
-            "ξⱼ and ηⱼ as functions of θⱼ",
-            printed=r["places"],
-            evidence=f"against the constructed positions of both masses, {cells}",
-        ),
-        compare(
-            "line-limit",
-            "line_cond, section 6",
-            "A layer becomes a line segment at π − β₀ for β₀ = 80°",
-            printed="110",
-            corrected="100",
-            erratum=19,
-            unit="deg",
-            value=r["line_limit"],
-            evidence=f"the height of the layer there is η = {r['height_on_line']:.1e}",
-        ),
-        check(
-            "kinematic-limit",
-            "line_cond",
-            "Rotations have no limit, so that lines with n ≥ 2 are reached too",
-            printed=r["second_line"] <= r["kinematic_limit"],
-            corrected=r["second_line"] > r["kinematic_limit"] and abs(r["phi_at_limit"]) < 1e-6 and r["cosine_needed_beyond"] < 0,
-            erratum=20,
-            evidence=f"n = 2 would need {r['second_line']:.0f}°; at {r['kinematic_limit']:.0f}° = 2(π − β₀) the "
-            "slider closes again "
-            f"(φ = {r['phi_at_limit']:.0e}) and beyond it tan²φ would be negative",
-        ),
-        check(
-            "max-displacement",
-            "max_disp_condition",
-            "|ξⱼ| is bounded by 1 + cos β₀",
-            printed=max(0.0, r["largest_displacement"] - r["bound"]),
-            evidence=f"largest {r['largest_displacement']:.6f}, bound {r['bound']:.6f}, at the straight line",
-        ),
-        check(
-            "damping-dimension",
-            "disip_ratio",
-            "The damping ratio C₂/(M₂ l²) is dimensionless",
-            printed=r["damping_printed_ratio"] - 1,
-            corrected=r["damping_ratio"] - 1,
-            erratum=13,
-            evidence="the same cell in seconds and in milliseconds: the printed ratio changes by "
-            f"{r['damping_printed_ratio']:g}; "
-            "C₂ T/(M₂ l²) does not",
-        ),
-        check(
-            "time-scale",
-            "section 5.3, timeT",
-            "τ = t √(M₂/K₂)",
-            printed=r["tau_printed"] - r["tau_of_frequency"],
-            corrected=r["tau_corrected"] - r["tau_of_frequency"],
-            erratum=13,
-            evidence=f"l = 0.2 m, M₂ = 1.5 kg, K₂ = 3 N m: 1 s is τ = {r['tau_corrected']:.4f}, as printed "
-            f"{r['tau_printed']:.4f}",
-        ),
-    ]
+        "max-displacement": measured(max(0.0, r["largest_displacement"] - r["bound"])),
+        "damping-dimension": measured(r["damping_printed_ratio"] - 1, r["damping_ratio"] - 1),
+        "time-scale": measured(r["tau_printed"] - r["tau_of_frequency"], r["tau_corrected"] - r["tau_of_frequency"]),
+    }
+    return with_fields(r | {"cells": len(CELLS)}, found)

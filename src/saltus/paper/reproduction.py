@@ -40,7 +40,7 @@ def reproduce(
     Raises:
         ParameterError: an unknown name, with the near ones; an output folder that cannot be written to.
     """
-    from saltus.paper import FIGURES
+    from saltus.paper.parts import FIGURES
 
     for name in names:
         if name not in FIGURES:

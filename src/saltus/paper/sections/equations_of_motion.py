@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.claims.claim import Claim, check
-from saltus.paper.provenance import dataset
+from saltus.paper.claims.claim import Measured, measured, with_fields
+from saltus.paper.figure_data import scalar_dataset, scalars
 
 
 def compute(states: int = 40) -> Any:
@@ -16,9 +16,7 @@ def compute(states: int = 40) -> Any:
     rows = [_residuals(rng) for _ in range(states)]
     values = {name: max(row[name] for row in rows) for name in rows[0]}
     values |= {**_equivalence(rng), **_symmetry(rng), **_closed_layer()}
-    return dataset(
-        {name: ((), value) for name, value in values.items()}, what="residuals of the equations of motion", states=states
-    )
+    return scalar_dataset(values, what="residuals of the equations of motion", states=states)
 
 
 def random_case(rng: np.random.Generator, beta0: float | None = None) -> tuple[Any, Any, Any]:
@@ -193,88 +191,18 @@ def _closed_layer() -> dict[str, float]:
     return {"reaction_onset": float(brentq(reaction, 0.01, 5.0)), "reaction_slow": reaction(0.3), "reaction_fast": reaction(1.5)}
 
 
-def claims(data: Any) -> list[Claim]:
+def measure(data: Any) -> dict[str, Measured]:
     """Section 3 and the reduction."""
-    r = {name: float(value) for name, value in data.to_dataset().items()}
-    states = f"{data.attrs['states']} random parameter sets, loads and states"
-    return [
-        check(
-            "kinetic-energy",
-            "kin_eng",
-            "The kinetic energy in the angles and velocities",
-            printed=r["kinetic"],
-            tolerance=1e-8,
-            evidence=f"velocities of both masses of the constructed cell on a moving ground, by differences, {states}",
-        ),
-        check(
-            "lagrange",
-            "eomnl",
-            "M, C, D, K and f follow from the kinetic and potential energy, the Rayleigh function and the forces",
-            printed=r["lagrange"],
-            tolerance=1e-7,
-            evidence=f"Euler-Lagrange expressions by differences along the motion, {states}",
-        ),
-        check(
-            "linearised",
-            "M₀, K₀(τ), f₀",
-            "The linearised equations",
-            printed=r["linear"],
-            tolerance=1e-12,
-            evidence=f"derivatives of K θ − f at θ = 0, {states}",
-        ),
-        check(
-            "reduction",
-            "gov_eqn_theta_long",
-            "With one layer open the two equations become a single one",
-            printed=r["reduction"],
-            tolerance=1e-12,
-            evidence=f"row of the open layer with the other closed, {states}",
-        ),
-        check(
-            "one-open-layer",
-            "section 4",
-            "At every time only one layer is deformed",
-            printed=r["reaction_fast"] >= 0,
-            corrected=r["reaction_slow"] > 0 > r["reaction_fast"],
-            erratum=21,
-            evidence="an assumption with a range: right after a crossing the closed layer's reaction has the "
-            "wrong sign for |θ'| > "
-            f"{r['reaction_onset']:.4f} (β₀ = 80°, V = −0.5, free, undamped)",
-        ),
-        check(
-            "symmetry",
-            "gov_eqn_theta",
-            "The response is symmetric for m = v = h = 0, k = c = 1",
-            printed=r["symmetry"],
-            tolerance=1e-12,
-            evidence=f"accelerations under reversed loads; with k = 1.7 alone the gap is {r['symmetry_unequal']:.2f}",
-        ),
-        check(
-            "symmetry-general",
-            "gov_eqn_theta",
-            "Symmetry needs m = v = h = 0, k = c = 1",
-            printed=r["symmetry_scaled"] > 1e-9,
-            corrected=r["symmetry_scaled"] < 1e-12,
-            erratum=18,
-            evidence=f"k = c = 1+m = 1+h = 1+v = 1.7 is symmetric too (gap {r['symmetry_scaled']:.1e})",
-        ),
-        check(
-            "pendulum",
-            "gov_eqn_special",
-            "For β₀ = π/2 the system is a smooth inverted pendulum on a spring",
-            printed=r["pendulum"],
-            tolerance=1e-12,
-            evidence="accelerations on both sides under every upper load",
-        ),
-        check(
-            "ground-force",
-            "loadpathaa",
-            "Ground motion ζ̂ is equivalent to load (i) with Ĥ = −Ω² ζ̂",
-            printed=r["force_printed"],
-            corrected=r["force_corrected"],
-            erratum=14,
-            tolerance=1e-12,
-            evidence="accelerations over time; the sign is +, and unequal layers need h = m too (without it "
-            f"{r['force_unequal']:.2f})",
-        ),
-    ]
+    r = scalars(data)
+    found = {
+        "kinetic-energy": measured(r["kinetic"]),
+        "lagrange": measured(r["lagrange"]),
+        "linearised": measured(r["linear"]),
+        "reduction": measured(r["reduction"]),
+        "one-open-layer": measured(r["reaction_fast"] >= 0, r["reaction_slow"] > 0 > r["reaction_fast"]),
+        "symmetry": measured(r["symmetry"]),
+        "symmetry-general": measured(r["symmetry_scaled"] > 1e-9, r["symmetry_scaled"] < 1e-12),
+        "pendulum": measured(r["pendulum"]),
+        "ground-force": measured(r["force_printed"], r["force_corrected"]),
+    }
+    return with_fields(r | data.attrs, found)

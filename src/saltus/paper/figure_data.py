@@ -1,0 +1,64 @@
+"""Datasets that say what they are: units on every variable, and what was computed, with which system, at which accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import xarray as xr
+
+from saltus.provenance import provenance
+from saltus.systems import System
+
+TOLERANCE = 1e-12  # of every motion behind a figure
+
+
+def dataset(
+    variables: Mapping[str, tuple[Any, ...]],
+    coords: Mapping[str, Any] | None = None,
+    *,
+    what: str,
+    system: System | None = None,
+    **attributes: Any,
+) -> xr.Dataset:
+    """A Dataset from `name: (dims, values, units, meaning)`, with its provenance in its attributes."""
+    parts = {name: _variable(*parts) for name, parts in variables.items()}
+    axes = {name: _variable(*parts) if isinstance(parts, tuple) else parts for name, parts in (coords or {}).items()}
+    return xr.Dataset(parts, axes, provenance(system, what=what, **attributes))
+
+
+def _variable(dims: Any, values: Any, units: str = "1", meaning: str = "") -> xr.Variable:
+    return xr.Variable(dims, values, {"units": units, **({"long_name": meaning} if meaning else {})})
+
+
+def scalar_dataset(values: Mapping[str, float], *, what: str, **attributes: Any) -> xr.Dataset:
+    """A Dataset of single numbers without a unit, with its provenance."""
+    return dataset({name: ((), value) for name, value in values.items()}, what=what, **attributes)
+
+
+def scalars(data: Any) -> dict[str, float]:
+    """The numbers of a group of a DataTree that holds nothing else, by name."""
+    return {name: float(value) for name, value in data.to_dataset().items()}
+
+
+def tree(groups: Mapping[str, xr.Dataset], *, what: str, **attributes: Any) -> xr.DataTree:
+    """A DataTree of named datasets, such as the panels of a figure."""
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=provenance(what=what, **attributes)), **dict(groups)})
+
+
+def joined(panels: Mapping[str, xr.DataTree], *, what: str) -> xr.DataTree:
+    """The trees of a figure's panels as one DataTree; every variable has units, and every group its provenance."""
+    parts = {"/": xr.Dataset(attrs=provenance(what=what))}
+    for name, panel in panels.items():
+        for node in panel.subtree:
+            data = node.to_dataset(inherit=False)
+            data.attrs = provenance(what=node.name if node is not panel else what) | data.attrs
+            for variable in data.variables.values():
+                variable.attrs.setdefault("units", "1")
+            parts[f"{name}/{node.relative_to(panel)}".removesuffix("/.")] = data
+    return xr.DataTree.from_dict(parts)
+
+
+def with_groups(tree: xr.DataTree, groups: Mapping[str, xr.Dataset]) -> xr.DataTree:
+    """A tree with further datasets as its children."""
+    return tree.assign({name: xr.DataTree(data) for name, data in groups.items()})

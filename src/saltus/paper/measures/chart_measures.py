@@ -1,0 +1,194 @@
+"""What the text says of Figs. 14 and 15, measured: each trend answered by a number.
+
+The panels of a figure are given by the value that tells them apart, in rising order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from saltus.paper.claims.claim import Measured, measured
+from saltus.paper.measures.chart_areas import chart_cells, gained, lost, lost_by_curves, onset
+
+Panels = Mapping[float, Any]
+
+SHALLOW = -1.0  # V above which no deformed equilibrium is there without a horizontal load, for any of the charts
+PRIMARY = (0.7, 1.6)  # Omega about 1: the frequencies of Fig. 14 beside it
+SLOW = 0.25  # Omega: far below resonance motions follow the loads, and nothing is anticipated
+NARROW = 0.15  # of the quasi-static domain
+FEW = 0.02  # of the changes looked into: at no special point that could be located
+SLIGHT = 0.15  # relative
+ROWS = np.linspace(-1.2, -0.2, 41)  # V at which the onset is compared
+REFERENCE_V = np.array([-0.5])  # at which the onset is named
+
+
+def over_frequency(data: Any) -> dict[str, Measured]:
+    """Fig. 14."""
+    panels = dict(sorted((float(tree.attrs["frequency"]), tree) for tree in data.children.values()))
+    return {
+        "fig14-anticipates": _anticipates(panels),
+        "fig14-frequency": _grows_with_frequency(panels),
+        "fig14-amplitude": _largest_amplitude(panels),
+        "fig14-second": _second_motion(panels),
+        "fig14-onset": _onset(panels),
+        "fig14-closed-form": _closed_form(panels),
+        "fig14-agreement": agreement(data),
+    }
+
+
+def _anticipates(panels: Panels) -> Measured:
+    """As printed: at every frequency. Erratum 34: not far below resonance, where cells with nothing but rest are even gained."""
+    rows = [{"frequency": w, "lost": lost(tree), "gained": gained(tree)} for w, tree in panels.items()]
+    always = bool(rows) and all(row["lost"] > row["gained"] for row in rows)
+    fast = bool(rows) and all((row["lost"] > row["gained"]) == (row["frequency"] > SLOW) for row in rows)
+    return measured(always, fast, panels=rows)
+
+
+def _grows_with_frequency(panels: Panels) -> Measured:
+    shares = [lost(tree) for tree in panels.values()]
+    exact = [{"frequency": w, "share": lost_by_curves(tree)} for w, tree in panels.items()]
+    return measured(
+        len(shares) > 1 and bool((np.diff(shares) > 0).all()),
+        panels=[{"frequency": w, "share": share} for w, share in zip(panels, shares, strict=True)],
+        exact=[row for row in exact if math.isfinite(row["share"])],
+    )
+
+
+def _largest_amplitude(panels: Panels) -> Measured:
+    """Over the loads that every chart shows and under which rest is the only state without a horizontal load."""
+    widest = min(float(tree["chart"]["horizontal"].max()) for tree in panels.values())
+    rows = []
+    for frequency, tree in panels.items():
+        cells = chart_cells(tree)
+        size = cells.amplitude[np.ix_(cells.vertical > SHALLOW, cells.horizontal <= widest)]
+        largest, mean = float(np.nanmax(size, initial=0.0)), float(np.nan_to_num(size).mean())
+        rows.append({"frequency": frequency, "largest": largest, "mean": mean})
+    tops = [max(rows, key=lambda row: row[name])["frequency"] for name in ("largest", "mean")]
+    holds = len(rows) > 1 and all(PRIMARY[0] <= top <= PRIMARY[1] for top in tops)
+    return measured(holds, shallow=SHALLOW, widest=widest, panels=rows)
+
+
+def _second_motion(panels: Panels) -> Measured:
+    """As printed: in a narrow region. Erratum 33: in a strip of six impacts below Hcr, and wide ones of longer periods."""
+    fast = max(panels)
+    cells = chart_cells(panels[fast])
+    domain, period_three = cells.static, cells.with_motion(3, 2)
+    several = (cells.count >= 2) & domain
+    share, six, three = (
+        float((where & domain).sum() / max(domain.sum(), 1)) for where in (several, cells.with_motion(1, 6), period_three)
+    )
+    first = float(cells.horizontal[period_three.any(axis=0)].min(initial=np.inf))
+    found = bool(several.any())
+    return measured(
+        found and share < NARROW,
+        found and share >= NARROW and six > 0.0,
+        frequency=fast, several=share, six=six, three=three, first=first,
+    )  # fmt: skip
+
+
+def _onset(panels: Panels) -> Measured:
+    frequency = min(panels, key=lambda w: abs(w - 1.0))
+    value = float(onset(panels[frequency], REFERENCE_V)[0])
+    border = panels[frequency]["static"]
+    static = float(np.interp(REFERENCE_V, border["vertical"], border["true"])[0])
+    return measured(value < 0.5 * static, frequency=frequency, onset=value, static=static)
+
+
+def _closed_form(panels: Panels) -> Measured:
+    from saltus.theory import high_frequency_onset
+
+    fast = max(panels)
+    attrs = panels[fast].attrs
+    beta0, damping = math.radians(float(attrs["beta0_degrees"])), float(attrs["damping"])
+    known = [high_frequency_onset(fast, beta0=beta0, vertical=v, damping=damping, order=2) for v in ROWS]
+    away = _farthest(onset(panels[fast], ROWS) / np.array(known))
+    return measured(False, away < 0.02, frequency=fast, low=ROWS[0], high=ROWS[-1], difference=away)
+
+
+def agreement(data: Any) -> Measured:
+    """Charts from simulation against orbits from continuation: every motion of a cell that its neighbour lacks."""
+    judged, rows = [], []
+    for tree in data.children.values():
+        differ, added = tree["disagreements"].to_dataset(), int(tree["chart"].attrs.get("added_by_continuation", 0))
+        total, at_rest, curves, chaos, harmless = (
+            int(differ.attrs[key]) for key in ("changes", "changes_beside_rest", "on_curves", "chaos_beside_rest", "harmless")
+        )
+        looked, beside = differ["looked_into"].values.astype(bool), differ["beside_rest"].values.astype(bool)
+        known, known_at_rest = total - int((~looked).sum()), at_rest - int((beside & ~looked).sum())
+        judged += [known > 0 and looked.sum() <= FEW * known]
+        judged += [known_at_rest > 0 and (looked & beside).sum() <= FEW * known_at_rest]
+        rows.append(
+            {
+                "frequency": float(tree.attrs["frequency"]),
+                "located": total - len(looked) - harmless,
+                "changes": known - harmless,
+                "on_curves": curves,
+                "located_at_rest": at_rest - beside.sum(),
+                "changes_at_rest": known_at_rest,
+                "chaos": chaos,
+                "not_looked_into": (~looked).sum(),
+                "harmless": harmless,
+                "added": added,
+            }
+        )
+    return measured(bool(judged) and all(judged), panels=rows)
+
+
+def over_parameters(data: Any) -> dict[str, Measured]:
+    """Fig. 15, against the reference."""
+    panels = {_parameters(tree): tree for tree in data.children.values()}
+    angles = dict(sorted((beta0, tree) for (beta0, damping), tree in panels.items() if damping == 0.1))
+    dampings = dict(sorted((damping, tree) for (beta0, damping), tree in panels.items() if beta0 == 80.0))
+    return {
+        "fig15-angle-border": _border_and_angle(angles),
+        "fig15-angle-amplitude": _amplitude_falls(angles),
+        "fig15-damping-amplitude": _amplitude_falls(dampings),
+        "fig15-damping-domain": _domain_and_damping(dampings),
+        "fig15-agreement": agreement(data),
+    }
+
+
+def _parameters(tree: Any) -> tuple[float, float]:
+    return round(float(tree.attrs["beta0_degrees"]), 6), round(float(tree.attrs["damping"]), 6)
+
+
+def _border_and_angle(angles: Panels) -> Measured:
+    ends = (min(angles), max(angles))
+    one, two = (onset(angles[beta0], ROWS) for beta0 in ends)
+    static = [np.abs(ROWS / math.tan(math.radians(beta0))) for beta0 in ends]
+    place, shape = _farthest(one / two), _farthest((one / static[0]) / (two / static[1]))
+    return measured(
+        min(shape, place) < SLIGHT,
+        low_angle=ends[0], high_angle=ends[1], low=ROWS[0], high=ROWS[-1], place=place, shape=shape,
+    )  # fmt: skip
+
+
+def _farthest(ratio: np.ndarray) -> float:
+    """By how much ratios differ from 1 at most; infinite where there are none."""
+    known = ratio[np.isfinite(ratio)]
+    return float(np.abs(known - 1).max()) if known.size else np.inf
+
+
+def _amplitude_falls(panels: Panels) -> Measured:
+    """The largest amplitude of a chart, and where both have motions the share of cells in which it is smaller."""
+    sizes = {value: chart_cells(tree).amplitude for value, tree in panels.items()}
+    largest = [float(np.nanmax(size)) for size in sizes.values()]
+    shares = []
+    for one, two in pairwise(sizes.values()):
+        both = np.isfinite(one) & np.isfinite(two)
+        shares.append({"share": float((two < one)[both].mean())})
+    rows = [{"value": value, "size": size} for value, size in zip(sizes, largest, strict=True)]
+    return measured(len(rows) > 1 and bool((np.diff(largest) < 0).all()), panels=rows, shares=shares)
+
+
+def _domain_and_damping(dampings: Panels) -> Measured:
+    filled = [float((~chart_cells(tree).only_rest).mean()) for tree in dampings.values()]
+    begins = [float(onset(tree, REFERENCE_V)[0]) for tree in dampings.values()]
+    holds = len(filled) > 1 and bool((np.diff(filled) < 0).all()) and bool((np.diff(begins) > 0).all())
+    cases = zip(dampings, filled, begins, strict=True)
+    return measured(holds, panels=[{"damping": c, "share": share, "onset": h} for c, share, h in cases])

@@ -1,0 +1,276 @@
+"""What section 6 says of Figs. 9 to 13, measured: knots, superharmonics, loops, jumps, onsets, coexistence, symmetry.
+
+The panels of a figure are given by the value that tells them apart, such as {0.2: tree, 0.5: tree}, in rising order. What it says
+of chaotic and quasi-periodic bands is measured in `chaos_measures.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from saltus.branch_lines import branches_of, smooth_lines
+from saltus.paper.claims.claim import Measured, measured
+from saltus.paper.measures.spectrum_features import (
+    PROMINENT,
+    amplitudes_at,
+    count,
+    detached,
+    first_fold,
+    main_branch,
+    passing,
+    range_counts,
+    stable_motions,
+    superharmonic,
+)
+
+Panels = Mapping[float, Any]
+
+CONFIRMED = 1e-8  # distance of a stable motion from itself, by direct simulation
+BESIDE = 1e-9  # relative
+ON_BRANCH = 2e-2  # rad between a simulated attractor and the line drawn between the points of its branch
+EQUAL = 1e-10  # rad between amplitudes that are equal
+RESONANCE = 0.9  # Omega of the primary one, about (Fig. 9)
+SAMPLES = 600  # values at which motions are counted, an even number
+APART = 0.1  # rad: motions or amplitudes that plainly differ
+LARGE_LOAD = 0.5  # Hhat from which detached loops are there
+SHOWN_LOOPS = 3  # whose range of frequencies is named
+LOADS = np.array([1.0, 2.0, 5.0, 15.0])  # of Hcr, at which the amplitudes of two frequencies are compared
+
+
+def confirmed(spectra: Iterable[Any]) -> Measured:
+    """The paper's own check, made of everything drawn: stable motions are those of the non-smooth equation."""
+    kept, off, orbits, attractors = 0.0, 0.0, 0, 0
+    for spectrum in spectra:
+        for _, branch in branches_of(spectrum):
+            stable = branch["stable"].values.astype(bool)
+            kept = max(kept, float(np.max(branch["kept"].values[stable], initial=0.0)))
+            orbits += int(stable.sum())
+        places, lines = spectrum["attractors"], [line for _, branch in branches_of(spectrum) for line in smooth_lines(branch)]
+        for value, amplitude in zip(places["parameter"].values, places["amplitude"].values, strict=True):
+            # on both sides: a branch found at this very value may begin, or close, exactly there
+            known = np.concatenate([passing(lines, float(value) * (1 + side), stable=True) for side in (-BESIDE, BESIDE)])
+            off, attractors = max(off, float(np.abs(known - amplitude).min(initial=np.inf))), attractors + 1
+    holds = orbits > 0 and attractors > 0 and kept < CONFIRMED and off < ON_BRANCH
+    return measured(holds, orbits=orbits, kept=kept, attractors=attractors, off=off)
+
+
+def force_spectra(panels: Panels) -> dict[str, Measured]:
+    """Fig. 9, over the amplitudes of the force."""
+    return {
+        "fig09-knots-appear": _knots_appear(panels),
+        "fig09-knots": _knots_differ(panels),
+        "fig09-superharmonic": _superharmonics(panels),
+        "fig09-loops": loops({load: tree for load, tree in panels.items() if load >= LARGE_LOAD}),
+        "fig09-jumps": _jumps(panels),
+        "fig09-confirmed": confirmed(panels.values()),
+    }
+
+
+def _knots_appear(panels: Panels) -> Measured:
+    """Knots and unstable motions of the primary resonance: above two thirds of its frequency."""
+    rows = [{"load": load, **_primary_resonance(tree)} for load, tree in panels.items()]
+    low, middle = [row for row in rows if row["load"] <= 0.2], [row for row in rows if 0.5 <= row["load"] <= 1.5]
+    holds = not any(row["knots"] + row["unstable"] for row in low) and all(row["knots"] and row["unstable"] for row in middle)
+    return measured(holds, panels=[*low, *middle])
+
+
+def _primary_resonance(spectrum: Any) -> dict[str, int]:
+    branch = main_branch(spectrum)
+    start = 2 / 3 * float(branch["parameter"][int(np.argmax(branch["amplitude"].values))])
+    unstable = branch["stable"].values[branch["parameter"].values > start] == 0
+    return {"knots": int((spectrum["knots"]["parameter"].values > start).sum()), "unstable": int(unstable.sum())}
+
+
+def _knots_differ(panels: Panels) -> Measured:
+    knots = {load: tree["knots"] for load, tree in panels.items()}
+    apart = np.concatenate([[], *(one["apart"].values for one in knots.values())])
+    equal = np.concatenate([[], *(np.ptp(one["amplitude"].values, axis=1) for one in knots.values())])
+    rows = [_last_knot(load, one) for load, one in knots.items() if one.sizes["knot"]]
+    holds = apart.size > 0 and apart.min() > APART and equal.max() < EQUAL
+    return measured(bool(holds), knots=apart.size, difference=equal.max() if equal.size else np.nan, panels=rows)
+
+
+def _last_knot(load: float, knots: Any) -> dict[str, float]:
+    k = int(np.argmax(knots["parameter"].values))
+    one, two = np.rad2deg(knots["peak"].values[k])
+    frequency, amplitude = float(knots["parameter"][k]), float(knots["amplitude"][k, 0])
+    return {"load": load, "frequency": frequency, "amplitude": amplitude, "first_peak": one, "second_peak": two}
+
+
+def _superharmonics(panels: Panels) -> Measured:
+    unstable, rows = {}, []
+    for load, tree in panels.items():
+        branch = main_branch(tree)
+        top = superharmonic(branch)
+        low = branch["parameter"].values < (float(top[-1, 0]) * 1.2 if len(top) else 0.0)
+        unstable[load] = int((branch["stable"].values[low] == 0).sum())
+        rows.append({"load": load, "peaks": [{"frequency": x} for x in top[::-1, 0]]})
+    holds = all(row["peaks"] for row in rows) and all(unstable[load] > 0 for load in panels if load <= 0.5)
+    return measured(holds, panels=rows)
+
+
+def loops(panels: Panels) -> Measured:
+    """In each panel a detached branch that somewhere is larger than all of the main one is there."""
+    rows = []
+    for load, tree in panels.items():
+        main, bounds = main_branch(tree), tree.attrs["bounds"]
+        above = [branch for _, branch in detached(tree) if _rises_above(branch, main, bounds)]
+        spans = [(int(b["period"][0]), float(b["parameter"].min()), float(b["parameter"].max())) for b in above[:SHOWN_LOOPS]]
+        rows.append({"load": load, "loops": [{"period": period, "low": low, "high": high} for period, low, high in spans]})
+    return measured(bool(rows) and all(row["loops"] for row in rows), panels=rows)
+
+
+def _rises_above(branch: Any, main: Any, bounds: Any) -> bool:
+    """Whether somewhere within the bounds a branch is plainly larger than all of the main one there."""
+    lines = list(smooth_lines(main))
+    return any(
+        amplitude - np.max(passing(lines, value), initial=0.0) >= APART
+        for value, amplitude in zip(branch["parameter"].values, branch["amplitude"].values, strict=True)
+        if bounds[0] <= value <= bounds[1]
+    )
+
+
+def _jumps(panels: Panels) -> Measured:
+    """In every panel with loops; where other motions of about the same size lie by, a jump need not show in the amplitude."""
+    rows = []
+    for load, tree in panels.items():
+        sizes = np.abs(tree["jumps"]["after"].values - tree["jumps"]["before"].values)
+        if sizes.size:
+            rows.append({"load": load, "jumps": int((sizes > APART).sum()), "folds": sizes.size, "largest": sizes.max()})
+    return measured(bool(rows) and all(row["jumps"] * 2 > row["folds"] for row in rows), apart=APART, panels=rows)
+
+
+def ground_spectra(panels: Panels) -> dict[str, Measured]:
+    """Fig. 10, over the amplitudes of the ground motion."""
+    return {
+        "fig10-superharmonic": _no_superharmonics({load: main_branch(tree) for load, tree in panels.items()}),
+        "fig10-loops": loops(panels),
+        "fig10-confirmed": confirmed(panels.values()),
+    }
+
+
+def _no_superharmonics(mains: Panels) -> Measured:
+    rows = []
+    for load, main in mains.items():
+        rise = superharmonic(main, share=0.0)[:, 2].max(initial=0.0) / float(main["amplitude"].max())
+        rows.append({"load": load, "begin": float(main["parameter"].min()), "rise": rise})
+    holds = bool(rows) and not any(len(superharmonic(main)) for main in mains.values())
+    return measured(holds, prominent=PROMINENT, panels=rows)
+
+
+def force_diagrams(name: str, panels: Panels) -> dict[str, Measured]:
+    """Figs. 11 and 12, over the frequencies of the force."""
+    return {
+        f"{name}-undeformed": _undeformed(panels),
+        f"{name}-anticipated": _anticipated(panels),
+        f"{name}-grows": _grows(panels),
+        f"{name}-flattens": _flattens(panels),
+        f"{name}-coexistence": coexistence(panels),
+        f"{name}-confirmed": confirmed(panels.values()),
+    }
+
+
+def _critical(spectrum: Any) -> float:
+    """Hcr, at which rest is lost under a static load."""
+    return float(spectrum.attrs["critical"])
+
+
+def _undeformed(panels: Panels) -> Measured:
+    """As printed: past Hcr motions leave for the limit cycle. Erratum 24: rest is left, and closed again, in every period."""
+    turns, gone, rows = [], [], []
+    for frequency, tree in panels.items():
+        row = tree["undeformed"]
+        cycle = float(np.max(amplitudes_at(main_branch(tree), _critical(tree) * 1.001, stable=True), initial=0.0))
+        turns.append(bool(row["held_below"]) and not bool(row["held_above"]))
+        gone.append(float(row["later"]) > 0.5 * cycle)
+        rows.append({"frequency": frequency, "later": float(row["later"]), "cycle": cycle})
+    return measured(all(turns) and all(gone), all(turns), panels=rows)
+
+
+def _anticipated(panels: Panels) -> Measured:
+    stable, rows = [], []
+    for frequency, tree in panels.items():
+        branch, critical = main_branch(tree), _critical(tree)
+        fold, _ = first_fold(branch)
+        stable.append(fold < critical and amplitudes_at(branch, (fold + critical) / 2, stable=True).size > 0)
+        rows.append({"frequency": frequency, "fold": fold})
+    critical = _critical(next(iter(panels.values())))
+    return measured(bool(stable) and all(stable), critical=critical, panels=rows)
+
+
+def _grows(panels: Panels) -> Measured:
+    """As printed: from its birth on. Erratum 30: from twice Hcr on, past the superharmonics of low frequency."""
+    always, later, rows = [], [], []
+    for frequency, tree in panels.items():
+        main = main_branch(tree)
+        near, far = (_largest(main, values) for values in _along_the_first_path(main, _critical(tree)))
+        later.append(_rises(far))
+        always.append(_rises(near) and later[-1])
+        row = {"frequency": frequency, "birth": near[0], "double": near[-1], "tenfold": far[-1]}
+        rows.append(row | {"falls": [] if always[-1] else [{}]})
+    return measured(bool(always) and all(always), bool(later) and all(later), panels=rows)
+
+
+def _along_the_first_path(main: Any, critical: float) -> tuple[np.ndarray, np.ndarray]:
+    """Amplitudes of the load from the first fold to 2 Hcr, and from there to 10 Hcr."""
+    fold, shares = first_fold(main)[0], (np.arange(60) + 1) / 60
+    return fold + (2 * critical - fold) * shares, critical * (2 + 8 * shares)
+
+
+def _largest(main: Any, values: np.ndarray) -> np.ndarray:
+    lines = list(smooth_lines(main))
+    return np.array([np.max(passing(lines, value, stable=True), initial=0.0) for value in values])
+
+
+def _rises(sizes: np.ndarray) -> bool:
+    return bool((sizes > 0).all() and (np.diff(sizes) > 0).all())
+
+
+def _flattens(panels: Panels) -> Measured:
+    """As printed: everywhere. Erratum 30: where both frequencies are above the primary resonance, or the load is large."""
+    critical = _critical(next(iter(panels.values())))
+    sizes = np.array([_largest(main_branch(tree), critical * LOADS) for tree in panels.values()])
+    falls, several = np.diff(sizes, axis=0) < 0, len(panels) > 1
+    rows = [{"frequency": w, "sizes": [{"size": x} for x in row]} for w, row in zip(panels, sizes, strict=True)]
+    late = bool(falls[:, -1].all()) and not falls[:, 0].any() and min(panels) < RESONANCE
+    return measured(several and bool(falls.all()), several and late, panels=rows)
+
+
+def coexistence(panels: Panels) -> Measured:
+    """Beyond twice Hcr there are somewhere more stable motions than there."""
+    more, rows = [], []
+    for frequency, tree in panels.items():
+        start = 2 * _critical(tree)
+        values, number = range_counts(tree, SAMPLES)
+        early, later = int(stable_motions(tree, np.array([start]))[0]), number[values > start]
+        most, place = int(later.max()), float(values[values > start][later.argmax()])
+        more.append(most > max(early, 1))
+        rows.append({"frequency": frequency, "early": early, "most": most, "place": place, "last": later[-1]})
+    return measured(bool(more) and all(more), panels=rows)
+
+
+def both_diagram(spectrum: Any, mirror: Any) -> dict[str, Measured]:
+    """Fig. 13; `mirror` holds how far motions are from mirror images under each load."""
+    gaps = dict(zip(map(str, mirror["load"].values), map(float, mirror["gap"].values), strict=True))
+    own = [int(branch["symmetric"].sum()) for _, branch in branches_of(spectrum)]
+    main = main_branch(spectrum)
+    uneven = np.abs(main["highest"].values + main["lowest"].values)
+    kinds = {kind: count(spectrum, kind) for kind in ("LP", "PD", "GR")}
+    values, number = range_counts(spectrum, SAMPLES)
+    most = int(number.max())
+    symmetric = max(gaps["(i)"], gaps["(ii)"]) < CONFIRMED and gaps["(iii)"] > APART and not any(own)
+    return {
+        "fig13-symmetry": measured(
+            symmetric, loads=[{"load": load, "gap": gap} for load, gap in gaps.items()], uneven=uneven.max()
+        ),
+        "fig13-features": measured(
+            most > 1 and all(kinds.values()),
+            most=most,
+            place=float(values[number.argmax()]),
+            kinds=[{"kind": kind, "number": n} for kind, n in kinds.items()],
+        ),
+        "fig13-confirmed": confirmed([spectrum]),
+    }

@@ -1,0 +1,33 @@
+"""The numbers and statements of sections 2 to 5 that no figure bears on."""
+
+from __future__ import annotations
+
+from types import ModuleType
+from typing import Any
+
+from saltus.paper.claims.claim import Measured
+from saltus.paper.figure_data import tree
+from saltus.paper.figures.figure import paper_figure
+from saltus.paper.sections import equations_of_motion, impacts, kinematics, small_vibrations
+
+SECTIONS: dict[str, ModuleType] = {
+    "kinematics": kinematics,
+    "dynamics": equations_of_motion,
+    "impacts": impacts,
+    "vibrations": small_vibrations,
+}
+
+
+def compute() -> Any:
+    """The evidence of every section."""
+    return tree(
+        {name: section.compute() for name, section in SECTIONS.items()}, what="evidence for the statements of sections 2 to 5"
+    )
+
+
+def measure(data: Any) -> dict[str, Measured]:
+    """What every section measured."""
+    return {id: one for name, section in SECTIONS.items() for id, one in section.measure(data[name]).items()}
+
+
+FIGURE = paper_figure("claims", compute=compute, measure=measure)
