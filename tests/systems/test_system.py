@@ -198,7 +198,7 @@ def test_get_names_near_whole_paths():
         (lambda: System.from_dict({"model": {"type": "TwoLayer", "beta0": 1.0, "dampng": 1}}), "did you mean 'damping'"),
         (lambda: System.from_dict({"modl": {}}), "did you mean 'model'"),
         (lambda: System.from_dict({"model": 3}), "model must be a table"),
-        (lambda: System.from_dict({**EXAMPLE.to_dict(), "impact": {"type": "Bounce"}}), "not a known impact law"),
+        (lambda: System.from_dict({**EXAMPLE.to_dict(), "impact": {"type": "Bounce"}}), "impact.type 'Bounce' is not known"),
         (lambda: System.from_dict({**EXAMPLE.to_dict(), "load": {"vertical": {"amplitud": 1}}}), "'amplitude'"),
     ],
 )

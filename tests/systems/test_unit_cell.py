@@ -51,11 +51,11 @@ def test_masses_are_at_the_coordinates_of_the_paper(cell, first, second):
     layout = cell.layout(*theta)
     size = max(1.0, cell.base)
     offset = math.sin(cell.alpha0 - cell.beta0) / (2 * math.sin(cell.alpha0))
-    assert layout.mass_1 == pytest.approx([cell.xi(theta[0]) - offset, cell.eta(theta[0])], abs=1e-12 * size)
-    step = layout.mass_2 - layout.mass_1
+    assert layout.points["mass_1"] == pytest.approx([cell.xi(theta[0]) - offset, cell.eta(theta[0])], abs=1e-12 * size)
+    step = layout.points["mass_2"] - layout.points["mass_1"]
     assert step == pytest.approx([cell.xi(theta[1]) + math.cos(cell.beta0), cell.eta(theta[1])], abs=1e-12 * size)
-    assert layout.mass_1 == pytest.approx((layout.middle_left + layout.middle_right) / 2)
-    assert layout.mass_2 == pytest.approx((layout.upper_left + layout.upper_right) / 2)
+    assert layout.points["mass_1"] == pytest.approx((layout.points["middle_left"] + layout.points["middle_right"]) / 2)
+    assert layout.points["mass_2"] == pytest.approx((layout.points["upper_left"] + layout.points["upper_right"]) / 2)
 
 
 @settings(deadline=None)
@@ -102,7 +102,7 @@ def test_erratum_2_the_sign_of_theta_is_that_of_the_inequalities():
     assert CELL.theta(phi, layer=1) == pytest.approx(opening) == -CELL.theta(phi, layer=2)
     # the velocity of the first mass that kin_eng uses, sin(beta0 + theta_1) theta_1', needs it too
     theta, step = CELL.theta(phi, layer=1), 1e-6
-    slope = (CELL.layout(theta + step).mass_1 - CELL.layout(theta - step).mass_1) / (2 * step)
+    slope = (CELL.layout(theta + step).points["mass_1"] - CELL.layout(theta - step).points["mass_1"]) / (2 * step)
     assert slope == pytest.approx([math.sin(CELL.beta0 + theta), math.cos(CELL.beta0 + theta)], abs=1e-9)
 
 
@@ -126,7 +126,7 @@ def test_erratum_19_the_line_is_at_100_degrees_for_80():
     assert CELL.line_condition() == CELL.line_limit
     assert CELL.eta(CELL.line_limit) == pytest.approx(0.0, abs=1e-15)
     flat = CELL.layout(CELL.line_limit)
-    assert flat.middle_left == pytest.approx([1.0, 0.0], abs=1e-15)
+    assert flat.points["middle_left"] == pytest.approx([1.0, 0.0], abs=1e-15)
     assert abs(CELL.eta(math.radians(110))) > 0.1  # the printed angle is no line
 
 

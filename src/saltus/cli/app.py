@@ -36,6 +36,10 @@ Study = Annotated[
     Path, typer.Argument(metavar="STUDY.TOML", help="The study: a model, its loads, its impact law, and how to simulate it.")
 ]
 
+Output = Annotated[
+    Path | None, typer.Option("--output", "-o", help="The folder to write to.", show_default="results/<name of the study>")
+]
+
 
 def _version(wanted: bool) -> None:
     if wanted:
@@ -65,9 +69,7 @@ def saltus(
 @app.command(epilog=STUDY)
 def simulate(
     study: Study,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The folder to write to.", show_default="results/<name of the study>")
-    ] = None,
+    output: Output = None,
     plot: Annotated[bool, typer.Option(help="Draw the time history and the phase portrait.")] = True,
 ) -> None:
     """Compute a motion, exactly from impact to impact; write it and draw it.
@@ -87,9 +89,7 @@ def simulate(
 @app.command()
 def run(
     study: Study,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The folder to write to.", show_default="results/<name of the study>")
-    ] = None,
+    output: Output = None,
     plot: Annotated[bool, typer.Option(help="Draw what is computed.")] = True,
     scheduler: Annotated[
         str | None,

@@ -58,9 +58,5 @@ def _hints(function: Callable[..., Any]) -> dict[str, Any]:
 
 
 def read_ask(source: Source, system: System, kind: str, data: Any) -> Ask:
-    """The question in a table.
-
-    Raises:
-        ParameterError: with the place of what is wrong.
-    """
+    """The question in a table."""
     return Ask(kind=kind, options=read_table(source, (kind,), data, keys_of(kind, system.model.coordinates)))

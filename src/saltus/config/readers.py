@@ -205,11 +205,7 @@ def readers_of(cls: type) -> dict[str, Reader]:
 
 
 def read_table(source: Source, keys: Keys, data: Any, readers: Mapping[str, Reader]) -> dict[str, Any]:
-    """The values in the table `data` that stands at `keys`, each as its reader gives it.
-
-    Raises:
-        ParameterError: what is no table, an unknown key, a value that is refused, with its place.
-    """
+    """The values in the table `data` that stands at `keys`, each as its reader gives it."""
     name = ".".join(keys)
     if not isinstance(data, Mapping):
         source.refuse(keys, f"{name} must be a table of keys and values, got {show(data)}")
@@ -220,11 +216,7 @@ def read_table(source: Source, keys: Keys, data: Any, readers: Mapping[str, Read
 
 
 def read(source: Source, keys: Keys, value: Any, reader: Reader) -> Any:
-    """One value, which stands at `keys`.
-
-    Raises:
-        ParameterError: what the reader refuses, with its place.
-    """
+    """One value, which stands at `keys`."""
     try:
         return reader(value)
     except ValueError as error:

@@ -21,11 +21,7 @@ class Settings:
 
 
 def read_settings(source: Source, system: System, data: Any) -> Settings:
-    """The settings of a study of `system`.
-
-    Raises:
-        ParameterError: with the place of what is wrong.
-    """
+    """The settings of a study of `system`."""
     values = read_table(source, ("simulate",), data, _readers(system.model, margin_names(system)))
     _check_horizon(source, system, values)
     return Settings(samples=values.pop("samples", None), arguments={**dict.fromkeys(system.model.coordinates, 0.0), **values})

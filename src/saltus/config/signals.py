@@ -16,11 +16,7 @@ from saltus.systems import Harmonic, Record
 
 
 def read_load(source: Source, data: Any) -> dict[str, Any]:
-    """The load of a study as `System.from_dict` takes it, its records read from their files.
-
-    Raises:
-        ParameterError: with the place of what is wrong.
-    """
+    """The load of a study as `System.from_dict` takes it, its records read from their files."""
     if not isinstance(data, Mapping):
         source.refuse(("load",), f"load must be a table of keys and values, got {show(data)}")
     for name in data:

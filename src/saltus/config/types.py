@@ -20,11 +20,7 @@ EXAMPLES = {"model": "Metainterface", "impact": "VelocityReduction"}
 
 
 def read_part(source: Source, kind: str, data: Any) -> dict[str, Any]:
-    """The model or the impact law (`kind`) of a study as `System.from_dict` takes it: `type` and the fields of that class.
-
-    Raises:
-        ParameterError: with the place of what is wrong.
-    """
+    """The model or the impact law (`kind`) of a study as `System.from_dict` takes it: `type` and the fields of that class."""
     if not isinstance(data, dict):
         source.refuse((kind,), f"{kind} must be a table of keys and values, got {show(data)}")
     if "type" not in data:
@@ -35,11 +31,7 @@ def read_part(source: Source, kind: str, data: Any) -> dict[str, Any]:
 
 
 def find_class(source: Source, kind: str, name: str) -> type:
-    """The class that `model.type` or `impact.type` names: `Metainterface`, `my_model.py:Duffing` or `module:Class`.
-
-    Raises:
-        ParameterError: an unknown name, with the near ones; a file or module that cannot be imported; a class that will not do.
-    """
+    """The class that `model.type` or `impact.type` names: `Metainterface`, `my_model.py:Duffing` or `module:Class`."""
     keys, known = (kind, "type"), MODELS if kind == "model" else IMPACTS
     if ":" not in name:
         if name in known:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +12,7 @@ Point = NDArray[np.float64]
 Pair = tuple[str, str]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class CellLayout:
     """Points (x, y) of shape (2,), in units of l, in the frame of the base with its origin at the lower left hinge.
 
@@ -24,27 +24,8 @@ class CellLayout:
     layer, and the paper's text does not say which it takes: here A is the lower right and B the upper right hinge.
     """
 
-    lower_left: Point
-    lower_right: Point
-    middle_left: Point
-    middle_right: Point
-    upper_left: Point
-    upper_right: Point
-    slider_1_in: Point
-    slider_1_out: Point
-    slider_2_in: Point
-    slider_2_out: Point
-    mass_1: Point
-    mass_2: Point
+    points: dict[str, Point]  # of every hinge, slider and mass, by name
 
-    hinges: ClassVar[tuple[str, ...]] = (
-        "lower_left",
-        "lower_right",
-        "middle_left",
-        "middle_right",
-        "upper_left",
-        "upper_right",
-    )
     bars: ClassVar[tuple[Pair, ...]] = (
         ("lower_left", "lower_right"),
         ("lower_left", "middle_left"),
@@ -71,29 +52,17 @@ class CellLayout:
         right = [corner + edge for corner in left]
         slider_1 = _slider(left[0], right[1], half_diagonal, phi[0])
         slider_2 = _slider(right[1], left[2], half_diagonal, phi[1])
-        return cls(
-            lower_left=left[0],
-            lower_right=right[0],
-            middle_left=left[1],
-            middle_right=right[1],
-            upper_left=left[2],
-            upper_right=right[2],
-            slider_1_in=slider_1[0],
-            slider_1_out=slider_1[1],
-            slider_2_in=slider_2[0],
-            slider_2_out=slider_2[1],
-            mass_1=left[1] + edge / 2,
-            mass_2=left[2] + edge / 2,
-        )
-
-    @property
-    def points(self) -> dict[str, Point]:
-        """Every point by its name."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        points = {}
+        for row, at_left, at_right in zip(("lower", "middle", "upper"), left, right, strict=True):
+            points |= {f"{row}_left": at_left, f"{row}_right": at_right}
+        points |= {"slider_1_in": slider_1[0], "slider_1_out": slider_1[1]}
+        points |= {"slider_2_in": slider_2[0], "slider_2_out": slider_2[1]}
+        points |= {"mass_1": left[1] + edge / 2, "mass_2": left[2] + edge / 2}
+        return cls(points)
 
     def segment(self, pair: Pair) -> Point:
         """The two ends of a pair of names, as rows, shape (2, 2)."""
-        return np.array([getattr(self, pair[0]), getattr(self, pair[1])])
+        return np.array([self.points[pair[0]], self.points[pair[1]]])
 
 
 def _slider(start: Point, end: Point, half: float, phi: float) -> tuple[Point, Point]:

@@ -15,14 +15,18 @@ from saltus.systems.model import Model
 class ImpactLaw:
     """What turns the velocity before an impact into the one after it, v-, s -> v+, s+, for any model.
 
-    `velocity_after` gives the velocity carried through the contact; a wall turns it round itself. It is traced, and may
-    use comparisons within NumPy's where, and maximum and minimum, besides what an acceleration may use.
+    `velocity_after` is traced, and may use comparisons within NumPy's where, and maximum and minimum, besides what an
+    acceleration may use.
     """
 
     __slots__ = ()
 
     def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
-        """The velocity after an impact at `t` from `side` to `next_side`."""
+        """The velocity that an impact at `t` lets through from `side` to `next_side`.
+
+        Both velocities are rates of the coordinate, and the result has the sign of `velocity`: what does not pass but bounces
+        gets its sign turned by the model's `reset`.
+        """
         raise NotImplementedError
 
 

@@ -57,7 +57,11 @@ class Model:
         return side * theta
 
     def reset(self, t: Any, velocity: Any, side: Any, load: Any, impact: Any) -> tuple[Any, Any]:
-        """The next side and the velocity after an impact that ends the mode `side` with `velocity`."""
+        """The side on which the motion goes on, and its velocity there, after an impact that ends the mode `side`.
+
+        Both velocities are rates of the coordinate, positive towards larger coordinates, and not speeds of approach. Here the
+        motion passes through the contact and the sign of the velocity stays; a model with a wall turns the sign itself.
+        """
         return -side, impact.velocity_after(self, t, velocity, side, -side, load)
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
@@ -76,5 +80,8 @@ class Model:
         """Refuse, with a ParameterError, a load whose channels are known but cannot act on this model as it is."""
 
     def mirror(self, load: Any) -> Any:
-        """The load under which -theta moves as theta does under `load`, or None where there is no such symmetry."""
+        """The load under which -theta(t) is a motion wherever theta(t) is one under `load`, or None without such a symmetry.
+
+        The mirror turns the signs of all coordinates, velocities and sides; it does not shift the time.
+        """
         return None

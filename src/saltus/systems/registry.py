@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from saltus.errors import ParameterError, near
 from saltus.systems.impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
@@ -38,15 +38,10 @@ def register(cls: T) -> T:
     return cls
 
 
-def find_model(name: str) -> type[Model]:
-    """The model class called `name`."""
-    if name not in MODELS:
-        raise ParameterError(f"model.type {name!r} is not a known model; {near(name, MODELS)}", "model.type")
-    return MODELS[name]
-
-
-def find_impact(name: str) -> type[ImpactLaw]:
-    """The impact law called `name`."""
-    if name not in IMPACTS:
-        raise ParameterError(f"impact.type {name!r} is not a known impact law; {near(name, IMPACTS)}", "impact.type")
-    return IMPACTS[name]
+def find(kind: str, name: str) -> type[Model] | type[ImpactLaw]:
+    """The class called `name`, of the `kind` "model" or "impact"."""
+    known: dict[str, Any] = MODELS if kind == "model" else IMPACTS
+    if name not in known:
+        raise ParameterError(f"{kind}.type {name!r} is not known; {near(name, known)}", f"{kind}.type")
+    found: type[Model] | type[ImpactLaw] = known[name]
+    return found

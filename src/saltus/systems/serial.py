@@ -8,7 +8,7 @@ from typing import Any
 
 from saltus.errors import ParameterError, near
 from saltus.systems.load import Load
-from saltus.systems.registry import find_impact, find_model
+from saltus.systems.registry import find
 from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
 
 
@@ -42,8 +42,7 @@ def from_dict(kind: str, data: Any) -> Any:
     name = fields.pop("type")
     if not isinstance(name, str):
         raise ParameterError(f"{kind}.type must be a name in quotes, got {name!r}", f"{kind}.type")
-    cls: Any = find_model(name) if kind == "model" else find_impact(name)
-    return build(cls, fields, kind)
+    return build(find(kind, name), fields, kind)
 
 
 def read_signal(data: Any, where: str) -> Signal | float:

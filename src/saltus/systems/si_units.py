@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import mul, truediv
 from typing import Any
 
 from saltus.checks import settle_numbers
@@ -21,7 +22,7 @@ class PhysicalCell:
 
     The characteristic time is T = sqrt(M2 l^2 / K2) (`timeT`), so that tau = t / T; forces are H l / K2 (`dim_less`), ground
     displacements U / l (`displ_ratio1`), the damping C = C2 T / (M2 l^2), all three as corrected by erratum 13; energies are
-    per K2. Every conversion takes a number or an array.
+    per K2.
 
     Raises:
         ParameterError: a value out of range, or a lower damping without an upper one (c = C1 / C2 is then undefined).
@@ -65,20 +66,27 @@ class PhysicalCell:
         )
 
     @property
-    def time_unit(self) -> float:
-        """T = sqrt(M2 l^2 / K2), s (`timeT`)."""
-        return math.sqrt(self.upper_mass * self.length**2 / self.upper_stiffness)
+    def units(self) -> dict[str, float]:
+        """The SI value of 1 of each dimensionless quantity: tau = t / units["time"], H = H_2 / units["force"] and so on.
 
-    @property
-    def force_unit(self) -> float:
-        """K2 / l, N (`dim_less`)."""
-        return self.upper_stiffness / self.length
+        T = sqrt(M2 l^2 / K2) (`timeT`), 1 / T rad/s, K2 / l (`dim_less`), l and its rates, and the energy K2.
+        """
+        time = math.sqrt(self.upper_mass * self.length**2 / self.upper_stiffness)
+        return {
+            "time": time,
+            "frequency": 1 / time,
+            "force": self.upper_stiffness / self.length,
+            "displacement": self.length,
+            "velocity": self.length / time,
+            "acceleration": self.length / time**2,
+            "energy": self.upper_stiffness,
+        }
 
     @property
     def ratios(self) -> dict[str, float]:
         """C, k, m, c as the models name them (`m_k_ratio`, `disip_ratio`); c is 1 where nothing is damped."""
         return {
-            "damping": self.upper_damping * self.time_unit / (self.upper_mass * self.length**2),
+            "damping": self.upper_damping * self.units["time"] / (self.upper_mass * self.length**2),
             "stiffness_ratio": (self.lower_stiffness or self.upper_stiffness) / self.upper_stiffness,
             "mass_ratio": self.lower_mass / self.upper_mass,
             "dissipation_ratio": (self.lower_damping or 0.0) / self.upper_damping if self.upper_damping else 1.0,
@@ -92,68 +100,28 @@ class PhysicalCell:
         """The two-layer model of this cell with the angle `beta0`, rad."""
         return TwoLayer(beta0=beta0, **self.ratios)
 
-    def time(self, seconds: Any) -> Any:
-        """tau = t / T."""
-        return seconds / self.time_unit
-
-    def seconds(self, time: Any) -> Any:
-        """t = T tau."""
-        return time * self.time_unit
-
-    def frequency(self, radians_per_second: Any) -> Any:
-        """Omega = T omega."""
-        return radians_per_second * self.time_unit
-
-    def radians_per_second(self, frequency: Any) -> Any:
-        """omega = Omega / T."""
-        return frequency / self.time_unit
-
-    def force(self, newtons: Any) -> Any:
-        """H = H_2 l / K2."""
-        return newtons / self.force_unit
-
-    def newtons(self, force: Any) -> Any:
-        """H_2 = H K2 / l."""
-        return force * self.force_unit
-
-    def displacement(self, metres: Any) -> Any:
-        """zeta = U / l."""
-        return metres / self.length
-
-    def metres(self, displacement: Any) -> Any:
-        """U = l zeta."""
-        return displacement * self.length
-
-    def joules(self, energy: Any) -> Any:
-        """K2 times an energy of the models."""
-        return energy * self.upper_stiffness
-
     def load(self, si: Load) -> Load:
         """The dimensionless load of one written in SI: rad/s, N, and for the ground m, m/s or m/s^2; records in s."""
-        return self._convert(si, self.time, self.frequency, -1)
+        return self._convert(si, truediv, mul, -1)
 
     def load_in_si(self, load: Load) -> Load:
         """The inverse of `load`."""
-        return self._convert(load, self.seconds, self.radians_per_second, 1)
+        return self._convert(load, mul, truediv, 1)
 
-    def _convert(self, load: Load, time: Callable[[Any], Any], frequency: Callable[[Any], Any], power: int) -> Load:
-        units = {
-            "force": self.force_unit,
-            "displacement": self.length,
-            "velocity": self.length / self.time_unit,
-            "acceleration": self.length / self.time_unit**2,
-        }
+    def _convert(self, load: Load, by_time: Callable[..., Any], by_rate: Callable[..., Any], power: int) -> Load:
+        """The load with times and rates taken through the unit of time, and values times the `power` of their unit."""
+        units = self.units
 
         def convert(signal: Signal, quantity: str) -> Signal:
             if isinstance(signal, Sum):
                 return Sum(tuple(convert(term, quantity) for term in signal.terms))
             if isinstance(signal, Record):
                 scale = signal.scale * units[signal.quantity] ** power
-                return Record(time(signal.time), signal.value, signal.quantity, scale, signal.source)
+                return Record(by_time(signal.time, units["time"]), signal.value, signal.quantity, scale, signal.source)
             return scaled(signal, units[quantity] ** power)
 
         channels = {
             name: convert(signal, "displacement" if name.startswith("ground_") else "force")
             for name, signal in load.channels.items()
         }
-        return Load(frequency=None if load.frequency is None else frequency(load.frequency), **channels)
+        return Load(frequency=None if load.frequency is None else by_rate(load.frequency, units["time"]), **channels)

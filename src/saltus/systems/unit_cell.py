@@ -29,8 +29,8 @@ class UnitCell:
     A difference angle `theta` is a number or an array of any shape, rad: theta >= 0 is theta_1 of the lower layer, theta <= 0 is
     theta_2 of the upper one (`theta_conditions`), as in the reduced model. Lengths are in units of l.
 
-    With `physical`, a `PhysicalCell` of SI data, the cell makes its models (`metainterface`, `two_layer`); conversions
-    of times, forces and displacements are the methods of `physical`.
+    With `physical`, a `PhysicalCell` of SI data, the cell makes its models (`metainterface`, `two_layer`);
+    `physical.units` converts times, forces and displacements.
 
     Raises:
         ParameterError: angles outside alpha0 > 0, 0 < beta0 < pi, alpha0 + beta0 < pi (`restangle`).

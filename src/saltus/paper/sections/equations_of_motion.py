@@ -59,7 +59,7 @@ def _kinetic_residual(model: Any, load: Any, t: float, theta: Any, velocity: Any
     def places(s: float) -> np.ndarray:
         layout = cell.layout(theta[0] + velocity[0] * s, theta[1] + velocity[1] * s)
         ground = np.array([load.ground_horizontal(t + s), load.ground_vertical(t + s)])
-        return np.array([layout.mass_1, layout.mass_2]) + ground
+        return np.array([layout.points["mass_1"], layout.points["mass_2"]]) + ground
 
     h = 1e-3
     speeds = (8 * (places(h) - places(-h)) - (places(2 * h) - places(-2 * h))) / (12 * h)

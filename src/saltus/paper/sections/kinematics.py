@@ -58,11 +58,11 @@ def _drawn(cell: Any, openings: np.ndarray) -> dict[str, float]:
         bars = [np.diff(layout.segment(pair), axis=0)[0] for pair in layout.bars]
         wanted = [cell.base, 1, 1, cell.base, 1, 1, cell.base, *[cell.lambda_] * 4]
         lengths = max(lengths, *(abs(float(np.hypot(*bar)) - length) for bar, length in zip(bars, wanted, strict=True)))
-        run = layout.middle_right - layout.lower_left
+        run = layout.points["middle_right"] - layout.points["lower_left"]
         angles = max(angles, abs(math.atan2(run[1], run[0]) - float(cell.alpha(one))))
         offset = math.sin(cell.alpha0 - cell.beta0) / (2 * math.sin(cell.alpha0))
-        step = layout.mass_2 - layout.mass_1
-        found = (layout.mass_1[0] + offset, layout.mass_1[1], step[0] - math.cos(cell.beta0), step[1])
+        step = layout.points["mass_2"] - layout.points["mass_1"]
+        found = (layout.points["mass_1"][0] + offset, layout.points["mass_1"][1], step[0] - math.cos(cell.beta0), step[1])
         stated = (cell.xi(one), cell.eta(one), cell.xi(two), cell.eta(two))
         places = max(places, *(abs(a - b) for a, b in zip(found, stated, strict=True)))
     return {"bar_lengths": lengths, "alpha_drawn": angles, "places": places}
@@ -97,7 +97,7 @@ def _dimensions() -> dict[str, float]:
         "damping_printed_ratio": (millis.upper_damping / inertia) / (seconds.upper_damping / inertia),
         "damping_ratio": millis.ratios["damping"] / seconds.ratios["damping"],
         "tau_printed": math.sqrt(seconds.upper_mass / seconds.upper_stiffness) * 1.0,
-        "tau_corrected": float(seconds.time(1.0)),
+        "tau_corrected": 1.0 / seconds.units["time"],
         "tau_of_frequency": 1 / math.sqrt(inertia / seconds.upper_stiffness),
     }
 
