@@ -17,7 +17,7 @@ from saltus.config.readers import read_pairs, read_values
 from saltus.errors import ParameterError
 
 KEYS = {kind: set(keys_of(kind)) for kind in QUESTIONS}
-FOR_PYTHON_ALONE = {"system", "progress", "exploring", "store", "workers", "scheduler", "compute", "found", "known", "also"}
+FOR_PYTHON_ALONE = {"system", "progress", "store", "workers", "scheduler", "compute", "found", "known", "also"}
 
 
 def functions(kind):

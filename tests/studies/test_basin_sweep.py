@@ -25,9 +25,9 @@ def test_a_sweep_of_basins_is_the_basins(rows):
 
 def test_what_is_kept_is_gone_on_with(tmp_path, monkeypatch):
     told = []
-    whole = basin_sweep(SYSTEM, **GRID, rows=2, store=tmp_path / "store", progress=lambda *done: told.append(done[:2]))
-    assert told[0] == (0, 1)  # all arguments are checked
-    assert [done for done in told if done[1] == 4] == [(i, 4) for i in range(5)]
+    whole = basin_sweep(SYSTEM, **GRID, rows=2, store=tmp_path / "store", progress=lambda *what: told.append(what))
+    assert told[0][0] == 0.0  # all arguments are checked
+    assert [words.split(",")[0] for _, words in told if "chunks" in words] == [f"{i} of 4 chunks" for i in range(5)]
     for name in ("label", "time"):
         files.chunk_file(tmp_path / "store", name, (2, 0), 0).unlink()
     assert status(tmp_path / "store").done == 3

@@ -13,12 +13,11 @@ import saltus
 from saltus.errors import ParameterError
 from saltus.orbits import continue_orbit, continue_special, find_orbit
 from saltus.orbits.branch import follow_stable
+from saltus.studies import Borders, bordered_chart, disagreements, exact_borders, stability_chart, with_borders
 from saltus.studies.chart import follow as chart_follow
-from saltus.studies.chart.borders import HARMLESS, Borders, curve_dataset, disagreements, exact_borders, with_borders
-from saltus.studies.chart.changes import ends_of, explained, keys_of, read
-from saltus.studies.chart.chart import stability_chart
-from saltus.studies.chart.follow import KINDS, MISSED, Follower, lost
-from saltus.studies.chart.with_borders import bordered_chart
+from saltus.studies.chart.border_curves import curve_dataset, explained
+from saltus.studies.chart.changes import changes_of, keys_of, read_chart
+from saltus.studies.chart.follow import ChangeOutcome, Follower, lost
 from saltus.systems import System, VelocityReduction
 from saltus.theory import high_frequency_onset, unloaded_fold
 
@@ -33,7 +32,7 @@ def chart():
 
 @functools.cache
 def borders():
-    return exact_borders(forced(1.0), chart(), most=8)
+    return exact_borders(forced(1.0), chart(), curves=8)
 
 
 def at(curve, vertical):
@@ -71,7 +70,7 @@ def test_chart_and_curves_agree():
 
 def test_what_a_missing_curve_explained_is_a_disagreement():
     onset = of("LP", 2, borders().curves)
-    others = Borders([curve for curve in borders().curves if curve is not onset], borders().ends)
+    others = Borders([curve for curve in borders().curves if curve is not onset], borders().endings)
     left = disagreements(chart(), others)
     step = float(chart()["horizontal"][1])
     assert left.sizes["change"] >= 5
@@ -103,7 +102,7 @@ def test_a_motion_that_the_chart_lacks_is_a_disagreement():
 def test_the_onset_at_high_frequency_is_the_closed_form(W):
     system = forced(H=0.02, W=W)
     here = stability_chart(system, horizontal=[0.0005, 0.02], vertical=[-0.6, -0.5, -0.4], starts=6, least=1e-4)
-    onset = of("LP", 2, exact_borders(system, here, most=1).curves)
+    onset = of("LP", 2, exact_borders(system, here, curves=1).curves)
     for horizontal, vertical in zip(onset["horizontal"].values, onset["vertical"].values, strict=True):
         closed = high_frequency_onset(W, beta0=np.deg2rad(80), vertical=float(vertical), damping=0.1, order=2)
         assert horizontal == pytest.approx(closed, rel=3 * W**-4)
@@ -112,7 +111,7 @@ def test_the_onset_at_high_frequency_is_the_closed_form(W):
 def test_borders_are_kept_whole(tmp_path):
     again = Borders.from_xarray(borders().to_xarray())
     xr.testing.assert_identical(again.to_xarray()["ends"].to_dataset(), borders().to_xarray()["ends"].to_dataset())
-    assert again.ends.keys() == borders().ends.keys()
+    assert again.endings.keys() == borders().endings.keys()
     for one, two in zip(borders().curves, again.curves, strict=True):
         xr.testing.assert_identical(one, two)
     assert disagreements(chart(), again).identical(disagreements(chart(), borders()))
@@ -148,21 +147,21 @@ def test_the_stable_part_of_a_branch_is_that_of_the_whole_one():
 
 def test_every_end_without_a_curve_is_a_special_point_between_its_cells():
     """Without any curve: what is known of each change is known from continuation between its two cells alone."""
-    whole, alone = with_borders(forced(1.0), chart(), most=0)
-    cells = read(whole)
+    whole, alone = with_borders(forced(1.0), chart(), curves=0)
+    cells = read_chart(whole)
     assert alone.curves == []
-    assert set(alone.ends) == set(keys_of(cells, ends_of(cells)))
+    assert set(alone.endings) == set(keys_of(cells, changes_of(cells)))
     left = disagreements(whole, alone)
     assert left.sizes["change"] == left.attrs["on_curves"] == 0
     onset, found = of("LP", 2, borders().curves), 0
-    for (row, column, _, to_row, to_column), ending in alone.ends.items():
-        assert ending.said in KINDS + HARMLESS
-        if ending.said in KINDS:
+    for (row, column, _, to_row, to_column), ending in alone.endings.items():
+        assert ending.outcome.is_explained
+        if ending.outcome is ChangeOutcome.SPECIAL_POINT:
             for value, axis, ends_at in ((ending.horizontal, cells.horizontal, (column, to_column)),
                                          (ending.vertical, cells.vertical, (row, to_row))):  # fmt: skip
                 low, high = sorted(axis[list(ends_at)])
                 assert low <= value <= high
-        if ending.said == "LP" and row == to_row and ending.vertical > -1.1 and ending.amplitude > 0.15:
+        if ending.special_kind == "LP" and row == to_row and ending.vertical > -1.1 and ending.amplitude > 0.15:
             found += 1
             assert ending.horizontal == pytest.approx(at(onset, ending.vertical), rel=1e-3)
     assert found >= 3
@@ -176,7 +175,7 @@ def test_what_continuation_adds_to_a_chart_are_motions_that_repeat():
         if name.startswith("motion_"):
             poor[name].values[inside] = np.nan if poor[name].dtype.kind == "f" else 0
     poor["count"].values[inside] = 0
-    whole, _ = with_borders(forced(1.0), poor, most=0)
+    whole, _ = with_borders(forced(1.0), poor, curves=0)
     assert whole.attrs["added_by_continuation"] >= inside.sum()
     both = (whole["count"].values > 0) & (chart()["count"].values > 0)
     assert both[inside].mean() > 0.8
@@ -194,39 +193,36 @@ def test_what_continuation_adds_to_a_chart_are_motions_that_repeat():
 
 
 def test_a_motion_that_goes_on_where_the_chart_has_none_is_told():
-    cells = read(chart())
-    follower = Follower(forced(1.0), chart(), cells)
-    ends = ends_of(cells)
+    cells = read_chart(chart())
+    follower = Follower(forced(1.0), (H, V), cells)
+    changes = changes_of(cells)
     inside = next(
-        i for i in range(len(cells.rank)) if cells.horizontal[cells.cell[i, 1]] > 0.08 and cells.vertical[cells.cell[i, 0]] > -0.9
+        i for i, (row, column) in enumerate(cells.place) if cells.horizontal[column] > 0.08 and cells.vertical[row] > -0.9
     )
-    target = cells.cell[inside] + (0, 1)
-    end = type(ends)(np.array([inside]), cells.cell[[inside]], target[None])
-    assert follower.follow(end)[0].said in HARMLESS
-    without = read(
+    target = cells.place[inside] + (0, 1)
+    end = type(changes)(np.array([inside]), cells.place[[inside]], target[None])
+    assert follower.follow(end)[0].outcome.is_change is False
+    without = read_chart(
         chart().assign(motion_amplitude=chart()["motion_amplitude"].where(chart()["horizontal"] < cells.horizontal[target[1]]))
     )
-    other = Follower(forced(1.0), chart(), without)
-    same = next(
-        i
-        for i in range(len(without.rank))
-        if (without.cell[i] == cells.cell[inside]).all() and without.rank[i] == cells.rank[inside]
-    )
-    assert other.follow(type(ends)(np.array([same]), end.source, end.target))[0].said == MISSED
+    other = Follower(forced(1.0), (H, V), without)
+    motion = cells.motions[inside]
+    same = int(np.flatnonzero(without.motions == motion)[0])
+    assert other.follow(type(changes)(np.array([same]), end.source, end.target))[0].outcome is ChangeOutcome.MISSED
 
 
 def test_a_curve_explains_only_what_ends_on_it():
-    cells = read(chart())
-    ends = ends_of(cells)
+    cells = read_chart(chart())
+    changes = changes_of(cells)
     onset = of("LP", 2, borders().curves)
-    known = explained(cells, ends, [onset])
+    known = explained(cells, changes, [onset])
     assert known.any()
     assert not known.all()
     other = onset.copy()
     other.attrs = {**onset.attrs, "period": 5}
-    assert not explained(cells, ends, [other]).any()
+    assert not explained(cells, changes, [other]).any()
     far = onset.assign(amplitude=onset["amplitude"] * 10)
-    assert not explained(cells, ends, [far]).any()
+    assert not explained(cells, changes, [far]).any()
 
 
 def test_a_curve_is_told_in_the_order_of_the_charts_axes():
@@ -239,24 +235,24 @@ def test_a_curve_is_told_in_the_order_of_the_charts_axes():
 
 def test_a_chart_is_read_in_any_order_of_its_dimensions():
     turned = chart().transpose("motion", "horizontal", "vertical")
-    one, other = read(chart()), read(turned)
-    for name in ("cell", "period", "amplitude", "symmetric", "family", "empty"):
+    one, other = read_chart(chart()), read_chart(turned)
+    for name in ("motions", "family", "rest_alone"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
     assert disagreements(turned, borders()).sizes["change"] == disagreements(chart(), borders()).sizes["change"]
 
 
 def test_a_chart_read_lazily_gets_its_motions_too():
     bare = chart().chunk() if importlib.util.find_spec("dask") else chart()
-    whole, _ = with_borders(forced(1.0), bare, most=0)
-    same, _ = with_borders(forced(1.0), chart(), most=0)
+    whole, _ = with_borders(forced(1.0), bare, curves=0)
+    same, _ = with_borders(forced(1.0), chart(), curves=0)
     assert whole.attrs["added_by_continuation"] > 0
     np.testing.assert_array_equal(whole["count"].values, same["count"].values)
 
 
-@pytest.mark.parametrize("most", [-1, 2.5])
-def test_a_number_of_curves_without_meaning_is_refused(most):
-    with pytest.raises(ParameterError, match="most must"):
-        exact_borders(forced(1.0), chart(), most=most)
+@pytest.mark.parametrize("curves", [-1, 2.5])
+def test_a_number_of_curves_without_meaning_is_refused(curves):
+    with pytest.raises(ParameterError, match="curves must"):
+        exact_borders(forced(1.0), chart(), curves=curves)
 
 
 @pytest.mark.parametrize(
@@ -280,17 +276,20 @@ def test_ends_of_orbits_that_rest_are_special_points_too():
     """Impacts with loss: families end where a rest has no duration left (CH) or a release is only touched (RL)."""
     system = System(model=forced(1.0).model, load=forced(1.0).load, impact=VelocityReduction(0.6))
     here = stability_chart(system, horizontal=np.linspace(0.02, 0.5, 9), vertical=[-0.4, -0.2], starts=6)
-    _, found = with_borders(system, here, most=0)
-    assert {"CH", "RL"} & {ending.said for ending in found.ends.values()}
-    assert all(ending.said in KINDS for ending in found.ends.values() if np.isfinite(ending.horizontal))
+    _, found = with_borders(system, here, curves=0)
+    assert {"CH", "RL"} & {ending.special_kind for ending in found.endings.values()}
+    endings = found.endings.values()
+    assert all((ending.outcome is ChangeOutcome.SPECIAL_POINT) == bool(np.isfinite(ending.horizontal)) for ending in endings)
 
 
 def test_an_unstable_orbit_whose_special_point_was_not_located_is_no_motion(monkeypatch):
     unstable = towards_the_onset().points[-1].orbit
-    cells = read(chart())
-    ends = ends_of(cells)
+    cells = read_chart(chart())
+    changes = changes_of(cells)
     goal = float(
-        cells.horizontal[ends.target[0, 1]] if ends.source[0, 0] == ends.target[0, 0] else cells.vertical[ends.target[0, 0]]
+        cells.horizontal[changes.target[0, 1]]
+        if changes.source[0, 0] == changes.target[0, 0]
+        else cells.vertical[changes.target[0, 0]]
     )
 
     class Lost:
@@ -298,8 +297,9 @@ def test_an_unstable_orbit_whose_special_point_was_not_located_is_no_motion(monk
         special, ends, missed = (), ("start", "is no longer stable"), ("LP between",)
 
     monkeypatch.setattr(chart_follow, "follow_stable", lambda *_: Lost())
-    follower = Follower(forced(1.0), chart(), cells)
-    ending, special = follower.follow(ends.only(np.arange(len(ends)) == 0))
+    follower = Follower(forced(1.0), (H, V), cells)
+    ending, special = follower.follow(changes.only(np.arange(len(changes)) == 0))
     assert special is None
-    assert ending.said == "the orbit is not stable to its multipliers"
+    assert ending.outcome is ChangeOutcome.UNKNOWN
+    assert ending.reason == "the orbit is not stable to its multipliers"
     assert follower.missed == []

@@ -33,7 +33,7 @@ def go_on(store, where, pause, quick=-2.0):
     plan = long_plan(pause=float(pause), quick=float(quick))
     print("go", flush=True)
     place = {"scheduler": where} if "://" in where else {"workers": int(where) or None}
-    run(plan, store, progress=lambda done, total, left: print(done, flush=True), **place)
+    run(plan, store, progress=lambda _, what: print(what.split()[0], flush=True), **place)
 
 
 def measure(store, rows):

@@ -30,9 +30,9 @@ def test_a_cluster_gives_the_same_bytes_though_a_worker_is_killed(cluster, waves
     victims = [worker.process.pid for worker in cluster.workers.values()]
     done_at = []
 
-    def kill(done, total, left):
-        done_at.append(done)
-        if done == 4:
+    def kill(fraction, _):
+        done_at.append(round(21 * fraction))
+        if done_at[-1] == 4:
             os.kill(victims[0], signal.SIGKILL)
 
     run(plan, tmp_path / "cluster", scheduler=cluster.scheduler_address, progress=kill)
@@ -81,7 +81,12 @@ def test_a_scheduler_that_goes_away_is_told(waves_plan, tmp_path, monkeypatch):
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0", host="127.0.0.1"
     )
     with pytest.raises(SweepError, match=r"has gone away \(.*\); run the same again to go on"):
-        run(plan, tmp_path / "s", scheduler=cluster.scheduler_address, progress=lambda done, *_: done == 3 and cluster.close())
+        run(
+            plan,
+            tmp_path / "s",
+            scheduler=cluster.scheduler_address,
+            progress=lambda fraction, _: fraction == 3 / 8 and cluster.close(),
+        )
     assert 3 <= status(tmp_path / "s").done < 8
     run(plan, tmp_path / "s")
     assert status(tmp_path / "s").complete

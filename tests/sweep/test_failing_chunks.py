@@ -1,6 +1,7 @@
 """Chunks that fail: reported, tried again, and told at the end, while the rest goes on."""
 
 import logging
+import re
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ def test_the_rest_goes_on_and_the_same_run_completes_it(waves_plan, tree, tmp_pa
     assert found.failures == told.value.failures
     until.touch()
     counts = []
-    run(plan, store, workers=workers, progress=lambda done, total, left: counts.append(done))
+    run(plan, store, workers=workers, progress=lambda fraction, _: counts.append(round(8 * fraction)))
     assert counts == [6, 7, 8]
     assert status(store).failed == 0
     run(plan, tmp_path / "undisturbed")
@@ -58,8 +59,8 @@ def test_without_retries_it_is_not(waves_plan, tmp_path, caplog):
 
 
 def test_an_interrupted_run_keeps_its_list_of_failures(waves_plan, tmp_path):
-    def interrupt(done, total, left):
-        if done == 5:
+    def interrupt(fraction, _):
+        if fraction == 5 / 8:
             raise KeyboardInterrupt
 
     with pytest.raises(SweepInterrupted, match=r"interrupted after 5 of 8 chunks; .* keeps them"):
@@ -79,11 +80,10 @@ def test_in_memory_the_error_holds_what_there_is(waves_plan):
 def test_progress_counts_up_and_estimates_the_time_left(waves_plan, tmp_path):
     said = []
     run(waves_plan(arguments={"pause": 0.05}), tmp_path / "s", progress=lambda *what: said.append(what))
-    assert [done for done, _, _ in said] == list(range(9))
-    assert {total for _, total, _ in said} == {8}
-    assert said[0][2] is None  # nothing to estimate from
-    assert said[-1][2] == 0.0
-    assert all(0.05 * (8 - done) <= left < 2.0 for done, _, left in said[1:-1])  # a pause for each chunk, and what writing takes
+    assert [fraction for fraction, _ in said] == [done / 8 for done in range(9)]
+    assert said[0][1] == "0 of 8 chunks"  # nothing to estimate from
+    assert said[-1][1] == "8 of 8 chunks"
+    assert all(re.fullmatch(rf"{done} of 8 chunks, about [01] s left", what) for done, (_, what) in enumerate(said[1:-1], 1))
     again = []
     run(waves_plan(arguments={"pause": 0.05}), tmp_path / "s", progress=lambda *what: again.append(what))
-    assert again == [(8, 8, 0.0)]
+    assert again == [(1.0, "8 of 8 chunks")]

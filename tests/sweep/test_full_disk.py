@@ -8,8 +8,7 @@ import subprocess
 import pytest
 
 from saltus.errors import SweepError
-from saltus.sweep import durable_store as whole_module
-from saltus.sweep import run, status
+from saltus.sweep import durable_store, run, status
 
 
 def _own_disks() -> bool:
@@ -25,7 +24,7 @@ def test_a_disk_that_is_full_is_told_and_the_store_goes_on_once_there_is_room(sc
     out, err = process.communicate(timeout=60)
     assert process.returncode == 0, err
     sentence, counts, parts, same = out.splitlines()
-    assert "(no space left on device); the chunks before it are kept whole" in sentence
+    assert "(no space left on device); the chunks before it are kept" in sentence
     assert "run the same again" in sentence
     done, total = map(int, counts.split())
     assert 0 < done < total == 120
@@ -37,7 +36,7 @@ def test_a_disk_that_is_full_is_told_and_the_store_goes_on_once_there_is_room(sc
 def test_the_file_that_did_not_fit_is_not_there(waves_plan, tree, tmp_path, monkeypatch, code):
     """The system fails in the middle of the fourth chunk's file."""
     plan, store = waves_plan(), tmp_path / "store"
-    written, original = [], whole_module.write_whole
+    written, original = [], durable_store.write_durably
 
     def fails(path, content):
         if path.parents[2].name == "height":  # height/c/0/0
@@ -46,8 +45,8 @@ def test_the_file_that_did_not_fit_is_not_there(waves_plan, tree, tmp_path, monk
             raise OSError(code, os.strerror(code))
         original(path, content)
 
-    monkeypatch.setattr(whole_module, "write_whole", fails)
-    with pytest.raises(SweepError, match=f"{os.strerror(code).lower()}.*; the chunks before it are kept whole"):
+    monkeypatch.setattr(durable_store, "write_durably", fails)
+    with pytest.raises(SweepError, match=f"{os.strerror(code).lower()}.*; the chunks before it are kept"):
         run(plan, store)
     assert status(store).done == 3
     monkeypatch.undo()
@@ -62,5 +61,5 @@ def test_a_write_that_fails_leaves_nothing(tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space left"):
-        whole_module.write_whole(tmp_path / "c" / "0", b"x" * 100)
+        durable_store.write_durably(tmp_path / "c" / "0", b"x" * 100)
     assert list((tmp_path / "c").iterdir()) == []

@@ -89,15 +89,7 @@ def _open_store(path: Path) -> Any:
     data = open_store(path)
     if kind_of(data) == "basin_cells":
         raise ParameterError(f"{path} keeps the cells of basins alone; plot {path.with_suffix('.nc').name} beside it")
-    return _with_limits(data) if kind_of(data) == "stability_chart" and "system" in data.attrs else data
-
-
-def _with_limits(chart: Any) -> Any:
-    """A chart with the limits of its mechanism, which follow from the system and are not in the store."""
-    from saltus.studies import with_limits
-    from saltus.systems import System
-
-    return with_limits(chart, System.from_json(chart.attrs["system"]), chart.attrs["path"])
+    return data
 
 
 def _first_line(error: Exception) -> str:

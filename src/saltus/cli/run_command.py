@@ -96,23 +96,9 @@ def function_of(ask: Ask) -> Callable[..., Any]:
 
 def computed(study: Study, ask: Ask, output: Path, progress: Progress, scheduler: str | None) -> Any:
     """The Dataset or DataTree that answers a question."""
-    function, more = function_of(ask), dict[str, Any](progress=progress)
-    if ask.kind in SWEPT:
-        more = {"store": output / f"{ask.kind}.zarr", "scheduler": scheduler, "progress": _of_chunks(progress)}
-    if function.__name__ == "bordered_chart":
-        more["exploring"] = lambda share: progress(share, "exact borders")
-    data = study.answer(ask, function, **more)
+    more = {"store": output / f"{ask.kind}.zarr", "scheduler": scheduler} if ask.kind in SWEPT else {}
+    data = study.answer(ask, function_of(ask), progress=progress, **more)
     return data.to_xarray() if ask.kind == "attractors" else data
-
-
-def _of_chunks(progress: Progress) -> Callable[[int, int, float | None], None]:
-    """What tells of a sweep's chunks; within a chunk there is nothing to tell."""
-
-    def tell(done: int, total: int, left: float | None) -> None:
-        text = f"{done} of {total} chunks" + (f", {left:.0f} s left" if left else "")
-        progress(done / total, text if total > 1 else "computing")
-
-    return tell
 
 
 def written(ask: Ask, data: Any, output: Path, plot: bool) -> list[Path]:

@@ -1,18 +1,22 @@
 from .basins import basin_sweep
-from .chart.chart import stability_chart, with_limits
-from .chart.with_borders import bordered_chart
+from .chart.borders import Borders, exact_borders, with_borders
+from .chart.chart import bordered_chart, stability_chart
+from .chart.disagreements import disagreements
 from .diagram.bands import chaotic_bands
 from .diagram.diagram import bifurcation_diagram, orbit_diagram, response_spectrum
 from .portrait import phase_portrait
 
 __all__ = [
+    "Borders",
     "basin_sweep",
     "bifurcation_diagram",
     "bordered_chart",
     "chaotic_bands",
+    "disagreements",
+    "exact_borders",
     "orbit_diagram",
     "phase_portrait",
     "response_spectrum",
     "stability_chart",
-    "with_limits",
+    "with_borders",
 ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from saltus.attractors import basins_of_attraction
 from saltus.checks import check_count, checked_by
 from saltus.errors import ParameterError
+from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def basin_sweep(
     store: Any = None,
     workers: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[..., object] | None = None,
+    progress: Progress = silent,
     **options: Any,
 ) -> xarray.Dataset:
     """`basins_of_attraction`, its cells computed as a sweep: the same numbers, in chunks that a later run need not repeat.
@@ -49,8 +49,7 @@ def basin_sweep(
         system: what moves.
         rows: velocities of the grid in one chunk.
         store, workers, scheduler: where the cells are kept and who computes them, see `saltus.sweep.execution`.
-        progress: called with the chunks done, of how many, and the seconds left (None: not known);
-            first when all arguments have been checked.
+        progress: called with the fraction done and what is being done, first when all arguments have been checked.
         options: those of `basins`.
 
     Raises:
@@ -59,13 +58,13 @@ def basin_sweep(
     """
     from saltus.sweep import run
 
-    say = progress or (lambda *_: None)
-
     def computed(arguments: dict[str, Any], axes: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        data = run(plan(arguments, axes, int(rows)), store, workers=workers, scheduler=scheduler, progress=progress)
+        data = run(
+            plan(arguments, axes, int(rows)), store, workers=workers, scheduler=scheduler, progress=part_of(progress, 0.1, 0.9)
+        )
         return data["label"].values, data["time"].values
 
-    return basins_of_attraction(system, compute=computed, progress=lambda _: say(0, 1, None), **options)
+    return basins_of_attraction(system, compute=computed, progress=lambda fraction: progress(fraction, "attractors"), **options)
 
 
 def _check_store(path: Path, system: System) -> None:

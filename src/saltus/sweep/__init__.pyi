@@ -1,4 +1,4 @@
-from .chunk import Failure
+from .chunk_results import Failure
 from .cluster import on_cluster
 from .execution import SweepInterrupted, run
 from .plan import Plan, Variable

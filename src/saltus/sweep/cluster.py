@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from saltus.errors import SweepError
-from saltus.sweep.chunk import Raised, attempt
-from saltus.sweep.chunking import Index
-from saltus.sweep.interrupt import remembered
+from saltus.sweep.chunk_grid import Index
+from saltus.sweep.chunk_results import Raised, attempt
+from saltus.sweep.interrupt import deferred_interrupts
 from saltus.sweep.plan import Plan
 
 PATIENCE = 5.0  # s, for the scheduler to answer, and for it to have a worker
@@ -37,9 +37,9 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
 
         done = as_completed(loop=client.loop, with_results=True, raise_errors=False)
         flying: dict[str, Index] = {}
-        with remembered() as heed:
+        with deferred_interrupts() as raise_if_interrupted:
             while queue or flying:
-                heed()
+                raise_if_interrupted()
                 while queue and len(flying) < max(AHEAD, AHEAD * sum(client.nthreads().values())):
                     index = queue.popleft()
                     # Not pure: Dask would keep what a failed chunk raised, and not try it again.
@@ -47,14 +47,14 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
                     flying[future.key] = index
                     done.add(future)
                 while not done.has_ready():
-                    heed()
+                    raise_if_interrupted()
                     time.sleep(POLL)
                 future, result = next(done)
                 if isinstance(result, BaseException):  # the status may be that of a worker lost since, the result is not
                     raise OSError("the task was given up")
-                yield flying.pop(future.key), Raised(_said(result)) if future.status == "error" else result
+                yield flying.pop(future.key), Raised(_reason(result)) if future.status == "error" else result
                 del future, result  # so that the cluster forgets them
-            heed()
+            raise_if_interrupted()
     except OSError as error:
         raise SweepError(
             f"the Dask scheduler at {address} has gone away ({_first_line(error)}); run the same again to go on"
@@ -83,7 +83,7 @@ def _connect(address: str) -> Any:
     return client
 
 
-def _said(result: Any) -> str:
+def _reason(result: Any) -> str:
     """What went wrong on the cluster itself, such as a chunk whose workers died again and again."""
     error = result[1] if isinstance(result, tuple) else result
     return f"{type(error).__name__}: {_first_line(error)}"

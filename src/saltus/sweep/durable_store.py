@@ -7,22 +7,23 @@ import asyncio
 from zarr.core.buffer import Buffer
 from zarr.storage import LocalStore
 
-from saltus.sweep.store_files import write_whole
+from saltus.sweep.store_files import write_durably
 
 
-class WholeStore(LocalStore):
+class DurableStore(LocalStore):
     """A folder in which every file is brought to the disk before it has its name.
 
-    Zarr's own writes beside and renames too, but without that a power failure may leave a name without content, and here a name
-    means done; and what a kill leaves half-written has a name here by which it is found.
+    Zarr's own store also writes a file under another name and renames it, but does not wait for the disk: after a power failure a
+    name may stand without its content, while here a name means that the chunk is done. What a killed run leaves half-written has
+    a name here by which it is found.
     """
 
     async def set(self, key: str, value: Buffer) -> None:
-        """Write a file, whole."""
+        """Write a file so that it is complete or not there."""
         self._check_writable()
-        await asyncio.to_thread(write_whole, self.root / key, value.to_bytes())
+        await asyncio.to_thread(write_durably, self.root / key, value.to_bytes())
 
     def set_sync(self, key: str, value: Buffer) -> None:
-        """Write a file, whole."""
+        """Write a file so that it is complete or not there."""
         self._check_writable()
-        write_whole(self.root / key, value.to_bytes())
+        write_durably(self.root / key, value.to_bytes())

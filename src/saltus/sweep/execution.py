@@ -5,14 +5,16 @@ from __future__ import annotations
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from saltus.checks import check_count
 from saltus.errors import ParameterError, SweepError
-from saltus.sweep.chunk import Failure, Raised, attempt, checked
-from saltus.sweep.chunking import Index
+from saltus.progress import Progress, silent
+from saltus.sweep.chunk_grid import Index
+from saltus.sweep.chunk_results import Failure, Raised, attempt, checked
 from saltus.sweep.memory import Memory
 from saltus.sweep.plan import Plan
 from saltus.sweep.store import Store, opened
@@ -20,10 +22,9 @@ from saltus.sweep.store import Store, opened
 if TYPE_CHECKING:
     import xarray
 
-Progress = Callable[[int, int, float | None], object]
 Outcomes = Iterator[tuple[Index, Any]]
 
-LOOK = 1.0  # s
+NOTE_EVERY = 1.0  # s: the list of failures is written anew no more often than someone would look at it
 
 log = logging.getLogger("saltus.sweep")
 
@@ -38,7 +39,7 @@ def run(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     retries: int = 1,
 ) -> xarray.Dataset:
     """Compute what is missing of a sweep.
@@ -52,7 +53,8 @@ def run(
         workers: how many processes compute chunks at once; None computes one chunk after the other in this one, which is right
             for functions that use all cores themselves. Scripts need `if __name__ == "__main__":` around a run with workers.
         scheduler: the address of a Dask scheduler, such as "tcp://host:8786", whose workers compute the chunks.
-        progress: called as `progress(done, total, seconds_left)` before the first chunk and after each; None: not known yet.
+        progress: called before the first chunk and after each with the share of the chunks that are done, and in words with their
+            number and about how many seconds are left.
         retries: how often a failed chunk is tried again.
 
     Returns:
@@ -65,36 +67,36 @@ def run(
         SweepInterrupted: Ctrl-C. In all these cases the chunks written before are kept.
     """
     path = _check(plan, store, workers, scheduler, progress, retries)
-    with nullcontext(Memory(plan)) if path is None else opened(plan, path) as sheets:
-        sweep = _Sweep(plan, sheets, progress, retries)
+    with nullcontext(Memory(plan)) if path is None else opened(plan, path) as results:
+        sweep = _Run(plan, results, progress, retries)
         try:
             sweep.fill(workers, scheduler)
         except BaseException as error:
             if sweep.failures:
-                sheets.note(sweep.failures.values())
+                results.note(sweep.failures.values())
             if not isinstance(error, KeyboardInterrupt):
                 raise
             kept = "nothing is kept without a store" if path is None else f"{path} keeps them: run the same again to go on"
             raise SweepInterrupted(f"interrupted after {sweep.done} of {sweep.total} chunks; {kept}") from None
         sweep.conclude()
-        return sheets.dataset()
+        return results.dataset()
 
 
-class _Sweep:
-    """One run: the queue of missing chunks, the failures, the clock."""
+class _Run:
+    """One run: the queue of missing chunks, the failures, and since when it computes."""
 
-    def __init__(self, plan: Plan, sheets: Store | Memory, progress: Progress | None, retries: int) -> None:
-        self.plan, self.sheets, self.progress, self.retries = plan, sheets, progress, retries
-        self.queue = deque(sheets.missing())
-        self.total = plan.layout.total
+    def __init__(self, plan: Plan, results: Store | Memory, progress: Progress, retries: int) -> None:
+        self.plan, self.results, self.progress, self.retries = plan, results, progress, retries
+        self.queue = deque(results.missing())
+        self.total = plan.chunks.total
         self.done = self.before = self.total - len(self.queue)
         self.failures: dict[Index, Failure] = {}
-        self.noted = -LOOK
+        self.noted = -NOTE_EVERY
 
     def fill(self, workers: int | None, scheduler: str | None) -> None:
         """Compute and write until nothing is left that may be tried."""
         self.start = time.monotonic()
-        self._tell()
+        self._report_progress()
         if not self.queue:
             return
         with closing(_outcomes(self.plan, self.queue, workers, scheduler)) as outcomes:
@@ -102,23 +104,23 @@ class _Sweep:
                 if isinstance(outcome, Raised):
                     self._fail(index, outcome)
                     continue
-                self.sheets.write(index, checked(self.plan, index, outcome))
+                self.results.write(index, checked(self.plan, index, outcome))
                 self.done += 1
                 if self.failures.pop(index, None):
                     self._note()
-                self._tell()
+                self._report_progress()
 
     def conclude(self) -> None:
         """Raise if chunks are missing."""
-        self.sheets.note(self.failures.values())
+        self.results.note(self.failures.values())
         if not self.failures:
             return
         first, *others = sorted(self.failures.values(), key=lambda failure: failure.index)
         more = f", and {len(others)} more" if others else ""
-        if self.sheets.path is None:
-            dataset, kept = self.sheets.dataset(), "the others are in the error's `dataset`"
+        if self.results.path is None:
+            dataset, kept = self.results.dataset(), "the others are in the error's `dataset`"
         else:
-            dataset, kept = None, f"{self.sheets.path} keeps the others, and the same run again computes only what is missing"
+            dataset, kept = None, f"{self.results.path} keeps the others, and the same run again computes only what is missing"
         sentence = f"{len(self.failures)} of {self.total} chunks failed: {first}{more}; {kept}"
         raise SweepError(sentence, (first, *others), dataset)
 
@@ -134,17 +136,16 @@ class _Sweep:
         self._note()
 
     def _note(self) -> None:
-        """Keep the list of failures, which may be long, but not more often than someone would look."""
-        if time.monotonic() - self.noted > LOOK:
-            self.sheets.note(self.failures.values())
+        """Keep the list of failures, which may be long, from time to time."""
+        if time.monotonic() - self.noted > NOTE_EVERY:
+            self.results.note(self.failures.values())
             self.noted = time.monotonic()
 
-    def _tell(self) -> None:
-        if self.progress is None:
-            return
+    def _report_progress(self) -> None:
         computed, elapsed = self.done - self.before, time.monotonic() - self.start
-        left = elapsed / computed * (self.total - self.done) if computed else None
-        self.progress(self.done, self.total, 0.0 if self.done == self.total else left)
+        left = elapsed / computed * (self.total - self.done) if computed else 0.0
+        estimate = f", about {left:.0f} s left" if left else ""
+        self.progress(self.done / self.total, f"{self.done} of {self.total} chunks{estimate}" if self.total > 1 else "computing")
 
 
 def _outcomes(plan: Plan, queue: deque[Index], workers: int | None, scheduler: str | None) -> Any:
@@ -170,15 +171,15 @@ def _check(plan: Any, store: Any, workers: Any, scheduler: Any, progress: Any, r
     """The store's path, if the arguments have a meaning."""
     if not isinstance(plan, Plan):
         raise ParameterError(f"plan must be a Plan, got {plan!r:.80}")
-    for name, value, least in (("workers", workers, 1), ("retries", retries, 0)):
-        if not (name == "workers" and value is None) and (isinstance(value, bool) or not isinstance(value, int) or value < least):
-            raise ParameterError(f"{name} must be a whole number of at least {least}, got {value!r}")
+    check_count("retries", retries, 0)
+    if workers is not None:
+        check_count("workers", workers, 1)
     if scheduler is not None and (not isinstance(scheduler, str) or "://" not in scheduler):
         raise ParameterError(f"scheduler must be an address such as 'tcp://host:8786', got {scheduler!r}")
     if scheduler is not None and workers is not None:
         raise ParameterError("workers and scheduler are given both; a cluster has workers of its own")
-    if not (progress is None or callable(progress)):
-        raise ParameterError(f"progress must be a function of the chunks done, of all and of the seconds left, got {progress!r}")
+    if not callable(progress):
+        raise ParameterError(f"progress must be a function of the fraction done and of what is being done, got {progress!r}")
     if store is not None and not isinstance(store, str | Path):
         raise ParameterError(f"store must be the path of a folder, or None, got {store!r:.80}")
     if isinstance(store, str) and "://" in store:

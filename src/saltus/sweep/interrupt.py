@@ -1,4 +1,4 @@
-"""Interrupts that are remembered until they can be heeded."""
+"""Interrupts that wait until the program can be left cleanly."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 
 @contextmanager
-def remembered() -> Iterator[Callable[[], None]]:
+def deferred_interrupts() -> Iterator[Callable[[], None]]:
     """Within it an interrupt (Ctrl-C) raises nothing; the function that is given raises KeyboardInterrupt if there was one.
 
     Python raises it wherever the main thread happens to be: in a destructor of another library, where it is lost, or halfway
@@ -17,7 +17,7 @@ def remembered() -> Iterator[Callable[[], None]]:
     """
     seen: list[int] = []
 
-    def heed() -> None:
+    def raise_if_interrupted() -> None:
         if seen:
             raise KeyboardInterrupt
 
@@ -27,9 +27,9 @@ def remembered() -> Iterator[Callable[[], None]]:
     try:
         before = signal.signal(signal.SIGINT, remember)
     except ValueError:
-        yield heed
+        yield raise_if_interrupted
         return
     try:
-        yield heed
+        yield raise_if_interrupted
     finally:
         signal.signal(signal.SIGINT, before)

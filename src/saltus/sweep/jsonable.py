@@ -11,10 +11,10 @@ import numpy as np
 
 from saltus.errors import ParameterError
 
-LONGEST = 60  # characters of a value quoted in a sentence
+QUOTED = 60  # characters of a value in a sentence
 
 
-def plain(value: Any, place: str) -> Any:
+def as_json(value: Any, place: str) -> Any:
     """`value` as JSON gives it back: mappings to dicts, tuples to lists, NumPy's numbers to Python's.
 
     Raises:
@@ -31,17 +31,17 @@ def plain(value: Any, place: str) -> Any:
             raise ParameterError(f"{place} is {value!r}, which JSON does not have; write None or a word for it")
         return float(value)
     if isinstance(value, list | tuple):
-        return [plain(item, f"{place}[{i}]") for i, item in enumerate(value)]
+        return [as_json(item, f"{place}[{i}]") for i, item in enumerate(value)]
     if not isinstance(value, Mapping):
         kind = type(value).__name__
         raise ParameterError(f"{place} is of type {kind}, which JSON does not have; numbers, texts, lists and dicts can be kept")
     for key in value:
         if not isinstance(key, str):
             raise ParameterError(f"{place} has the key {key!r}; keys are texts in JSON")
-    return {key: plain(item, f"{place}[{key!r}]") for key, item in value.items()}
+    return {key: as_json(item, f"{place}[{key!r}]") for key, item in value.items()}
 
 
-def text(value: Any) -> str:
+def one_line(value: Any) -> str:
     """`value` as one line of JSON, the same for the same value."""
     return json.dumps(value, sort_keys=True, allow_nan=False)
 
@@ -72,5 +72,5 @@ def _parsed(value: Any) -> Any:
 
 
 def _short(value: Any) -> str:
-    said = repr(value)
-    return said if len(said) <= LONGEST else said[: LONGEST - 3] + "..."
+    quoted = repr(value)
+    return quoted if len(quoted) <= QUOTED else quoted[: QUOTED - 3] + "..."

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from saltus.sweep.chunk import Arrays, Failure
-from saltus.sweep.chunking import Index
+from saltus.sweep.chunk_grid import Index
+from saltus.sweep.chunk_results import Arrays, Failure
 from saltus.sweep.plan import Plan
 
 if TYPE_CHECKING:
@@ -26,11 +26,11 @@ class Memory:
 
     def missing(self) -> list[Index]:
         """All chunks."""
-        return list(self.plan.layout.indices())
+        return list(self.plan.chunks.indices())
 
     def write(self, index: Index, values: Arrays) -> None:
         """Keep a chunk."""
-        cut = self.plan.layout.slices(index)
+        cut = self.plan.chunks.slices(index)
         for name, array in self.arrays.items():
             array[cut] = values[name]
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, near
-from saltus.sweep.chunk import resolve
-from saltus.sweep.chunking import Index, Layout
-from saltus.sweep.jsonable import plain, text
+from saltus.sweep.chunk_grid import ChunkGrid, Index
+from saltus.sweep.chunk_results import resolve
+from saltus.sweep.jsonable import as_json, one_line
 
 NAME = re.compile(r"[A-Za-z][\w.\-]*")  # of an axis, a dimension or a variable: it is a folder's name in a store
 RESERVED = ("zarr.json", "plan")
@@ -48,7 +48,7 @@ class Variable:
             fill = dtype.type(fill).item()
         except (TypeError, ValueError, OverflowError):
             raise ParameterError(f"fill must be a value of type {dtype}, got {fill!r}") from None
-        for name, value in (("dtype", dtype.name), ("extra", extra), ("attrs", plain(self.attrs, "attrs")), ("fill", fill)):
+        for name, value in (("dtype", dtype.name), ("extra", extra), ("attrs", as_json(self.attrs, "attrs")), ("fill", fill)):
             object.__setattr__(self, name, value)
 
 
@@ -87,11 +87,11 @@ class Plan:
             raise ParameterError("axes is empty; a plan needs at least one axis")
         variables = _variables(self.variables, axes)
         values = {
-            "arguments": plain(self.arguments, "arguments"),
+            "arguments": as_json(self.arguments, "arguments"),
             "axes": axes,
             "chunk": _chunk(self.chunk, axes),
             "variables": variables,
-            "attrs": plain(self.attrs, "attrs"),
+            "attrs": as_json(self.attrs, "attrs"),
         }
         if "plan" in values["attrs"]:
             raise ParameterError("attrs must not have the key 'plan'; the plan itself is kept there")
@@ -99,13 +99,13 @@ class Plan:
             object.__setattr__(self, name, value)
 
     @cached_property
-    def layout(self) -> Layout:
+    def chunks(self) -> ChunkGrid:
         """How the grid is cut."""
-        return Layout({name: len(values) for name, values in self.axes.items()}, self.chunk)
+        return ChunkGrid({name: len(values) for name, values in self.axes.items()}, self.chunk)
 
     def block(self, index: Index) -> dict[str, np.ndarray]:
         """The values of each axis in a chunk."""
-        cuts = zip(self.axes.items(), self.layout.slices(index), strict=True)
+        cuts = zip(self.axes.items(), self.chunks.slices(index), strict=True)
         return {name: values[cut].copy() for (name, values), cut in cuts}
 
     def place(self, index: Index) -> str:
@@ -118,13 +118,13 @@ class Plan:
 
     def shape(self, name: str, index: Index | None = None) -> tuple[int, ...]:
         """The shape of a variable, whole or in the chunk `index`."""
-        sizes = self.layout.sizes.values() if index is None else (s.stop - s.start for s in self.layout.slices(index))
+        sizes = self.chunks.sizes.values() if index is None else (s.stop - s.start for s in self.chunks.slices(index))
         return (*sizes, *(size for _, size in self.variables[name].extra))
 
     @property
     def attributes(self) -> dict[str, Any]:
         """Those of the dataset: the plan's own, and the plan itself as a text."""
-        return {**self.attrs, "plan": text(self.describe())}
+        return {**self.attrs, "plan": one_line(self.describe())}
 
     def describe(self) -> dict[str, Any]:
         """The plan as JSON: two plans that say the same compute the same. Axes are told by a digest of their values."""

@@ -14,8 +14,8 @@ import numpy as np
 
 from saltus.errors import ParameterError, SweepError
 from saltus.sweep import store_files as files
-from saltus.sweep.chunk import Arrays, Failure
-from saltus.sweep.chunking import Index
+from saltus.sweep.chunk_grid import Index
+from saltus.sweep.chunk_results import Arrays, Failure
 from saltus.sweep.jsonable import differences
 from saltus.sweep.plan import Plan
 from saltus.sweep.store_status import read_plan, status
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 class Store:
     """The arrays of a plan, in a folder.
 
-    A chunk is done when the file of every variable is there. A file is written once and whole, so that it is there or not,
-    and its bytes are those of the computed numbers alone: a store does not show who wrote it, when, or in what order.
+    A chunk is done when the file of every variable is there. A file is written once, and is complete or not there; its bytes
+    are those of the computed numbers alone: a store does not show who wrote it, when, or in what order.
     """
 
     def __init__(self, plan: Plan, path: Path) -> None:
         import zarr
 
         self.plan, self.path = plan, path
-        self.zarr = files.zarr_store(path)
+        self.zarr = _zarr_store(path)
         # Otherwise a chunk of nothing but fill values has no file, and would never be done.
         with zarr.config.set({"array.write_empty_chunks": True}):
             group: Any = zarr.open_group(self.zarr, mode="r+")
@@ -43,7 +43,7 @@ class Store:
 
     def missing(self) -> list[Index]:
         """The chunks that are not done."""
-        return [i for i in self.plan.layout.indices() if not all(self._has(name, i) for name in self.plan.variables)]
+        return [i for i in self.plan.chunks.indices() if not all(self._has(name, i) for name in self.plan.variables)]
 
     def write(self, index: Index, values: Arrays) -> None:
         """Keep a chunk: the files that are not there yet, if an earlier run was killed among them.
@@ -51,7 +51,7 @@ class Store:
         Raises:
             SweepError: the store cannot be written to.
         """
-        cut = self.plan.layout.slices(index)
+        cut = self.plan.chunks.slices(index)
         try:
             for name, array in self.arrays.items():
                 if not self._has(name, index):
@@ -59,7 +59,7 @@ class Store:
         except OSError as error:
             raise SweepError(
                 f"chunk {'/'.join(map(str, index))} cannot be written to {self.path} ({reason(error)}); the chunks before it "
-                "are kept whole: when that is put right, run the same again and it goes on from there"
+                "are kept: when that is put right, run the same again and it goes on from there"
             ) from error
 
     def note(self, failures: Iterable[Failure]) -> None:
@@ -68,7 +68,7 @@ class Store:
         file = self.path / files.FAILURES
         with contextlib.suppress(OSError):  # a full disk is told where a chunk is written
             if entries:
-                files.write_whole(file, json.dumps(entries).encode())
+                files.write_durably(file, json.dumps(entries).encode())
             else:
                 file.unlink(missing_ok=True)
 
@@ -134,12 +134,19 @@ def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
         raise SweepError(
             f"{path} has {found.done} of {found.total} chunks; run the sweep again to complete it, or give partial=True"
         )
-    return _dataset(files.zarr_store(Path(path)))
+    return _dataset(_zarr_store(Path(path)))
 
 
 def reason(error: OSError) -> str:
     """What the system says, as part of a sentence."""
     return (error.strerror or str(error)).lower()
+
+
+def _zarr_store(folder: Path) -> Any:
+    """Zarr's store in a folder; Zarr is imported only where it is needed."""
+    from saltus.sweep.durable_store import DurableStore
+
+    return DurableStore(folder)
 
 
 def _dataset(store: Any) -> xarray.Dataset:
@@ -154,7 +161,7 @@ def _create(plan: Plan, path: Path) -> None:
     try:
         part = files.begin(path)
         try:
-            _make(plan, files.zarr_store(part))
+            _make(plan, _zarr_store(part))
             _sort(part / files.METADATA)
         except BaseException:
             shutil.rmtree(part, ignore_errors=True)
@@ -176,7 +183,7 @@ def _make(plan: Plan, store: Any) -> None:
         group.create_array(
             name,
             shape=plan.shape(name),
-            chunks=(*plan.layout.chunk.values(), *(size for _, size in variable.extra)),
+            chunks=(*plan.chunks.chunk.values(), *(size for _, size in variable.extra)),
             dtype=np.dtype(variable.dtype),
             dimension_names=list(plan.dimensions(name)),
             fill_value=variable.fill,
@@ -191,4 +198,4 @@ def _sort(metadata: Path) -> None:
     """Give the arrays' metadata an order: Zarr before 3.1.3 takes them as the disk lists them, which is another each time."""
     group = json.loads(metadata.read_text(encoding="utf-8"))
     group["consolidated_metadata"]["metadata"] = dict(sorted(group["consolidated_metadata"]["metadata"].items()))
-    files.write_whole(metadata, json.dumps(group, indent=2).encode())
+    files.write_durably(metadata, json.dumps(group, indent=2).encode())

@@ -1,4 +1,4 @@
-"""Files of a store: whole or not there, found by name, and locked while a run writes."""
+"""Files of a store: complete or not there, found by name, and locked while a run writes."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
-from saltus.sweep.chunking import Index
+from saltus.sweep.chunk_grid import Index
 
 METADATA = "zarr.json"
 FAILURES = ".failures.json"
 PART = ".part"
 STALE = 60.0  # s; a store is made in much less, so what was begun earlier was left by a killed run
-PATIENCE = 1.0  # s to wait for a lock: who only looks whether there is one holds it for a moment
+LOCK_PATIENCE = 1.0  # s to wait for a lock: a process that only looks whether there is one holds it for a moment
 
 
-def write_whole(path: Path, content: bytes) -> None:
+def write_durably(path: Path, content: bytes) -> None:
     """Write a file so that whoever finds it finds all of it, after a kill or a power failure too.
 
     It is written beside its place, brought to the disk, and moved there. If that fails nothing is left.
@@ -85,7 +85,7 @@ def locked(path: Path) -> Iterator[bool | None]:
         yield None
         return
     with file:
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + LOCK_PATIENCE
         while (got := _lock(file)) is False and time.monotonic() < deadline:
             time.sleep(0.05)
         yield got
@@ -114,10 +114,3 @@ def _lock(file: IO[bytes], shared: bool = False) -> bool | None:
     except OSError:
         return None
     return True
-
-
-def zarr_store(root: Path) -> Any:
-    """Zarr's store in the folder `root`, with files written by `write_whole`."""
-    from saltus.sweep.durable_store import WholeStore
-
-    return WholeStore(root)

@@ -11,8 +11,8 @@ from typing import Any
 
 from saltus.errors import ParameterError
 from saltus.sweep import store_files as files
-from saltus.sweep.chunk import Failure
-from saltus.sweep.chunking import Layout
+from saltus.sweep.chunk_grid import ChunkGrid
+from saltus.sweep.chunk_results import Failure
 
 
 @dataclass(frozen=True)
@@ -55,10 +55,10 @@ def status(path: Path | str) -> Status:
     """
     path = Path(path)
     plan = read_plan(path)
-    layout = Layout({name: plan["axes"][name]["size"] for name in plan["order"]}, plan["chunk"])
+    chunks = ChunkGrid({name: plan["axes"][name]["size"] for name in plan["order"]}, plan["chunk"])
     variables = {name: len(variable["extra"]) for name, variable in plan["variables"].items()}
     missing, updated = set(), 0.0
-    for index in layout.indices():
+    for index in chunks.indices():
         times = [_written(files.chunk_file(path, name, index, extra)) for name, extra in variables.items()]
         if not all(times):
             missing.add(index)
@@ -67,9 +67,9 @@ def status(path: Path | str) -> Status:
         path=path,
         kind=str(plan["attrs"].get("kind") or plan["attrs"].get("title") or "sweep"),
         function=plan["function"],
-        sizes=dict(layout.sizes),
-        done=layout.total - len(missing),
-        total=layout.total,
+        sizes=dict(chunks.sizes),
+        done=chunks.total - len(missing),
+        total=chunks.total,
         failures=tuple(failure for failure in _failures(path) if failure.index in missing),
         bytes=_size(path),
         started=_moment(os.path.getmtime(path / files.METADATA)),

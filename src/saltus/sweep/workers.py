@@ -11,8 +11,8 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from saltus.errors import SweepError
-from saltus.sweep.chunk import Raised, attempt
-from saltus.sweep.chunking import Index
+from saltus.sweep.chunk_grid import Index
+from saltus.sweep.chunk_results import Raised, attempt
 from saltus.sweep.plan import Plan
 
 READY = "ready"

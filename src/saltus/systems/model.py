@@ -21,7 +21,8 @@ class Model:
        at which the gaps of all sides are zero. While the system rests there the accelerations at contact decide when it leaves;
     5. `reset`, the next side and the velocity after an impact, given the impact law;
     6. optionally `mirror` (the symmetry that maps motions to motions), `kinetic_energy` (for impact laws that need
-       it), `margins` (what must stay positive), `stops` (the margins that end a motion unasked) and `check_load`.
+       it), `margins` (what must stay positive), `stops` (the margins that end a motion unasked), `check_load`, and
+       `damping`, the coefficient of the velocity in the equation of motion.
 
     Every argument may be a number, an array or a symbol. With one degree of freedom the coordinate, the velocity and the
     acceleration are scalars; with several they are tuples.
@@ -33,6 +34,7 @@ class Model:
     units: ClassVar[tuple[str, ...]] = ()
     channels: ClassVar[tuple[str, ...]] = ()
     stops: ClassVar[tuple[str, ...]] = ()
+    damping: float = 0.0  # small vibrations decay as exp(-damping tau / 2)
 
     def unit_of(self, coordinate: str) -> str:
         """The unit of one of the coordinates, such as "rad"."""

@@ -4,6 +4,7 @@ from .high_frequency import high_frequency_onset
 from .impact_oscillator import WallOrbit, WallOrbits, wall_orbits
 from .layer import Layer, layers, open_layer
 from .loaded_equilibria import Equilibrium, Stability, equilibria, undeformed_stability
+from .mechanism_limits import AmplitudeLimit, amplitude_limits
 from .pendulum import pendulum_acceleration
 from .piecewise_linear import LinearMotion, linear_motion
 from .quasi_static import (
@@ -36,19 +37,23 @@ from .small_vibrations import (
     upright_period,
     vibrations,
 )
+from .static_border import QuasiStaticBorder, quasi_static_border
 from .static_divergence import Divergence, divergence, linear_equilibria
 
 __all__ = [
+    "AmplitudeLimit",
     "Contact",
     "Divergence",
     "Equilibrium",
     "Layer",
     "LinearMotion",
     "Peaks",
+    "QuasiStaticBorder",
     "Stability",
     "Vibration",
     "WallOrbit",
     "WallOrbits",
+    "amplitude_limits",
     "critical_horizontal",
     "decayed_amplitude",
     "decayed_period",
@@ -74,6 +79,7 @@ __all__ = [
     "pendulum_acceleration",
     "potential_energy",
     "potential_slope",
+    "quasi_static_border",
     "reciprocal",
     "rocking_energy_decreases",
     "rocking_energy_jump",

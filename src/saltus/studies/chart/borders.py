@@ -1,13 +1,12 @@
 """The exact borders of a stability chart: where its motions are born or lose their stability.
 
 Every change between neighbouring cells is looked into: the orbit is followed across it to the special point at which it ends, and
-the widest families' points are followed as curves through the whole plane. What neither explains is told.
+the points of the widest families are followed as curves through the plane. What neither explains is listed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,20 +14,34 @@ import numpy as np
 from saltus.checks import check_count
 from saltus.errors import MotionError, ParameterError
 from saltus.orbits import PeriodicOrbit, SpecialPoint, continue_special
-from saltus.studies.chart.augment import ADDED, with_motions
-from saltus.studies.chart.changes import Cells, Ends, ends_of, explained, keys_of, passes, read, unseen
-from saltus.studies.chart.follow import CONTINUED, KINDS, MISSED, SHRINKS, Ending, Follower
+from saltus.progress import Progress, silent
+from saltus.studies.chart.added_motions import ADDED, with_motions
+from saltus.studies.chart.border_curves import curve_dataset, explained, passes_through
+from saltus.studies.chart.changes import Changes, changes_of, keys_of, read_chart
+from saltus.studies.chart.follow import ChangeOutcome, Ending, Follower
 from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
 
-MOST = 24  # curves
-LOOKS = 3  # times as many changes may be looked into in vain as curves are wanted
-MOST_LOOKS = 2000  # changes that are looked into one by one
-EASY = 10  # times as many may turn out to be none: the same motion a little further
-BESIDE_REST = 10  # times as much as others do the changes matter where the neighbour has rest alone
-HARMLESS = (CONTINUED, SHRINKS)
+CURVES = 24  # on which motions end, at most
+
+
+@dataclass(frozen=True)
+class BorderSettings:
+    """How much work the borders of a chart may take."""
+
+    # Changes that may be looked into in vain, for each curve that is wanted.
+    vain: int = 3
+    # Changes that may turn out to be none, the same motion going on, for each curve that is wanted: these cost little.
+    harmless: int = 10
+    # Changes that are looked into one by one.
+    one_by_one: int = 2000
+    # A change matters so many times more where the neighbour has rest alone: that is the border of the monostable domain.
+    beside_rest: int = 10
+
+
+SETTINGS = BorderSettings()
 
 
 @dataclass
@@ -36,20 +49,18 @@ class Borders:
     """Curves through the plane of a chart, each a Dataset along `point`, and what became of the changes on none of them."""
 
     curves: list[xarray.Dataset] = field(default_factory=list)
-    ends: dict[tuple[int, ...], Ending] = field(default_factory=dict)  # by their keys
+    endings: dict[tuple[int, ...], Ending] = field(default_factory=dict)  # by the keys of the changes
 
     def to_xarray(self) -> xarray.DataTree:
-        """The curves as groups, and the changes on none of them in the group `ends`: `key` (see `chart_ends.keys_of`), what is
-        known, `said`, and where the motion ends: `horizontal`, `vertical`, `amplitude`."""
+        """The curves as groups, and the changes on none of them in the group `ends`: `key` (see `keys_of`), the `outcome`, and
+        where the motion ends at a special point its kind, `horizontal`, `vertical` and `amplitude`."""
         import xarray as xr
 
-        keys, rows = list(self.ends), [astuple(ending) for ending in self.ends.values()]
-        ends = {
-            "key": (("end", "index"), np.array(keys, dtype=int).reshape(-1, 5)),
-            "said": ("end", np.array([row[0] for row in rows], dtype=str)),
-        }
-        for i, name in enumerate(("horizontal", "vertical", "amplitude"), start=1):
-            ends[name] = ("end", np.array([row[i] for row in rows], dtype=float))
+        rows = [asdict(ending) for ending in self.endings.values()]
+        ends: dict[str, Any] = {"key": (("end", "index"), np.array(list(self.endings), dtype=int).reshape(-1, 5))}
+        for column in fields(Ending):
+            values = [row[column.name] for row in rows]
+            ends[column.name] = ("end", np.array(values, dtype=float if column.type == "float" else str))
         groups = {f"curve_{i:02d}": curve for i, curve in enumerate(self.curves)}
         return xr.DataTree.from_dict({"ends": xr.Dataset(ends), **groups})
 
@@ -59,13 +70,12 @@ class Borders:
         names = sorted(name for name in tree.children if name.startswith("curve_"))
         ends = tree["ends"].to_dataset()
         keys = [tuple(map(int, key)) for key in np.asarray(ends["key"])]
-        rows = zip(*(ends[name].values.tolist() for name in ("said", "horizontal", "vertical", "amplitude")), strict=True)
-        return cls([tree[name].to_dataset() for name in names], dict(zip(keys, (Ending(*row) for row in rows), strict=True)))
+        rows = zip(*(ends[column.name].values.tolist() for column in fields(Ending)), strict=True)
+        endings = {key: Ending(ChangeOutcome(outcome), *row) for key, (outcome, *row) in zip(keys, rows, strict=True)}
+        return cls([tree[name].to_dataset() for name in names], endings)
 
 
-def exact_borders(
-    system: System, chart: xarray.Dataset, *, most: int = MOST, progress: Callable[[float], object] | None = None
-) -> Borders:
+def exact_borders(system: System, chart: xarray.Dataset, *, curves: int = CURVES, progress: Progress = silent) -> Borders:
     """The curves of LP, PD, BPC and GR on which the motions of a chart end, and its other ends cell by cell.
 
     Where a cell has a motion and its neighbour none alike, the orbit is solved for and followed towards the neighbour to the
@@ -75,158 +85,108 @@ def exact_borders(
     Args:
         system: that of the chart.
         chart: as `stability_chart` returns it.
-        most: how many curves at most.
+        curves: how many curves at most.
         progress: called with the share of the changes that are explained.
     """
-    return _borders(system, chart, most, progress)[0]
+    return _searched(system, chart, curves, progress).borders
 
 
 def with_borders(
-    system: System, chart: xarray.Dataset, *, most: int = MOST, progress: Callable[[float], object] | None = None
+    system: System, chart: xarray.Dataset, *, curves: int = CURVES, progress: Progress = silent
 ) -> tuple[xarray.Dataset, Borders]:
     """A chart with the stable motions that go on into a cell where no start has led to them, and the exact borders of it.
 
     Arguments as of `exact_borders`. The chart's attribute `added_by_continuation` is the number of motions added.
     """
-    borders, missed = _borders(system, chart, most, progress)
-    chart = chart.assign_attrs({ADDED: 0})
-    while missed:
-        before, chart = chart, with_motions(chart, system, missed)
+    search = _searched(system, chart, curves, progress)
+    chart, borders = chart.assign_attrs({ADDED: 0}), search.borders
+    while search.missed:
+        before, chart = chart, with_motions(chart, system, search.missed)
         if chart.attrs[ADDED] == before.attrs[ADDED]:
             break
-        cells, follower = read(chart), Follower(system, chart, read(chart))
-        every = ends_of(cells)
-        keys = keys_of(cells, every)
-        borders.ends = {key: borders.ends[key] for key in keys if key in borders.ends and borders.ends[key].said != MISSED}
-        fresh = np.array([key not in borders.ends for key in keys], dtype=bool)
-        fresh &= ~explained(cells, every, borders.curves)
-        _locate(follower, cells, every.only(fresh), borders, _told(progress, len(every)))
-        missed = follower.missed
+        search = _BorderSearch(system, chart, borders, progress)
+        search.look_into(search.renewed())
     return chart, borders
 
 
-def _borders(
-    system: System, chart: xarray.Dataset, most: int, progress: Callable[[float], object] | None
-) -> tuple[Borders, list[tuple[int, int, PeriodicOrbit]]]:
-    """The borders of a chart, and the orbits that it lacks: row, column, orbit."""
-    check_count("most", most, 0)
-    found, cells = Borders(), read(chart)
-    waiting, follower = ends_of(cells), Follower(system, chart, cells)
-    total, looks, easy = max(len(waiting), 1), LOOKS * most, EASY * most
-    while len(waiting) and len(found.curves) < most and looks and easy:
-        if progress is not None:
-            progress(1 - len(waiting) / total)
-        urgency, before = _urgency(cells, waiting), len(found.curves)
-        first = np.arange(len(waiting)) == np.argmax(urgency)
-        ending, special = follower.follow(waiting.only(first))
-        curve = None if special is None else _curve(special, waiting.only(first), cells, found.curves, chart.attrs["path"])
-        if curve is None:
-            found.ends[keys_of(cells, waiting.only(first))[0]] = ending
-            looks, easy = (looks, easy - 1) if ending.said in HARMLESS + KINDS else (looks - 1, easy)
-        else:
-            found.curves.append(curve)
-        waiting = waiting.only(~first & ~explained(cells, waiting, found.curves[before:]))
-    _locate(follower, cells, waiting, found, _told(progress, total))
-    return found, follower.missed
+def _searched(system: System, chart: xarray.Dataset, curves: int, progress: Progress) -> _BorderSearch:
+    """Everything that is known of the changes of a chart as it is."""
+    check_count("curves", curves, 0)
+    search = _BorderSearch(system, chart, Borders(), progress)
+    search.follow_curves(curves)
+    search.look_into(search.waiting)
+    return search
 
 
-def _told(progress: Callable[[float], object] | None, total: int) -> Callable[[int], object] | None:
-    """Progress from how many changes are left of how many."""
-    return None if progress is None else lambda left: progress(1 - left / max(total, 1))
+class _BorderSearch:
+    """The changes of a chart that are still to be explained, and what is known of the others."""
 
+    def __init__(self, system: System, chart: xarray.Dataset, borders: Borders, progress: Progress) -> None:
+        self.paths: tuple[str, str] = (str(chart.attrs["path"][0]), str(chart.attrs["path"][1]))
+        self.chart, self.borders, self.progress = read_chart(chart), borders, progress
+        self.follower = Follower(system, self.paths, self.chart)
+        self.waiting = changes_of(self.chart)
+        self.total = max(len(self.waiting), 1)
 
-def _locate(follower: Follower, cells: Cells, ends: Ends, found: Borders, left: Callable[[int], object] | None) -> None:
-    """Follow each of these changes, the most urgent ones if there are too many; all of one motion are one after the other."""
-    chosen = np.argsort(-_urgency(cells, ends), kind="stable")[: max(0, MOST_LOOKS - len(found.ends))]
-    for done, i in enumerate(chosen[np.argsort(ends.motion[chosen], kind="stable")]):
-        if left is not None:
-            left(len(chosen) - done)
-        end = ends.only(np.array([i]))
-        found.ends[keys_of(cells, end)[0]] = follower.follow(end)[0]
+    @property
+    def missed(self) -> list[tuple[int, int, PeriodicOrbit]]:
+        """Orbits that the chart lacks: row, column, orbit."""
+        return self.follower.missed
 
+    def follow_curves(self, most: int) -> None:
+        """Follow the most urgent change to its special point and that through the plane, until `most` curves are known."""
+        curves, vain, harmless = self.borders.curves, SETTINGS.vain * most, SETTINGS.harmless * most
+        while len(self.waiting) and len(curves) < most and vain and harmless:
+            self._tell(len(self.waiting))
+            known, first = len(curves), np.arange(len(self.waiting)) == np.argmax(self._urgency(self.waiting))
+            change = self.waiting.only(first)
+            ending, special = self.follower.follow(change)
+            curve = None if special is None else self._curve(special, change, ending)
+            if curve is not None:
+                curves.append(curve)
+            else:
+                self._note(change, ending)
+                vain, harmless = (vain, harmless - 1) if ending.outcome.is_explained else (vain - 1, harmless)
+            self.waiting = self.waiting.only(~first & ~explained(self.chart, self.waiting, curves[known:]))
 
-def _urgency(cells: Cells, ends: Ends) -> np.ndarray:
-    """The larger the family the more, above all with rest alone beside it."""
-    size = np.bincount(cells.family, minlength=1)[cells.family[ends.motion]]
-    return np.asarray(size * np.where(cells.empty[tuple(ends.target.T)], BESIDE_REST, 1))
+    def look_into(self, changes: Changes) -> None:
+        """Follow each of these changes, the most urgent ones if there are too many; all of one motion are one after the other."""
+        room = max(0, SETTINGS.one_by_one - len(self.borders.endings))
+        chosen = np.argsort(-self._urgency(changes), kind="stable")[:room]
+        for done, i in enumerate(chosen[np.argsort(changes.motion[chosen], kind="stable")]):
+            self._tell(len(chosen) - done)
+            change = changes.only(np.array([i]))
+            self._note(change, self.follower.follow(change)[0])
 
+    def renewed(self) -> Changes:
+        """The changes of a chart with added motions of which nothing is known yet; what is gone with them is forgotten."""
+        keys, endings = keys_of(self.chart, self.waiting), self.borders.endings
+        kept = {key: endings[key] for key in keys if key in endings and endings[key].outcome is not ChangeOutcome.MISSED}
+        self.borders.endings = kept
+        fresh = np.array([key not in kept for key in keys], dtype=bool)
+        return self.waiting.only(fresh & ~explained(self.chart, self.waiting, self.borders.curves))
 
-def _curve(
-    special: SpecialPoint, end: Ends, cells: Cells, known: Sequence[xarray.Dataset], paths: Sequence[str]
-) -> xarray.Dataset | None:
-    """The curve through a special point, or None if a known one goes through it or it cannot be followed."""
-    along = 0 if end.source[0, 0] == end.target[0, 0] else 1
-    spot = [float(cells.horizontal[end.source[0, 1]]), float(cells.vertical[end.source[0, 0]])]
-    spot[along] = special.parameter
-    if any(passes(cells, curve, (spot[0], spot[1])) for curve in known if curve.attrs["kind"] == special.kind):
-        return None
-    whole = [(float(values.min()), float(values.max())) for values in (cells.horizontal, cells.vertical)]
-    try:
-        locus = continue_special(special, paths[1 - along], bounds=whole[1 - along], first_bounds=whole[along])
-        return curve_dataset(locus, paths)
-    except (MotionError, ParameterError):
-        return None
+    def _urgency(self, changes: Changes) -> np.ndarray:
+        """The larger the family the more, above all with rest alone beside it."""
+        beside_rest = self.chart.rest_alone[tuple(changes.target.T)]
+        return np.asarray(self.chart.family_size[changes.motion] * np.where(beside_rest, SETTINGS.beside_rest, 1))
 
+    def _note(self, change: Changes, ending: Ending) -> None:
+        self.borders.endings[keys_of(self.chart, change)[0]] = ending
 
-def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
-    """Where chart and curves do not agree, away from the cells through which the curves run.
+    def _tell(self, left: int) -> None:
+        self.progress(1 - left / self.total, "exact borders")
 
-    Returns:
-        A Dataset with the changes along `change` that neither a curve nor a special point between the two cells explains:
-        `horizontal` and `vertical` halfway between the cells, `amplitude` and `period` of the motion that ends, `cells` of its
-        family, whether the neighbour has rest alone, `beside_rest`, and whether the change was `looked_into`; and along
-        `unseen` the places on the curves of folds beside which no cell has the motions that end there. The attributes
-        `changes` and `changes_beside_rest` count all that there are, `on_curves` those that a curve explains, `harmless` those
-        where the same motion goes on, with another amplitude than expected or too small to count; `chaos_beside_rest` counts
-        pairs of neighbouring cells, one with rest alone and one where no start settles, between which no motion ends but chaos.
-    """
-    import xarray as xr
-
-    cells = read(chart)
-    ends = ends_of(cells)
-    on_curves = explained(cells, ends, borders.curves)
-    said = np.array([borders.ends[key].said if key in borders.ends else "" for key in keys_of(cells, ends)], dtype=str)
-    harmless = np.isin(said, HARMLESS) & ~on_curves
-    left = ends.only(~on_curves & ~harmless & ~np.isin(said, KINDS))
-    looked = np.array([key in borders.ends for key in keys_of(cells, left)], dtype=bool)
-    middle, lonely = (left.source + left.target) / 2, unseen(cells, borders.curves)
-    columns = {
-        "amplitude": cells.amplitude[left.motion],
-        "period": cells.period[left.motion],
-        "cells": np.bincount(cells.family, minlength=1)[cells.family[left.motion]],
-        "beside_rest": cells.empty[tuple(left.target.T)],
-        "looked_into": looked,
-    }
-    data = {name: ("change", values) for name, values in columns.items()}
-    for i, (name, axis) in enumerate((("vertical", cells.vertical), ("horizontal", cells.horizontal))):
-        data[name] = ("change", np.interp(middle[:, i], np.arange(len(axis)), axis))
-        data[f"unseen_{name}"] = ("unseen", np.interp(lonely[:, i], np.arange(len(axis)), axis))
-    number = chart.transpose("vertical", "horizontal", ...)
-    chaos = ((number["count"] == 0) & (number["unsettled"] > 0)).values
-    attrs = {
-        "changes": len(ends),
-        "changes_beside_rest": int(cells.empty[tuple(ends.target.T)].sum()),
-        "on_curves": int(on_curves.sum()),
-        "harmless": int(harmless.sum()),
-        "chaos_beside_rest": _neighbours(chaos, cells.empty),
-    }
-    return xr.Dataset(data, attrs=attrs)
-
-
-def _neighbours(some: np.ndarray, others: np.ndarray) -> int:
-    """How many pairs of neighbouring cells there are, one of each kind."""
-    pairs = ((some[1:], others[:-1]), (some[:-1], others[1:]), (some[:, 1:], others[:, :-1]), (some[:, :-1], others[:, 1:]))
-    return int(sum((a & b).sum() for a, b in pairs))
-
-
-def curve_dataset(locus: Any, paths: Sequence[str]) -> xarray.Dataset:
-    """A curve as a Dataset along `point`: `horizontal`, `vertical`, the `amplitude` of its orbits, their `residual`."""
-    data = locus.to_xarray()
-    order = [list(locus.paths).index(path) for path in paths]
-    for name, i in zip(("horizontal", "vertical"), order, strict=True):
-        data[name] = ("point", locus.parameters[:, i])
-    kept = data[["horizontal", "vertical", "amplitude", "residual", "special_kind"]]
-    kept["special_place"] = (("special", "axis"), data["special_parameter"].values[:, order])
-    impact_count = locus.orbits[0].signature.impact_count
-    kept.attrs = {**data.attrs, "impact_count": impact_count, "path": list(paths)}
-    return kept
+    def _curve(self, special: SpecialPoint, change: Changes, ending: Ending) -> xarray.Dataset | None:
+        """The curve through a special point, or None if a known one goes through it or it cannot be followed."""
+        spot = (ending.horizontal, ending.vertical)
+        known = (curve for curve in self.borders.curves if curve.attrs["kind"] == special.kind)
+        if any(passes_through(self.chart, curve, spot) for curve in known):
+            return None
+        bounds = [(float(values.min()), float(values.max())) for values in (self.chart.horizontal, self.chart.vertical)]
+        along = change.along
+        try:
+            curve = continue_special(special, self.paths[1 - along], bounds=bounds[1 - along], first_bounds=bounds[along])
+            return curve_dataset(curve, self.paths)
+        except (MotionError, ParameterError):
+            return None

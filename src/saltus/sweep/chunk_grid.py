@@ -11,7 +11,7 @@ Index = tuple[int, ...]  # of a chunk: its place along each axis
 
 
 @dataclass(frozen=True)
-class Layout:
+class ChunkGrid:
     """A grid of `sizes` points along its axes, cut into chunks of `chunk` points along each; those at the ends may be smaller."""
 
     sizes: Mapping[str, int]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError, near
-from saltus.sweep.chunking import Index
+from saltus.sweep.chunk_grid import Index
 
 if TYPE_CHECKING:
     from saltus.sweep.plan import Plan

@@ -1,0 +1,119 @@
+"""The stable motions of the cells of a chart: one record for each, what makes two of them one, and their table in a Dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray
+
+KEPT = 8  # motions of each cell that a chart keeps, the largest ones
+SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))  # rows and columns to the neighbours of a cell
+MOTION = np.dtype(
+    [
+        ("cell", np.int64),  # the cell's number, row by row
+        ("starts", np.int64),  # how many initial states have led to it
+        ("period", np.int64),  # forcing periods after which it repeats itself; 0 while it has not settled
+        ("impact_count", np.int64),  # impacts in them
+        ("amplitude", float),  # max abs of the coordinate
+        ("other", float),  # the extremum on the other side, counted positive there; the amplitude if the motion is symmetric
+        ("state", float, (2,)),  # coordinate and velocity at phase 0
+    ]
+)
+
+
+@dataclass(frozen=True)
+class MotionTolerances:
+    """By how much of their amplitude motions may differ."""
+
+    same: float = 1e-4  # Settled motions of a cell with extrema so near, or those of the mirror image, are one motion.
+    joined: float = 1e-2  # Motions of a cell whose states at the same phase are so near end on the same motion.
+    alike: float = 0.2  # A motion of a neighbouring cell is not tried in a cell that has one so near to it already.
+    family: float = 0.35  # Motions of neighbouring cells so near are one family; nothing changes between the cells.
+    symmetric: float = 2e-4  # A motion whose two extrema are so near is its own mirror image.
+    curve: float = 0.5  # The orbit on a curve and a motion that ends there: near a fold amplitudes change steeply.
+    followed: float = 1e-3  # The orbit followed into a cell is the motion there if their amplitudes are so near.
+
+
+TOLERANCES = MotionTolerances()
+
+
+def motions_in(motions: np.ndarray, cell: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """The first motion of each of these cells, then the second, ...: whether there is one, and its index in `motions`."""
+    first, last = (np.searchsorted(motions["cell"], cell, side=side) for side in ("left", "right"))
+    for step in range(int((last - first).max(initial=0))):
+        there = first + step < last
+        yield there, np.where(there, first + step, 0)
+
+
+def is_same(one: np.ndarray, other: np.ndarray, tolerance: float = TOLERANCES.same) -> np.ndarray:
+    """Whether motions have the same period and the same extrema, so that they are one or mirror images."""
+    same = one["period"] == other["period"]
+    for name in ("amplitude", "other"):
+        same &= np.abs(one[name] - other[name]) <= tolerance * other["amplitude"]
+    return np.asarray(same)
+
+
+def is_alike(one: np.ndarray, other: np.ndarray, tolerance: float) -> np.ndarray:
+    """Whether motions have the same period and number of impacts, and about the same extrema."""
+    return is_same(one, other, tolerance) & (one["impact_count"] == other["impact_count"])
+
+
+def has_alike(known: np.ndarray, cell: np.ndarray, motions: np.ndarray, tolerance: float) -> np.ndarray:
+    """Whether these cells have a motion like each of these."""
+    result = np.zeros(len(cell), dtype=bool)
+    for there, index in motions_in(known, cell):
+        result |= there & is_alike(known[index], motions, tolerance)
+    return result
+
+
+def distinct(motions: np.ndarray) -> np.ndarray:
+    """Each motion of each cell once, and mirror images as one, by cell and falling amplitude."""
+    motions = by_cell(motions)
+    fresh = np.ones(len(motions), dtype=bool)
+    for step in range(1, int(np.bincount(motions["cell"]).max(initial=0))):
+        one, other = motions[step:], motions[:-step]
+        fresh[step:] &= ~((one["cell"] == other["cell"]) & is_same(one, other))
+    return motions[fresh]
+
+
+def by_cell(motions: np.ndarray) -> np.ndarray:
+    """Motions in the order of their cells and, in a cell, of falling amplitude."""
+    return motions[np.lexsort((-motions["amplitude"], motions["cell"]))]
+
+
+def table(motions: np.ndarray, size: int, coordinate: str) -> dict[str, np.ndarray]:
+    """What a chart of `size` cells says of its motions, which are given by cell and falling amplitude: a row for each cell."""
+    number = np.bincount(motions["cell"], minlength=size)
+    rank = np.arange(len(motions)) - np.repeat(np.cumsum(number) - number, number)
+    kept = rank < KEPT
+    place = motions["cell"][kept], rank[kept]
+    fields = {"amplitude": np.nan, "other": np.nan, "period": 0, "impact_count": 0}
+    columns = {name: np.full((size, KEPT), empty) for name, empty in (fields | {coordinate: np.nan, "velocity": np.nan}).items()}
+    for name in fields:
+        columns[name][place] = motions[name][kept]
+    for i, name in enumerate((coordinate, "velocity")):
+        columns[name][place] = motions["state"][kept, i]
+    smallest = np.full(size, np.nan)
+    np.fmin.at(smallest, motions["cell"], motions["amplitude"])
+    summary = {"amplitude": columns["amplitude"][:, 0], "period": columns["period"][:, 0], "smallest_amplitude": smallest}
+    return {**summary, "count": number, **{f"motion_{name}": values for name, values in columns.items()}}
+
+
+def read_motions(chart: xarray.Dataset) -> np.ndarray:
+    """The motions that a chart keeps, by cell and falling amplitude."""
+    chart = chart.transpose("vertical", "horizontal", ...)
+    names = ("amplitude", "other", "period", "impact_count")
+    columns: dict[str, Any] = {name: chart[f"motion_{name}"].values for name in (*names, chart.attrs["coordinate"], "velocity")}
+    shape = columns["amplitude"].shape
+    at = np.nonzero(np.isfinite(columns["amplitude"]))
+    motions = np.zeros(len(at[0]), MOTION)
+    motions["cell"] = np.ravel_multi_index(at[:2], shape[:2]) if len(at[0]) else 0
+    for name in names:
+        motions[name] = columns[name][at]
+    motions["state"] = np.stack([columns[name][at] for name in (chart.attrs["coordinate"], "velocity")], axis=1)
+    return motions

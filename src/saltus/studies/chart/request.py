@@ -1,0 +1,170 @@
+"""What a stability chart is asked for: checked once, kept in a store as JSON, and given to whoever computes its cells."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.checks import check_along, check_axis, check_count, check_number, check_path, check_window
+from saltus.errors import ParameterError
+from saltus.provenance import provenance
+from saltus.studies.chart.motions import KEPT
+from saltus.systems import System
+from saltus.theory import amplitude_limits
+
+if TYPE_CHECKING:
+    from saltus.sweep import Plan, Variable
+
+CELLS = "saltus.studies.chart.cells:cells"
+MAX_PERIOD = 16  # forcing periods that an ensemble looks back for a recurrence
+NUMBERS = ("max_period", "starts", "least", "periods", "tol", "seed")
+
+
+@dataclass(frozen=True)
+class DurationSettings:
+    """How long a motion is given to settle where nothing is said."""
+
+    decay: float = 75.0  # A motion has settled, as a rule, once exp(-C tau / 2) has fallen to exp(-75).
+    fewest: int = 40  # With much damping, or at a low frequency, some motions need longer than that rule says.
+    most: int = 1200  # Without damping only impacts dissipate, and the rule gives no end.
+
+
+DURATION = DurationSettings()
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ChartRequest:
+    """The arguments of `stability_chart` that say what is computed.
+
+    Raises:
+        ParameterError: an argument without meaning, or one that the system refuses.
+    """
+
+    system: System
+    horizontal: Any
+    vertical: Any
+    paths: tuple[str, str]
+    max_period: int
+    starts: int
+    window: Any  # None is the one around the contact
+    least: float
+    periods: Any  # None is what the damping of the model takes
+    tol: float
+    seed: int
+    rows: int = 1
+
+    def __post_init__(self) -> None:
+        check_system(self.system)
+        for name in ("horizontal", "vertical"):
+            object.__setattr__(self, name, check_axis(name, getattr(self, name)))
+        _check_paths(self.system, self.paths, (self.horizontal, self.vertical))
+        if self.periods is None:
+            object.__setattr__(self, "periods", periods_to_settle(self.system))
+        for name in ("starts", "periods", "rows"):
+            check_count(name, getattr(self, name), 1)
+        check_count("max_period", self.max_period, 1, MAX_PERIOD)
+        check_count("seed", self.seed, 0)
+        check_number("least", self.least, above=0.0)
+        check_number("tol", self.tol, at_least=1e-15, at_most=1e-6)
+        object.__setattr__(self, "window", check_window(self.window, self.system))
+
+    @property
+    def coordinate(self) -> str:
+        """The name of the system's coordinate."""
+        return self.system.model.coordinates[0]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return len(self.vertical), len(self.horizontal)
+
+    @property
+    def parameters(self) -> dict[str, np.ndarray]:
+        """The values of both parameters in each cell, row by row, by their dotted paths."""
+        vertical, horizontal = np.meshgrid(self.vertical, self.horizontal, indexing="ij")
+        return {self.paths[1]: vertical.ravel(), self.paths[0]: horizontal.ravel()}
+
+    def to_arguments(self) -> dict[str, Any]:
+        """The request without its axes, as JSON has it."""
+        numbers = {name: getattr(self, name) for name in NUMBERS}
+        return {"system": self.system.to_json(), "paths": list(self.paths), "window": list(self.window), **numbers}
+
+    @classmethod
+    def from_arguments(cls, arguments: Mapping[str, Any], block: Mapping[str, Any]) -> ChartRequest:
+        """The request for a block of the plane, with these values along its axes."""
+        system, paths = System.from_json(arguments["system"]), tuple(arguments["paths"])
+        numbers = {name: arguments[name] for name in NUMBERS}
+        return cls(system=system, paths=paths, window=arguments["window"], **block, **numbers)
+
+    def plan(self) -> Plan:
+        """The chart as a sweep: chunks of rows, each a call of `cells`."""
+        from saltus.sweep import Plan
+
+        more = {name: getattr(self, name) for name in NUMBERS if name not in ("tol", "seed")}
+        more |= {"path": list(self.paths), "window": np.ravel(self.window).tolist(), "coordinate": self.coordinate}
+        return Plan(
+            function=CELLS,
+            arguments=self.to_arguments(),
+            axes={"vertical": self.vertical, "horizontal": self.horizontal},
+            chunk={"vertical": self.rows},
+            variables=self._variables(),
+            attrs=provenance(self.system, tol=self.tol, seed=self.seed, title="stability chart computed by saltus", **more),
+        )
+
+    def _variables(self) -> dict[str, Variable]:
+        """The arrays of a chart, with their units and what they mean."""
+        from saltus.sweep import Variable
+
+        unit, name, each = self.system.model.unit_of(self.coordinate), self.coordinate, (("motion", KEPT),)
+        rows: list[tuple[str, str, str, Any, str]] = [
+            ("amplitude", "f8", unit, (), "the largest amplitude of the stable motions beside rest"),
+            ("period", "i2", "1", (), "forcing periods of the largest motion, 0 where there is none"),
+            ("smallest_amplitude", "f8", unit, (), "the smallest amplitude of those that count"),
+            ("count", "i2", "1", (), "stable motions beside rest, mirror images counted once"),
+            ("rest", "?", "1", (), "some start is captured at rest"),
+            ("tiny", "i2", "1", (), "starts that end on motions too small to count"),
+            ("unsettled", "i2", "1", (), "starts that do not settle"),
+            ("motion_amplitude", "f8", unit, each, "amplitude of each motion"),
+            ("motion_other", "f8", unit, each, "extremum of each motion on the other side, as its amplitude if symmetric"),
+            ("motion_period", "i2", "1", each, "forcing periods of each motion"),
+            ("motion_impact_count", "i4", "1", each, "impacts in a period of each motion"),
+            (f"motion_{name}", "f8", unit, each, f"{name} of each motion at phase 0"),
+            ("motion_velocity", "f8", unit, each, f"d {name} / d tau of each motion at phase 0"),
+        ]
+        limits = amplitude_limits(self.system)
+        rows += [(f"beyond_{limit.name}", "?", "1", (), f"the largest motion passes {limit.meaning}") for limit in limits]
+        return {
+            key: Variable(dtype=dtype, extra=extra, attrs={"units": units, "long_name": text})
+            for key, dtype, units, extra, text in rows
+        }
+
+
+def check_system(system: Any) -> None:
+    """Refuse what has no chart."""
+    if not isinstance(system, System):
+        raise ParameterError(f"stability_chart takes a System(model=..., load=..., impact=...), got {system!r}")
+    if system.load.frequency is None:
+        raise ParameterError("a stability chart needs a load with a frequency, Load(frequency=..., ...)")
+    if len(system.model.coordinates) > 1:
+        raise ParameterError("stability_chart works on models with one coordinate")
+
+
+def _check_paths(system: System, paths: Any, axes: tuple[np.ndarray, np.ndarray]) -> None:
+    """Refuse paths that lead to no number, and values that the system refuses."""
+    if isinstance(paths, str) or len(paths) != 2 or paths[0] == paths[1]:
+        raise ParameterError(f"paths must be two parameters, (along horizontal, along vertical), got {paths!r}", "paths")
+    for path, values in zip(paths, axes, strict=True):
+        check_path(system, path, "paths")
+        check_along(system, path, (values.min(), values.max()), "paths")
+
+
+def periods_to_settle(system: System) -> int:
+    """Forcing periods in which motions settle that do, by the damping of the model."""
+    damping, frequency = system.model.damping, system.load.frequency
+    if not damping or not frequency:
+        return DURATION.most
+    return math.ceil(min(DURATION.most, max(DURATION.fewest, 2 * DURATION.decay * frequency / (2 * math.pi * damping))))

@@ -1,0 +1,35 @@
+"""The amplitudes beyond which a motion is no longer one of the real mechanism."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from saltus.systems import Metainterface, System
+
+
+@dataclass(frozen=True)
+class AmplitudeLimit:
+    """An amplitude that motions of the mechanism do not pass."""
+
+    name: str
+    value: Any  # rad; an array where the limit varies with a parameter that is one
+    meaning: str
+
+
+def amplitude_limits(system: System, parameters: Mapping[str, Any] | None = None) -> tuple[AmplitudeLimit, ...]:
+    """The limits of the metainterface (erratum 20), pi - beta0 and 2 (pi - beta0); none are known for other models.
+
+    Args:
+        system: what moves.
+        parameters: values, by dotted path, that take the place of those of the system; numbers or arrays.
+    """
+    if not isinstance(system.model, Metainterface):
+        return ()
+    straight = math.pi - (parameters or {}).get("model.beta0", system.model.beta0)
+    return (
+        AmplitudeLimit("line", straight, "the straight line, pi - beta0"),
+        AmplitudeLimit("kinematic", 2 * straight, "2 (pi - beta0), where the slider closes again"),
+    )

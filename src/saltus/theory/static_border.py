@@ -1,0 +1,79 @@
+"""The quasi-static border of a stability chart: the loads under which rest alone is an equilibrium."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from saltus.systems import Harmonic, Metainterface, System
+from saltus.theory.quasi_static import critical_horizontal, fold_horizontal, subcritical_vertical, unloaded_fold
+
+if TYPE_CHECKING:
+    import xarray
+
+PLANE = ("load.horizontal.amplitude", "load.vertical")  # the two parameters in whose plane the closed forms hold
+
+
+@dataclass(frozen=True, eq=False)
+class QuasiStaticBorder:
+    """Both parts of the border over the vertical load V; the true border is the lesser of them (erratum 23)."""
+
+    vertical: np.ndarray
+    critical: np.ndarray  # Hhat at which the undeformed state is lost: the paper's border
+    fold: np.ndarray  # Hhat at the fold of deformed equilibria, nan where there is none
+    subcritical_below: float  # V below which the fold comes first
+
+    @property
+    def true(self) -> np.ndarray:
+        """The lesser of both."""
+        return np.asarray(np.fmin(self.critical, self.fold))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The border as a Dataset along `vertical`."""
+        import xarray as xr
+
+        data = {
+            "critical": (self.critical, "Hhat at which the undeformed state is lost (the paper's border)"),
+            "fold": (self.fold, "Hhat at the fold of deformed equilibria (erratum 23)"),
+            "true": (self.true, "the lesser of both: the quasi-static border"),
+        }
+        variables = {name: ("vertical", values, {"units": "1", "long_name": text}) for name, (values, text) in data.items()}
+        axis = {"vertical": ("vertical", self.vertical, {"units": "1", "long_name": "V"})}
+        return xr.Dataset(variables, axis, {"subcritical_below": self.subcritical_below})
+
+
+def quasi_static_border(system: System, plane: tuple[str, ...], lowest: float) -> QuasiStaticBorder | None:
+    """The border over V from `lowest` to 0, or None where no closed form is known.
+
+    It is known for the metainterface with k = 1 and beta0 below 90 degrees, under H = Hhat sin and a constant V < 0 alone, in
+    the plane of Hhat and V.
+    """
+    model, channels = system.model, system.load.channels
+    if tuple(plane) != PLANE or not isinstance(model, Metainterface):
+        return None
+    horizontal = channels.get("horizontal")
+    known = (
+        (model.stiffness_ratio, model.smoothing) == (1.0, None)
+        and model.beta0 < math.pi / 2
+        and set(channels) == {"horizontal", "vertical"}
+        and isinstance(horizontal, Harmonic)
+        and horizontal.mean == 0.0
+        and lowest < 0.0
+    )
+    return border_over(model.beta0, lowest) if known else None
+
+
+def border_over(beta0: float, lowest: float) -> QuasiStaticBorder:
+    """The border of the metainterface with k = 1 over V from `lowest` to 0."""
+    start, end = subcritical_vertical(beta0), unloaded_fold(beta0)[0]
+    bend = end + (start - end) * np.linspace(0.0, 1.0, 101) ** 0.5  # the fold leaves the line at V = start as a power 3/2
+    ends = [np.linspace(lowest, end, 21), bend, np.linspace(end, start, 101), np.linspace(start, 0.0, 21)]
+    vertical = np.unique(np.concatenate(ends))
+    vertical = vertical[vertical >= lowest]
+    fold = np.full_like(vertical, np.nan)
+    fold[vertical <= start] = fold_horizontal(beta0, vertical[vertical <= start])
+    fold[vertical <= end] = 0.0  # deformed equilibria exist without any horizontal load; this removes the rounding of 0
+    return QuasiStaticBorder(vertical, critical_horizontal(beta0, vertical), fold, start)
