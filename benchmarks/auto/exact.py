@@ -91,5 +91,5 @@ def _row(outcome: tuple[Any, float] | str, known: Known) -> dict[str, Any]:
         "grazings": grazings,
         "labels": {kind: labels[kind] for kind in ("LP", "BP", "PD", "TR")},
         "impossible": sum(point.kind == "NS" or (point.kind == "PD" and point.orbit.symmetric) for point in special),
-        "end": branch.ends[0],
+        "end": str(branch.ends[0]),
     }

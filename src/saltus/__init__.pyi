@@ -19,8 +19,8 @@ from .errors import MotionError, ParameterError, SaltusError, SweepError, TraceE
 from .flow import EventKind, Motion, Sensitivities, Stop, sensitivities, simulate, simulate_many
 from .orbits import (
     Branch,
-    Locus,
     PeriodicOrbit,
+    SpecialCurve,
     SpecialPoint,
     continue_orbit,
     continue_special,
@@ -56,7 +56,6 @@ __all__ = [
     "Harmonic",
     "InelasticImpact",
     "Load",
-    "Locus",
     "Metainterface",
     "Model",
     "Motion",
@@ -68,6 +67,7 @@ __all__ = [
     "RockingBlock",
     "SaltusError",
     "Sensitivities",
+    "SpecialCurve",
     "SpecialPoint",
     "Stop",
     "SweepError",

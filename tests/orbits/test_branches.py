@@ -9,6 +9,7 @@ from orbit_cases import FREQUENCY
 from shared_systems import forced, hinged, walled
 
 from saltus import ParameterError, continue_orbit, find_orbit, simulate
+from saltus.continuation import CurveEnd, End
 
 AMPLITUDE = "load.horizontal.amplitude"
 
@@ -291,7 +292,7 @@ def test_mirror_images_have_mirrored_branches():
 def test_systems_that_are_almost_symmetric(excess):
     """The two mirror pairs of impacts appear one after the other, at grazings as near to each other as the stiffness is to 1."""
     found = continue_orbit(start(k=1.0 + excess, W=0.3), FREQUENCY, (0.2845, 0.31))
-    assert found.ends == ("bound 0.2845", "bound 0.31")
+    assert [str(end) for end in found.ends] == ["bound 0.2845", "bound 0.31"]
     assert parameter(found, "LP", 0.284668) == pytest.approx(0.284668455747, abs=2 * excess)
     near = [p for _, p in kinds(found, "GR") if abs(p - 0.28463) < 10 * excess]
     assert len(near) == 2
@@ -307,7 +308,7 @@ def test_symmetric_but_for_rounding():
     found = continue_orbit(start(k=1.0 + 1e-9, W=0.3), FREQUENCY, (0.2845, 0.31))
     assert all(o.admissible for o in found.orbits)
     assert not found.closed
-    assert found.ends[1] == "bound 0.31"
+    assert found.ends[1] == End(CurveEnd.BOUND, 0.31)
     assert {s.kind for s in found.special} <= {"GR", "LP", "PD"}
 
 
@@ -327,7 +328,7 @@ def test_bounds_end_a_branch_exactly_on_them():
     found = continue_orbit(start(), FREQUENCY, (0.95, 1.4))
     assert found.parameters[0] == 0.95
     assert found.parameters[-1] == 1.4
-    assert found.ends == ("bound 0.95", "bound 1.4")
+    assert found.ends == (End(CurveEnd.BOUND, 0.95), End(CurveEnd.BOUND, 1.4))
 
 
 def test_a_start_on_a_bound_is_followed_the_other_way():
@@ -338,9 +339,12 @@ def test_a_start_on_a_bound_is_followed_the_other_way():
 
 def test_progress_hears_of_every_step():
     heard = []
-    found = continue_orbit(start(), FREQUENCY, (0.95, 1.4), progress=heard.append)
-    assert set(heard) <= set(found.parameters)
-    assert len(heard) >= len(found.points) - 3
+    found = continue_orbit(start(), FREQUENCY, (0.95, 1.4), progress=lambda *told: heard.append(told))
+    fractions, steps = zip(*heard, strict=True)
+    assert list(fractions) == sorted(fractions)
+    assert fractions[-1] == 1.0
+    assert len(heard) >= len(found.points) - len(found.special) - 1
+    assert set(steps) <= {f"{FREQUENCY} = {value:.6g}" for value in found.parameters}
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 
-def branch(parameter, amplitude, stable, *, special=(), origin="start", ends=("bound 0", "bound 3"), periods=1, crossings=2):
+def branch(parameter, amplitude, stable, *, special=(), origin="start", ends=("bound", "bound"), periods=1, crossings=2):
     """A branch's dataset with the given points; `special` holds (kind, parameter, amplitude)."""
     amplitude = np.asarray(amplitude, float)
     n = len(amplitude)
@@ -25,7 +25,7 @@ def branch(parameter, amplitude, stable, *, special=(), origin="start", ends=("b
         data["special_amplitude"] = ("special", np.array(sizes, float))
         data["special_highest"] = ("special", np.array(sizes, float))
         data["special_lowest"] = ("special", -0.5 * np.array(sizes, float))
-    return xr.Dataset(data, attrs={"origin": origin, "ends": list(ends)})
+    return xr.Dataset(data, attrs={"origin": origin, "end_reasons": list(ends), "end_kinds": ["", ""]})
 
 
 def diagram(*branches, dots=(), bounds=(0.0, 3.0)):
@@ -54,6 +54,6 @@ def loop():
         [3.0, 2.5, 3.0, 3.5, 3.0],
         [1, 1, 1, 0, 1],
         special=[("LP", 2.0, 3.0), ("LP", 1.0, 3.0)],
-        ends=("closes", "closes"),
+        ends=("closed", "closed"),
         periods=3,
     )

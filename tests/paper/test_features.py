@@ -17,14 +17,14 @@ def test_the_main_branch_is_the_longest_one_of_period_one():
     ("changes", "number"),
     [
         ({}, 1),
-        ({"ends": ("bound 0", "bound 60")}, 1),
-        ({"ends": ("BPC at 1", "closes")}, 0),
+        ({"ends": ("bound", "bound")}, 1),
+        ({"ends": ("born", "closed")}, 0),
         ({"origin": "PD at 1"}, 0),
         ({"parameter": [4, 5]}, 0),
     ],
 )
 def test_a_family_is_detached_if_no_bifurcation_ties_it_and_it_reaches_into_the_range(changes, number):
-    parts = {"parameter": [1, 2], "amplitude": [3, 3], "stable": [1, 1], "periods": 3, "ends": ("closes", "closes")}
+    parts = {"parameter": [1, 2], "amplitude": [3, 3], "stable": [1, 1], "periods": 3, "ends": ("closed", "closed")}
     assert len(features.detached(diagram(folded(), branch(**{**parts, **changes})))) == number
 
 

@@ -85,7 +85,7 @@ def test_no_knot_without_two_stable_arms(resonance):
 
 
 def test_past_the_folds_of_a_loop_motions_jump(island):
-    names = [name for name, branch in detached(island) if branch.attrs["ends"] == ["closes", "closes"]]
+    names = [name for name, branch in detached(island) if branch.attrs["end_reasons"] == ["closed", "closed"]]
     jumps = motions.jumps(island)
     closed = np.isin(jumps["branch"].values, names)
     assert jumps["fold"].values[closed] == pytest.approx([2.539297, 2.914701], abs=2e-6)
@@ -93,7 +93,7 @@ def test_past_the_folds_of_a_loop_motions_jump(island):
 
 
 def test_between_its_folds_the_loop_attracts_what_starts_near_it(island):
-    _, branch = next((n, b) for n, b in detached(island) if b.attrs["ends"] == ["closes", "closes"])
+    _, branch = next((n, b) for n, b in detached(island) if b.attrs["end_reasons"] == ["closed", "closed"])
     stable = np.flatnonzero(branch["stable"].values)
     index = int(stable[np.argmin(np.abs(branch["parameter"].values[stable] - 2.7))])
     orbit = motions.orbit_at(branch, index, float(branch["parameter"][index]))

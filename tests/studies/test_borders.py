@@ -11,8 +11,7 @@ from shared_systems import forced
 
 import saltus
 from saltus.errors import ParameterError
-from saltus.orbits import continue_orbit, continue_special, find_orbit
-from saltus.orbits.branch import follow_stable
+from saltus.orbits import continue_orbit, continue_special, find_orbit, follow_stable
 from saltus.studies import Borders, bordered_chart, disagreements, exact_borders, stability_chart, with_borders
 from saltus.studies.chart import follow as chart_follow
 from saltus.studies.chart.border_curves import curve_dataset, explained

@@ -53,6 +53,7 @@ def test_a_main_branch_and_the_detached_loop_of_period_3(branches):
     assert [int(branch["period"][0]) for branch in branches] == [1, 3]
     main, loop = branches
     assert list(main.attrs["ends"]) == ["bound 2", "bound 2.6"]
+    assert list(main.attrs["end_reasons"]) == ["bound", "bound"]
     assert loop.attrs["closed"] == 1
     assert np.unique(loop["impact_count"]).tolist() == [2, 6]
 

@@ -1,5 +1,5 @@
-from .branch import STEP, Branch, continue_orbit, follow_stable
-from .codimension import CodimensionTwo
+from .branch import Branch
+from .branch_continuation import STEP, continue_orbit, follow_stable
 from .find import find_orbit, orbit_from
 from .from_dataset import orbits_of
 from .newton import solve
@@ -8,9 +8,9 @@ from .problem import Problem
 from .resting import RestingOrbit
 from .search import EVEN, Search, initial_states, same_orbit, search_orbits
 from .signature import Signature
-from .special import Evidence, SpecialPoint
-from .special_curve import Locus
-from .special_curves import continue_special
+from .special_curve import SpecialCurve
+from .special_curve_continuation import continue_special
+from .special_point import OrbitEnd, SpecialKind, SpecialPoint
 from .switching import Cascade, doubling_cascade, switch_branch
 from .symmetry import is_symmetric
 from .verify import defects
@@ -20,14 +20,14 @@ __all__ = [
     "STEP",
     "Branch",
     "Cascade",
-    "CodimensionTwo",
-    "Evidence",
-    "Locus",
+    "OrbitEnd",
     "PeriodicOrbit",
     "Problem",
     "RestingOrbit",
     "Search",
     "Signature",
+    "SpecialCurve",
+    "SpecialKind",
     "SpecialPoint",
     "continue_orbit",
     "continue_special",

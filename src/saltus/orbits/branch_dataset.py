@@ -7,47 +7,48 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.resting import RestingOrbit
+from saltus.provenance import provenance
 
 if TYPE_CHECKING:
     import xarray
 
     from saltus.orbits.branch import Branch
-    from saltus.orbits.special import SpecialPoint
+    from saltus.orbits.special_point import SpecialPoint
 
 
 def branch_dataset(branch: Branch) -> xarray.Dataset:
     """Points along `point`, special points along `special`.
 
-    Angles in radians; `stable` and `symmetric` are 0 or 1; `unknowns` and `sides` hold each orbit's own (see `problem.py`),
-    filled up with nan and 0.
+    `stable` and `symmetric` are 0 or 1; `unknowns` and `sides` hold each orbit's own (see `problem.py`), filled up with nan and
+    0. Orbits that rest have `releases`, `rests` (times) and `rest_share` besides. Of both ends the attributes hold the sentence
+    (`ends`), the reason as a word (`end_reasons`) and the kind of the special point there, if any (`end_kinds`).
     """
     import xarray
 
-    import saltus
-
     orbits = branch.orbits
-    system = orbits[0].problem.system
-    names = system.model.coordinates
+    problem = orbits[0].problem
     data: dict[str, Any] = {"parameter": ("point", branch.parameters, {"long_name": branch.path})}
-    data |= {name: ("point", values, attrs) for name, values, attrs in _columns(orbits, names[0])}
-    data |= _multipliers(orbits) | _unknowns(orbits) | _special(branch.special)
-    attributes = {
+    data |= {name: ("point", values, attrs) for name, values, attrs in _columns(orbits)}
+    data |= _multipliers(orbits) | _unknowns(orbits) | _special(branch.special) | _rests(orbits)
+    attributes: dict[str, Any] = {
         "path": branch.path,
-        "coordinate": names[0],
-        "ends": list(branch.ends),
-        "origin": branch.origin,
+        "coordinate": problem.system.model.coordinates[0],
+        "ends": [str(end) for end in branch.ends],
+        "end_reasons": [end.reason.code for end in branch.ends],
+        "end_kinds": [str(end.kind) for end in branch.ends],
+        "origin": str(branch.origin),
         "closed": int(branch.closed),
         "missed": "; ".join(branch.missed),
-        "system": system.to_json(),
-        "saltus": saltus.__version__,
-        "tol": orbits[0].problem.tol,
     }
-    return xarray.Dataset(data, attrs=attributes)
+    return xarray.Dataset(data, attrs=provenance(problem.system, tol=problem.tol, **attributes))
 
 
-def _columns(orbits: list[PeriodicOrbit], coordinate: str) -> list[tuple[str, np.ndarray, dict[str, str]]]:
+def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[str, str]]]:
     """What is one number of each orbit."""
-    angle = {"units": "rad"} if coordinate.startswith("theta") else {"units": "1"}
+    model = orbits[0].problem.system.model
+    coordinate = model.coordinates[0]
+    angle = {"units": model.unit_of(coordinate)}
 
     def column(value: Any, kind: Any = float) -> np.ndarray:
         return np.array([value(orbit) for orbit in orbits], dtype=kind)
@@ -68,6 +69,18 @@ def _columns(orbits: list[PeriodicOrbit], coordinate: str) -> list[tuple[str, np
     for name in orbits[0].problem.margins:
         columns.append((f"margin_{name}", column(lambda o, name=name: o.margins[name]), {"long_name": f"least {name}"}))
     return columns
+
+
+def _rests(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
+    """Releases and rests of orbits that rest."""
+    resting = [orbit for orbit in orbits if isinstance(orbit, RestingOrbit)]
+    if not resting:
+        return {}
+    return {
+        "releases": (("point", "rest"), np.array([orbit.releases for orbit in resting])),
+        "rests": (("point", "rest"), np.array([orbit.rests for orbit in resting])),
+        "rest_share": ("point", np.array([orbit.rest_share for orbit in resting])),
+    }
 
 
 def _multipliers(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
@@ -92,7 +105,7 @@ def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:
     if not special:
         return {}
     rows: dict[str, list[Any]] = {
-        "kind": [s.kind for s in special],
+        "kind": [str(s.kind) for s in special],
         "special_parameter": [s.parameter for s in special],
         "special_amplitude": [s.amplitude for s in special],
         "special_highest": [s.orbit.highest for s in special],

@@ -22,7 +22,7 @@ NEEDED = ("parameter", "unknowns")
 
 
 def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
-    """The orbits along `point` of a dataset that `Branch.to_xarray` or `Locus.to_xarray` made, bit for bit, in order.
+    """The orbits along `point` of a dataset that `Branch.to_xarray` or `SpecialCurve.to_xarray` made, bit for bit, in order.
 
     Nothing is solved again: the equations are evaluated at the unknowns as they are kept, and orbits that rest are flown from
     their first release. `continue_orbit` goes on from any.

@@ -4,38 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 
+from saltus.continuation import End
 from saltus.flow import segments as at
-from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import TOUCH
-from saltus.orbits.path import Curve, Point, along_kernel
+from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
+from saltus.orbits.special_point import OrbitEnd
 
 PROBES = 10.0 ** -np.arange(2, 12.0)  # along the new branch, until one direction is seen to be admissible
 SAME = 1e-7  # between states a period apart: a grazing is located to rounding, but where it touches only to its square root
 TOGETHER = 1e-4  # phase between the two impacts of a pair that vanishes, and their speeds
 
 
-def other_side(point: Point) -> Point | str:
+def other_side(point: OrbitPoint) -> OrbitPoint | End:
     """The point of the new branch at a grazing, with the direction in which it goes on; or why there is none.
 
     A gap that touches zero between impacts gains a pair of impacts without speed there, or a single one at a wall that turns
     the motion round; impacts that have lost their speed are left out.
     """
     changed = removed(point) if point.orbit.slowest < TOUCH else inserted(point)
-    if isinstance(changed, str):
+    if isinstance(changed, End):
         return changed
     problem, unknowns = changed
-    values = point.solution.values
-    equations = problem.evaluate(unknowns, values, look=True)
-    if equations is None:
-        return "the motion cannot be followed on the other side of the grazing"
-    curve = Curve(problem, point.curve.scale, point.curve.symmetric)
-    start = along_kernel(curve, Solution(unknowns, values, equations, 0))
-    return _admissible_direction(start) or "neither direction after the grazing leads to orbits of the system"
+    curve = point.curve.with_problem(problem)
+    known = curve.known(unknowns, point.parameters)
+    if known is None:
+        return End(OrbitEnd.NO_MOTION, point.parameter, detail="on the other side of")
+    return _admissible_direction(curve.along_kernel(known)) or End(OrbitEnd.NO_DIRECTION, point.parameter)
 
 
-def _admissible_direction(start: Point) -> Point | None:
+def _admissible_direction(start: OrbitPoint) -> OrbitPoint | None:
     for probe in PROBES:
         for point in (start, start.turned()):
             ahead = point.curve.solve(point.place + probe * point.tangent, point.tangent)
@@ -50,10 +49,10 @@ def _turns_round(problem: Problem, side: int) -> bool:
     return bool(model.reset(0.0, 1.0, side, load, impact)[0] == side)
 
 
-def inserted(point: Point) -> tuple[Problem, np.ndarray] | str:
-    """The problem and its unknowns with impacts of no speed where the gap touches zero, or why there is none."""
-    problem, signature = point.curve.problem, point.curve.problem.signature
-    looks = point.solution.equations.looks
+def inserted(point: OrbitPoint) -> tuple[Problem, np.ndarray]:
+    """The problem and its unknowns with impacts of no speed where the gap touches zero."""
+    problem, signature = point.orbit.problem, point.orbit.signature
+    looks = point.equations.looks
     segment = int(np.argmin(looks[:, at.HUMP]))
     phase = looks[segment, at.HUMP_TIME] * problem.frequency(point.solution.values)
     side = signature.along()[segment]
@@ -67,9 +66,9 @@ def inserted(point: Point) -> tuple[Problem, np.ndarray] | str:
     return problem.with_signature(longer), np.concatenate([unknowns[: 2 * place], touches, unknowns[2 * place :]])
 
 
-def removed(point: Point) -> tuple[Problem, np.ndarray] | str:
+def removed(point: OrbitPoint) -> tuple[Problem, np.ndarray] | End:
     """The problem and its unknowns without the impacts that have lost their speed, or why there is none."""
-    problem, signature = point.curve.problem, point.curve.problem.signature
+    problem, signature = point.orbit.problem, point.orbit.signature
     n = len(signature.sides)
     phases, speeds = point.solution.unknowns[::2], point.solution.unknowns[1::2]
     slow = int(np.argmin(speeds))
@@ -78,7 +77,7 @@ def removed(point: Point) -> tuple[Problem, np.ndarray] | str:
     else:
         gone = _vanishing_pair(phases, speeds, slow, problem.closing)
         if not gone:
-            return "an impact loses its speed while both sides push outward: the motion is not unique there"
+            return End(OrbitEnd.NOT_UNIQUE, point.parameter)
     kept = [i for i in range(n) if i not in gone]
     if not kept:
         return _without_impacts(point, slow)
@@ -97,11 +96,11 @@ def _vanishing_pair(phases: np.ndarray, speeds: np.ndarray, slow: int, closing: 
     return [slow, neighbour] if abs(distance) < TOGETHER and speeds[neighbour] < TOGETHER else []
 
 
-def _without_impacts(point: Point, slow: int) -> tuple[Problem, np.ndarray] | str:
+def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Problem, np.ndarray] | End:
     """The orbit that touches contact once a period, as one without impacts: its state at phase 0."""
-    problem, signature = point.curve.problem, point.curve.problem.signature
+    problem, signature = point.orbit.problem, point.orbit.signature
     if signature.symmetric:
-        return "the orbit shrinks to rest"
+        return End(OrbitEnd.GRAZES_INTO_REST, point.parameter)
     touch = point.solution.unknowns[2 * slow]
     lengths = np.diff(np.append(point.solution.unknowns[::2], point.solution.unknowns[0] + problem.closing))
     side = signature.along()[int(np.argmax(lengths))]
@@ -113,4 +112,4 @@ def _without_impacts(point: Point, slow: int) -> tuple[Problem, np.ndarray] | st
         later = other.carried(contact, touch, whole + other.closing, point.solution.values)
         if state is not None and later is not None and np.abs(later - state).max() < SAME:
             return other, state
-    return "the motion cannot be followed from the grazing"
+    return End(OrbitEnd.NO_MOTION, point.parameter, detail="from")

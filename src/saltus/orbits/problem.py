@@ -60,6 +60,10 @@ class Equations:
         matrix[-d:, :d] += closing * self.there[-1]
         return matrix
 
+    def derivatives(self) -> np.ndarray:
+        """The derivatives to the unknowns and the parameters."""
+        return np.column_stack([self.jacobian(), self.parameters])
+
     def monodromy(self) -> np.ndarray:
         """The chain of the segments' maps, from the first unknowns to those a (half) period later; inf at a grazing."""
         chain = np.eye(self.here.shape[1])
@@ -131,6 +135,12 @@ class Problem:
     def with_signature(self, signature: Signature) -> Problem:
         """The problem of another signature."""
         return Problem(self.system, signature, self.paths, self.tol)
+
+    def repeated(self, unknowns: np.ndarray) -> np.ndarray:
+        """The unknowns of an orbit with impacts over twice the time that the equations cover."""
+        later = unknowns.copy()
+        later[::2] += self.closing
+        return np.concatenate([unknowns, later])
 
     def evaluate(self, unknowns: np.ndarray, values: np.ndarray, look: bool = False) -> Equations | None:
         """The equations at a point, or None where the motion cannot be followed."""

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from saltus.checks import check_bounds
+from saltus.continuation import End
 from saltus.errors import ParameterError
-from saltus.orbits.branch import STEP, Branch, follow_from
-from saltus.orbits.newton import Solution, solve
-from saltus.orbits.path import Curve, Point
+from saltus.orbits.branch import Branch
+from saltus.orbits.branch_continuation import STEP, follow_from
+from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
-from saltus.orbits.special import SpecialPoint, UserFunction
-from saltus.orbits.symmetry import whole
+from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
+from saltus.orbits.symmetry import full_period
 
 LONGEST = 64  # forcing periods of an orbit: periods double six times
 
@@ -40,17 +41,20 @@ def switch_branch(
     Raises:
         ParameterError: a special point where no branch begins.
     """
-    low, high = check_bounds(bounds)
-    path = special.point.curve.problem.paths[0]
-    origin = f"{special.kind} at {special.parameter:.9g}"
-    if special.kind not in ("PD", "BPC"):
+    bounds = check_bounds(bounds)
+    if special.kind not in (SpecialKind.PD, SpecialKind.BPC):
         raise ParameterError(f"no branch begins at a {special.kind}; switch at a PD or a BPC (grazings are gone through anyway)")
-    if special.kind == "BPC" and not special.orbit.symmetric:
-        starts = _crossing_branch(special.point)
+    if special.kind == SpecialKind.PD:
+        starts: tuple[OrbitPoint | None, ...] = (_doubled(special.point),)
+    elif special.orbit.symmetric:
+        starts = _unsymmetric(special.point)[: 2 if both else 1]
     else:
-        starts = (_doubled(special.point),) if special.kind == "PD" else _unsymmetric(special.point)[: 2 if both else 1]
-    branches = [follow_from(start, path, (low, high), origin, functions, step) for start in starts if start is not None]
-    return tuple(branches)
+        starts = _crossing_branch(special.point)
+    return tuple(follow_from(start, bounds, _origin(special), functions, step) for start in starts if start is not None)
+
+
+def _origin(special: SpecialPoint) -> End:
+    return End(OrbitEnd.BORN, special.parameter, special.kind)
 
 
 def _kernel(matrix: np.ndarray) -> np.ndarray:
@@ -58,67 +62,44 @@ def _kernel(matrix: np.ndarray) -> np.ndarray:
     return vector
 
 
-def _doubled(point: Point) -> Point | None:
+def _doubled(point: OrbitPoint) -> OrbitPoint | None:
     """The orbit gone round twice, and the direction in which the two rounds differ."""
-    problem, signature = point.curve.problem, point.curve.problem.signature
+    problem, signature = point.orbit.problem, point.orbit.signature
     if 2 * signature.period > LONGEST:
         return None
     twice = Signature((*signature.sides, *signature.sides), 2 * signature.period, False, signature.side)
-    unknowns, direction = point.solution.unknowns, _kernel(point.solution.equations.jacobian(-1.0))
-    if not signature.sides:
-        return _along(point, problem.with_signature(twice), unknowns, direction)
-    later = unknowns.copy()
-    later[::2] += problem.closing
-    return _along(
-        point, problem.with_signature(twice), np.concatenate([unknowns, later]), np.concatenate([direction, -direction])
-    )
+    unknowns, direction = point.solution.unknowns, _kernel(point.equations.jacobian(-1.0))
+    if signature.sides:
+        unknowns, direction = problem.repeated(unknowns), np.concatenate([direction, -direction])
+    return _along(point, problem.with_signature(twice), unknowns, direction)
 
 
-def _unsymmetric(point: Point) -> tuple[Point | None, ...]:
-    """The symmetric orbit over its whole period, and the two directions in which its halves differ."""
-    problem, solution = whole(point.curve.problem, point.solution)
-    direction = _kernel(point.solution.equations.jacobian(-1.0))
-    if point.curve.problem.signature.sides:
+def _unsymmetric(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
+    """The symmetric orbit over its full period, and the two directions in which its halves differ."""
+    problem, solution = full_period(point.orbit.problem, point.solution)
+    direction = _kernel(point.equations.jacobian(-1.0))
+    if point.orbit.signature.sides:
         direction = np.concatenate([direction, -direction])
     return tuple(_along(point, problem, solution.unknowns, sign * direction) for sign in (1.0, -1.0))
 
 
-def _along(point: Point, problem: Problem, unknowns: np.ndarray, direction: np.ndarray) -> Point | None:
+def _along(point: OrbitPoint, problem: Problem, unknowns: np.ndarray, direction: np.ndarray) -> OrbitPoint | None:
     """The first point of the new branch, to be followed in a direction of the unknowns."""
-    values = point.solution.values
-    equations = problem.evaluate(unknowns, values, look=True)
-    if equations is None:
-        return None
-    curve = Curve(problem, point.curve.scale, point.curve.symmetric)
-    tangent = np.append(direction, 0.0)
-    return Point(curve, Solution(unknowns, values, equations, 0), tangent / curve.norm(tangent))
+    curve, tangent = point.curve.with_problem(problem), np.append(direction, 0.0)
+    known = curve.known(unknowns, point.parameters)
+    return None if known is None else curve.point_at(known, tangent / curve.norm(tangent))
 
 
-def _crossing_branch(point: Point) -> tuple[Point | None, ...]:
+def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
     """Where two branches cross: the direction in the two-dimensional kernel that is not the branch's own, both ways."""
-    equations, curve = point.solution.equations, point.curve
-    matrix = np.column_stack([equations.jacobian(), equations.parameters[:, 0]]) / curve.weights
+    curve = point.curve
     own = point.tangent * curve.weights
-    kernel = np.linalg.svd(matrix)[2][-2:]
+    kernel = np.linalg.svd(point.equations.derivatives() / curve.weights)[2][-2:]
     other = kernel[int(np.argmin(np.abs(kernel @ own)))]
     other = other - (other @ own) * own
     tangent = other / curve.weights
-    tangent = tangent / curve.norm(tangent)
-    return tuple(Point(curve, point.solution, sign * tangent) for sign in (1.0, -1.0))
-
-
-def mirror_image(orbit_problem: Problem, solution: Solution) -> tuple[Problem, Solution] | None:
-    """The mirror image of an orbit of a symmetric system, itself an orbit half a forcing period later."""
-    signature = orbit_problem.signature
-    if signature.symmetric:
-        return orbit_problem, solution
-    if not signature.sides:
-        return None
-    other = orbit_problem.with_signature(Signature(tuple(-s for s in signature.sides), signature.period, False, -signature.side))
-    unknowns = solution.unknowns.copy()
-    unknowns[::2] += np.pi
-    found = solve(other, unknowns, solution.values)
-    return None if found is None else (other, found)
+    first = replace(point, tangent=tangent / curve.norm(tangent))
+    return first, first.turned()
 
 
 @dataclass(frozen=True)
@@ -152,17 +133,15 @@ def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_pe
     Raises:
         ParameterError: a special point that is no PD.
     """
-    if first.kind != "PD":
+    if first.kind != SpecialKind.PD:
         raise ParameterError(f"a cascade begins at a PD, not at a {first.kind}")
-    low, high = check_bounds(bounds)
-    points = [first]
+    bounds, points = check_bounds(bounds), [first]
     while 2 * points[-1].orbit.period <= max_period:
         start = _doubled(points[-1].point)
         if start is None:
             break
-        path = start.curve.problem.paths[0]
-        branch = follow_from(start, path, (low, high), f"PD at {points[-1].parameter:.9g}", None, step, until="PD")
-        if not branch.special or branch.special[-1].kind != "PD" or branch.ends[1] != "the first PD":
+        branch = follow_from(start, bounds, _origin(points[-1]), None, step, until=SpecialKind.PD)
+        if branch.ends[1].reason is not OrbitEnd.FIRST:
             break
         points.append(branch.special[-1])
     return Cascade(tuple(points))

@@ -74,19 +74,19 @@ def _solved(problem: Problem, unknowns: np.ndarray, solution: Solution) -> tuple
     return None if found is None else (problem, found)
 
 
-def whole(problem: Problem, solution: Solution) -> tuple[Problem, Solution]:
-    """A symmetric orbit as a solution of the problem of its whole period."""
+def over_full_period(problem: Problem, unknowns: np.ndarray) -> tuple[Problem, np.ndarray]:
+    """The problem of the full period of a symmetric orbit, and the orbit's unknowns in it."""
     signature = problem.signature
-    if not signature.symmetric:
+    sides = (*signature.sides, *(-s for s in signature.sides))
+    other = problem.with_signature(Signature(sides, signature.period, False, signature.side))
+    return other, problem.repeated(unknowns) if sides else unknowns
+
+
+def full_period(problem: Problem, solution: Solution) -> tuple[Problem, Solution]:
+    """A symmetric orbit as a solution of the problem of its full period."""
+    if not problem.signature.symmetric:
         return problem, solution
-    other = problem.with_signature(
-        Signature((*signature.sides, *(-s for s in signature.sides)), signature.period, False, signature.side)
-    )
-    unknowns = solution.unknowns
-    if signature.sides:
-        later = unknowns.copy()
-        later[::2] += problem.closing
-        unknowns = np.concatenate([unknowns, later])
+    other, unknowns = over_full_period(problem, solution.unknowns)
     found = solve(other, unknowns, solution.values)
-    assert found is not None, "a symmetric orbit solves the equations of its whole period"
+    assert found is not None, "a symmetric orbit solves the equations of its full period"
     return other, found

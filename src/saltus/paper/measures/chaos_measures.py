@@ -121,7 +121,7 @@ def _route(panels: Panels) -> Measured:
     doubled: list[bool] = []
     rows: list[dict[str, Any]] = []
     for frequency, tree in panels.items():
-        born = [branch for _, branch in branches_of(tree) if "PD" in " ".join(branch.attrs["ends"])]
+        born = [branch for _, branch in branches_of(tree) if "PD" in branch.attrs["end_kinds"]]
         periods = sorted({int(branch["period"][0]) for branch in born})
         marks = [str(mark) for edge in ("low_mark", "high_mark") for mark in tree["bands"][edge].values]
         doublings, grazings = count(tree, "PD"), count(tree, "GR")

@@ -10,7 +10,7 @@ import numpy as np
 from saltus.branch_lines import branch_lines, branches_of, smooth_lines
 
 PROMINENT = 0.05  # of the highest amplitude, by which a resonance rises above the valleys beside it
-FREE_ENDS = ("closes", "bound")  # of a branch that hangs on no other
+FREE_ENDS = {"closed", "bound"}  # of a branch that hangs on no other
 
 
 def within(spectrum: Any, branch: Any) -> np.ndarray:
@@ -29,7 +29,7 @@ def detached(spectrum: Any) -> list[tuple[str, Any]]:
     """The branches that no special point ties to another one and that reach into the range, without the main one."""
     found = []
     for name, branch in branches_of(spectrum):
-        free = all(str(end).startswith(FREE_ENDS) for end in np.atleast_1d(branch.attrs["ends"]))
+        free = FREE_ENDS.issuperset(np.atleast_1d(branch.attrs["end_reasons"]).tolist())
         same = branch.equals(main_branch(spectrum))
         if branch.attrs["origin"] == "start" and free and not same and within(spectrum, branch).any():
             found.append((name, branch))

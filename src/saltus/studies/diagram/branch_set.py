@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.orbits import Branch, PeriodicOrbit, SpecialPoint, continue_orbit, same_orbit, switch_branch
+from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, continue_orbit, same_orbit, switch_branch
 
 FOLLOWED = 20.0  # times the range's upper end: how far families of a longer period are followed along a frequency,
 BEYOND = 1.3  # and along anything else, where few of them close
 MOST_BRANCHES = 30  # beyond which nothing more is followed that is born on another branch
 NARROW = 0.02  # of the range: on a narrower branch nothing is followed that is born there
 SAME_PLACE = 1e-6  # between a branch's end and the special point of another one that it is
-BRANCHING = ("PD", "BPC")
+BRANCHING = (SpecialKind.PD, SpecialKind.BPC)
 VISIBLE = 0.01  # of the largest amplitude: near rest a branch has endless special points, each smaller than the one before
 BESIDE = 1e-3  # step along a parent's branch from the special point at which its family was met
 
@@ -94,13 +94,10 @@ class Atlas:
     def _ends_at(self, special: SpecialPoint) -> bool:
         """Whether a branch of the orbits that are born at a special point begins or ends there."""
         for branch in self.branches:
-            for end, inner, reason in zip((0, -1), (1, -2), branch.ends, strict=True):
-                family = branch.points[inner].orbit if len(branch.points) > 2 else branch.points[end].orbit
-                if (
-                    special.kind in reason
-                    and family.period == _periods_born(special)
-                    and _meet(branch.points[end].orbit, special)
-                ):
+            for place, inner, end in zip((0, -1), (1, -2), branch.ends, strict=True):
+                last = branch.points[place].orbit
+                family = branch.points[inner].orbit if len(branch.points) > 2 else last
+                if special.kind == end.kind and family.period == _periods_born(special) and _meet(last, special):
                     return True
         return False
 
@@ -113,7 +110,7 @@ class Atlas:
 
 def _periods_born(special: SpecialPoint) -> int:
     """Of the orbits that are born at a special point."""
-    return special.orbit.period * (2 if special.kind == "PD" else 1)
+    return special.orbit.period * (2 if special.kind == SpecialKind.PD else 1)
 
 
 def _meet(end: PeriodicOrbit, special: SpecialPoint) -> bool:

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.orbits import Locus, SpecialPoint
+from saltus.orbits import SpecialCurve, SpecialPoint
 from saltus.orbits.codimension import normal_form
 from saltus.orbits.conditions import Singular
-from saltus.orbits.path import Curve
+from saltus.orbits.orbit_curve import OrbitCurve
 from saltus.orbits.problem import Problem
-from saltus.orbits.special_curve import LocusPoint
+from saltus.orbits.special_curve import SpecialCurvePoint
 from saltus.theory.impact_oscillator import wall_orbits
 
 FREQUENCY, AMPLITUDE, VERTICAL, FORCE = "load.frequency", "load.horizontal.amplitude", "load.vertical", "load.force.amplitude"
@@ -51,7 +51,7 @@ def wall_special(kind: str) -> SpecialPoint:
 
 
 @cache
-def wall_locus(kind: str) -> Locus:
+def wall_locus(kind: str) -> SpecialCurve:
     bounds = (0.67, 0.95) if kind == "PD" else (0.6, 1.99)
     return saltus.continue_special(wall_special(kind), FREQUENCY, bounds, first_bounds=(0.01, 6.0))
 
@@ -65,7 +65,7 @@ def resonance_fold() -> SpecialPoint:
 
 
 @cache
-def folds() -> Locus:
+def folds() -> SpecialCurve:
     """The curve of folds through it, in the load's frequency and amplitude."""
     return saltus.continue_special(resonance_fold(), AMPLITUDE, (0.05, 1.2), first_bounds=(0.3, 2.0))
 
@@ -78,12 +78,12 @@ def low_frequency_special(kind: str) -> SpecialPoint:
 
 
 @cache
-def low_frequency(kind: str) -> Locus:
+def low_frequency(kind: str) -> SpecialCurve:
     """Curves through the special points about the change from two to six crossings at Hhat = 0.5."""
     return saltus.continue_special(low_frequency_special(kind), AMPLITUDE, (0.3, 0.6), first_bounds=(0.18, 0.4))
 
 
-def closed_form(point: LocusPoint, kind: str) -> float:
+def closed_form(point: SpecialCurvePoint, kind: str) -> float:
     family = wall_orbits(point.orbit.system)
     if kind == "GR":
         return float(family.grazing_amplitude)
@@ -119,7 +119,7 @@ def test_both_folds_of_the_resonance_lie_on_one_curve_through_a_cusp() -> None:
     assert [s.kind for s in locus.special] == ["CP"]
     for amplitude, known in ((0.5, [0.848485265597, 0.908810732539]), (1.0, [0.811772145949, 0.995113422444])):
         assert sorted(o.frequency for o in locus.at(AMPLITUDE, amplitude)) == pytest.approx(known, abs=2e-12)
-    assert locus.ends == (f"bound {AMPLITUDE} = 1.2",) * 2
+    assert [str(end) for end in locus.ends] == [f"bound {AMPLITUDE} = 1.2"] * 2
 
 
 @pytest.mark.parametrize(("beyond", "count"), [(0.004, 2), (-0.001, 0)])
@@ -179,13 +179,13 @@ def test_folds_and_symmetry_breakings_of_six_crossings_end_at_one_point_of_the_g
         assert min(math.dist(meeting.parameters, s.parameters) for s in known) < 1e-11
 
 
-def shift_of_the_broken_family(point: LocusPoint, distance: float) -> float:
+def shift_of_the_broken_family(point: SpecialCurvePoint, distance: float) -> float:
     """How far in the first parameter the unsymmetric orbit lies that differs by a distance from a symmetric one at its BPC."""
     condition = point.condition
     assert isinstance(condition, Singular)
     assert condition.twice is not None
-    direction = condition.along(point.judged.right / np.linalg.norm(point.judged.right))
-    curve = Curve(Problem(point.orbit.system, condition.twice.signature, (FREQUENCY,)), 1.0)
+    direction = condition.along(point.condition_value.right / np.linalg.norm(point.condition_value.right))
+    curve = OrbitCurve(Problem(point.orbit.system, condition.twice.signature, (FREQUENCY,)), (1.0,))
     guess = np.append(condition.doubled(point.solution.unknowns) + distance * direction, point.solution.values[0])
     broken = curve.solve(guess, np.append(direction, 0.0))
     assert broken is not None
@@ -208,7 +208,7 @@ def test_a_fold_of_symmetric_orbits_goes_on_without_the_symmetry() -> None:
     fold = resonance_fold()
     assert fold.orbit.symmetric
     locus = saltus.continue_special(fold, "model.stiffness_ratio", (0.98, 1.02), first_bounds=(0.5, 1.5))
-    assert locus.ends == ("bound model.stiffness_ratio = 0.98", "bound model.stiffness_ratio = 1.02")
+    assert [end.parameter for end in locus.ends] == [0.98, 1.02]
     assert [o.frequency for o in locus.at("model.stiffness_ratio", 1.0)] == pytest.approx([fold.parameter], abs=1e-11)
     assert not locus.orbits[0].symmetric
 

@@ -1,0 +1,36 @@
+from .continuation_loop import Continuation
+from .corrector import Corrected, Evaluation, newton
+from .course import Course, both_ways, solved_at
+from .curve import Curve, Point
+from .end import CurveEnd, End, EndReason
+from .events import Cut, Events
+from .natural_parameter import NaturalCurve, bisected
+from .pseudo_arclength import EquationCurve
+from .step_length import STEPS, StepSettings
+from .test_functions import Evidence, TestFunction, Zero, located
+
+__all__ = [
+    "STEPS",
+    "Continuation",
+    "Corrected",
+    "Course",
+    "Curve",
+    "CurveEnd",
+    "Cut",
+    "End",
+    "EndReason",
+    "EquationCurve",
+    "Evaluation",
+    "Events",
+    "Evidence",
+    "NaturalCurve",
+    "Point",
+    "StepSettings",
+    "TestFunction",
+    "Zero",
+    "bisected",
+    "both_ways",
+    "located",
+    "newton",
+    "solved_at",
+]

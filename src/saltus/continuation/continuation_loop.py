@@ -1,0 +1,177 @@
+"""The loop of a continuation: step after step along a curve, to each event on the way and to an end that has a reason."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Generic
+
+import numpy as np
+
+from saltus.continuation.curve import P
+from saltus.continuation.end import CurveEnd, End
+from saltus.continuation.events import Cut, Events
+from saltus.continuation.step_length import STEPS, StepSettings
+from saltus.continuation.test_functions import Zero, located
+from saltus.progress import Progress
+
+AHEAD = 1e-6  # of a point along its tangent, to know its direction in other numbers
+WIDE = 0.2  # share of a step by which the first point of a curve may lie beside it for the curve to close
+
+
+class Watch(Generic[P]):
+    """Tells how much of a curve has been seen: of the range of its first parameter, or of the points it may have."""
+
+    def __init__(self, progress: Progress, names: Sequence[str], bounds: np.ndarray, most_points: int) -> None:
+        self.progress, self.names, self.bounds, self.most_points = progress, names, bounds, most_points
+        self.low, self.high, self.points = np.inf, -np.inf, 0
+
+    def __call__(self, point: P) -> None:
+        """Tell of a new point."""
+        self.low, self.high, self.points = min(self.low, point.parameter), max(self.high, point.parameter), self.points + 1
+        least, largest = self.bounds[0]
+        share = (min(self.high, largest) - max(self.low, least)) / (largest - least)
+        what = ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, point.parameters, strict=True))
+        self.progress(min(1.0, max(share, self.points / self.most_points)), what)
+
+
+@dataclass
+class Continuation(Generic[P]):
+    """One direction of a curve while it is being followed."""
+
+    bounds: np.ndarray  # (k, 2): the least and the largest value of each parameter
+    events: Events[P]
+    steps: StepSettings = STEPS
+    names: tuple[str, ...] = ()  # of the parameters; with several, the end on a bound says which one it is
+    watch: Callable[[P], object] = lambda point: None
+    points: list[P] = field(default_factory=list)
+    special: list[Zero[P]] = field(default_factory=list)
+    missed: list[str] = field(default_factory=list)
+    end: End | None = None
+
+    def follow(self, first: P, born: bool = False) -> None:
+        """Follow the curve from a point until it ends; `born` at a special point, whose own events are not to be found again."""
+        self.points.append(first)
+        self.end = self._on_a_bound(first)
+        before, step = None, min(self.steps.first, self.steps.longest)
+        while self.end is None:
+            point = self.points[-1]
+            ahead, step = self._step(before, point, step)
+            if ahead is None:
+                return
+            if self._accept(point, ahead, born):
+                step = min(self.steps.restart, 0.1 * step)
+            before, born = point, False
+            if self.end is None and len(self.points) > self.steps.most_points:
+                self.end = End(CurveEnd.MOST_POINTS, ahead.parameter, detail=str(self.steps.most_points))
+
+    def _step(self, before: P | None, point: P, step: float) -> tuple[P | None, float]:
+        """The next point, and the length of the step after it."""
+        curve, length = point.curve, step
+        while step > self.steps.least:
+            length = min(step, curve.reach(point))
+            ahead = curve.advance(before, point, length)
+            if ahead is not None and self.events.accepts(point, ahead):
+                turn = curve.turn(point, ahead)
+                if turn < self.steps.most:
+                    return ahead, self.steps.following(step, turn, ahead.iterations)
+            step = self.steps.shrink * length
+        self.end = self.events.stalled(self, point, length)
+        return None, step
+
+    def _accept(self, point: P, ahead: P, born: bool) -> bool:
+        """Take a step up to the first of its events; returns whether the curve goes on with other equations."""
+        cut = self.events.cut(point, ahead)
+        if isinstance(cut, End):
+            self.end = cut
+            return False
+        ahead = ahead if cut is None else cut.point
+        self.end = None if born else self.events.interrupted(self, point, ahead)
+        if self.end is not None:
+            return False
+        bound, closed = self._beyond(point, ahead), False
+        if bound is not None:
+            (ahead, end), cut = bound, None
+        elif closed := self._closes(point, ahead):
+            ahead, end, cut = self.points[0], End(CurveEnd.CLOSED), None
+        else:
+            end = None
+        if closed or not born:
+            self._note(point, ahead)
+        self.points.append(ahead)
+        self.watch(ahead)
+        self.end = self.end or end or self.events.ended(self, ahead, cut)
+        return self.end is None and cut is not None and self._cross(cut)
+
+    def _cross(self, cut: Cut[P]) -> bool:
+        """Go on beyond a cut; returns whether that is with other equations."""
+        following = self.events.across(self, cut)
+        if isinstance(following, End):
+            self.end = following
+        elif following is not None:
+            self.points.append(following)
+            return True
+        return False
+
+    def _note(self, a: P, b: P) -> None:
+        """Locate the special points of a step, in order."""
+        found = []
+        for test in self.events.tests(a):
+            if not test.value(a) * test.value(b) < 0.0:
+                continue
+            zero = located(test, a, b)
+            if zero is None:
+                self.missed.append(f"{test.kind} between {a.parameter:.9g} and {b.parameter:.9g}")
+            else:
+                found.append(zero)
+        for zero in sorted(self.events.distinct(found), key=lambda zero: a.curve.norm(zero.point.place - a.place)):
+            self.special.append(zero)
+            if self.events.keeps_special:
+                self.points.append(zero.point)
+            self.end = self.end or self.events.last(zero)
+
+    def _on_a_bound(self, point: P) -> End | None:
+        """The end of a curve that starts on a bound and leads beyond it."""
+        tangent = point.tangent[-len(self.bounds) :]
+        for i, ((low, high), value, rate) in enumerate(zip(self.bounds, point.parameters, tangent, strict=True)):
+            if (value <= low and rate < 0.0) or (value >= high and rate > 0.0):
+                return self._bound(i, value)
+        return None
+
+    def _bound(self, index: int, value: float) -> End:
+        return End(CurveEnd.BOUND, float(value), detail=f"{self.names[index]} = " if len(self.bounds) > 1 else "")
+
+    def _beyond(self, a: P, b: P) -> tuple[P, End] | None:
+        """The point on the first bound that a step goes over or ends on, and the end there."""
+        start, chord = a.parameters, b.parameters - a.parameters
+        shares = []
+        for i, (low, high) in enumerate(self.bounds):
+            for bound, passed in ((low, b.parameters[i] < low), (high, b.parameters[i] > high)):
+                if passed and chord[i] != 0.0:
+                    shares.append(((bound - start[i]) / chord[i], i, bound))
+        if not shares:
+            end = self._on_a_bound(b)
+            return None if end is None else (b, end)
+        share, index, bound = min(shares)
+        guess, place = a.place + share * (b.place - a.place), index - len(self.bounds)
+        guess[place] = bound
+        return a.curve.solve_at(guess, b.place - a.place, place) or b, self._bound(index, bound)
+
+    def _closes(self, a: P, b: P) -> bool:
+        """Whether a step goes by the first point of the curve, in the direction in which the curve was followed there."""
+        if len(self.points) <= 3:
+            return False
+        first, across, k = self.points[0], b.place - a.place, len(self.bounds)
+        length = b.curve.norm(across)
+        if np.linalg.norm(b.curve.weights[-k:] * (first.parameters - a.parameters)) > 1.1 * length:
+            return False
+        place = self.events.nearest(first, first.place, b)
+        if place is None:
+            return False
+        along = place - a.place
+        share = float(along @ (b.curve.weights**2 * across)) / length**2
+        if not (0.0 < share <= 1.0 and b.curve.norm(along - share * across) < WIDE * length):
+            return False
+        moved = self.events.nearest(first, first.place + AHEAD * first.tangent, b)
+        assert moved is not None
+        return float((moved - place) @ (b.curve.weights**2 * b.tangent)) > 0.0  # else it comes back along itself

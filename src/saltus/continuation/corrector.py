@@ -1,0 +1,88 @@
+"""Newton's method for a square system of equations, which knows when rounding stops it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class NewtonSettings:
+    """When Newton's method has converged and when it is given up."""
+
+    converged: float = 5e-14  # residual relative to the unknowns: a few dozen roundings of what it is computed from
+    stalled: float = 1e-10  # residual that is accepted where rounding keeps it above `converged`,
+    slowdown: float = 0.3  # which shows as the last step having left more than this share of the residual before
+    diverged: float = 1e6  # residual from which no step leads back
+    longest: float = 1.0  # no component of a step is longer than that: the equations are far from linear beyond
+
+
+NEWTON = NewtonSettings()
+
+
+class Evaluation(Protocol):
+    """The equations of a curve at one place."""
+
+    @property
+    def residual(self) -> np.ndarray:
+        """F, (m,)."""
+
+    def derivatives(self) -> np.ndarray:
+        """The derivatives of F to all unknowns and parameters, (m, m + 1)."""
+
+
+E = TypeVar("E", bound=Evaluation)
+Linear = Callable[[E, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Corrected(Generic[E]):
+    """Where Newton's method has converged, and what was evaluated there."""
+
+    place: np.ndarray
+    evaluation: E
+    iterations: int
+
+
+def newton(
+    evaluate: Callable[[np.ndarray, bool], E | None], linear: Linear[E], guess: np.ndarray, iterations: int
+) -> Corrected[E] | None:
+    """The zero of a system near a guess, or None where Newton's method does not converge.
+
+    Args:
+        evaluate: the equations at (place, thorough), None where they have no value. The evaluation that is returned was a
+            thorough one, with all that is wanted to be known of a solution.
+        linear: the matrix and the right-hand side of the equations for a step, from an evaluation and its place.
+        guess: where to begin.
+        iterations: the most steps.
+    """
+    place, before = guess.copy(), np.inf
+    for iteration in range(iterations + 1):
+        found = evaluate(place, iteration > 0)
+        if found is None:
+            return None
+        error, scale = np.abs(found.residual).max(), max(1.0, np.abs(place).max())
+        slow = error <= NEWTON.stalled * scale and error > NEWTON.slowdown * before
+        if error <= NEWTON.converged * scale or slow:
+            looked = found if iteration > 0 else evaluate(place, True)
+            return None if looked is None else Corrected(place, looked, iteration)
+        step = _step(*linear(found, place)) if error < NEWTON.diverged else None
+        if step is None:
+            return None
+        before, place = error, place + step
+    return None
+
+
+def _step(matrix: np.ndarray, right: np.ndarray) -> np.ndarray | None:
+    """Newton's step, shortened where it is too long; None where there is none."""
+    try:
+        step = np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError:
+        return None
+    longest = np.abs(step).max()
+    if not np.isfinite(longest):
+        return None
+    return np.asarray(step * min(1.0, NEWTON.longest / longest if longest > 0 else 1.0))

@@ -1,0 +1,81 @@
+"""What the loop of a continuation needs to know of a curve: its norm, its points, and how to get from one to the next."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Any, Generic, Self, TypeVar
+
+import numpy as np
+
+P = TypeVar("P", bound="Point")
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of a curve, and the direction in which the curve is followed there."""
+
+    curve: Any  # the `Curve` that it was solved on; its equations are those used for the next step
+    place: np.ndarray  # unknowns y, then parameters p
+    tangent: np.ndarray  # of length 1 in the norm of the curve
+    iterations: int  # of the corrector that found it
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """The parameters, (k,)."""
+        values: np.ndarray = self.place[-self.curve.count :]
+        return values
+
+    @property
+    def parameter(self) -> float:
+        """The first parameter."""
+        return float(self.parameters[0])
+
+    @property
+    def residual(self) -> float:
+        """The largest residual of the equations."""
+        return 0.0
+
+    def turned(self) -> Self:
+        """The same point, followed the other way."""
+        return replace(self, tangent=-self.tangent)
+
+
+class Curve(ABC, Generic[P]):
+    """The solutions of F(y, p) = 0 with one equation fewer than there are unknowns y and parameters p."""
+
+    count: int  # of the parameters, which are the last numbers of a place
+
+    @property
+    @abstractmethod
+    def weights(self) -> np.ndarray:
+        """Of the unknowns and the parameters in the norm, (n + k,)."""
+
+    @abstractmethod
+    def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
+        """The point near a guess in the hyperplane through it normal to a direction of length 1."""
+
+    @abstractmethod
+    def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
+        """The point near a guess with the guess's own value at an index of its place; its tangent goes along the direction."""
+
+    @abstractmethod
+    def advance(self, before: P | None, point: P, step: float) -> P | None:
+        """The point a step further, given the point before if there is one; None where the step is too long."""
+
+    @abstractmethod
+    def turn(self, a: P, b: P) -> float:
+        """How much the curve changes from a point to the next, by which the length of the steps is controlled."""
+
+    def reach(self, point: P) -> float:
+        """The longest step from a point that makes sense."""
+        return math.inf
+
+    def joins(self, other: Curve[P]) -> bool:
+        """Whether points of this curve and of the other one are solutions of the same equations."""
+        return self is other
+
+    def norm(self, step: np.ndarray) -> float:
+        """The length of a step."""
+        return float(np.linalg.norm(self.weights * step))

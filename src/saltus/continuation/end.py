@@ -1,0 +1,38 @@
+"""Why a curve ends, as data whose text is a sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class EndReason(Enum):
+    """A reason for which a curve ends. Its value is the sentence, in which the numbers of an `End` are filled in."""
+
+    @property
+    def code(self) -> str:
+        """The reason as a word for files."""
+        return self.name.lower()
+
+
+class CurveEnd(EndReason):
+    """The reasons that any curve may have."""
+
+    BOUND = "bound {detail}{parameter:g}"
+    CLOSED = "closes"
+    MOST_POINTS = "more than {detail} points"
+    NO_STEP = "the steps shrink to nothing: the {detail} has a singularity that is none of the known kinds"
+    NOT_LOCATED = "a {detail} that could not be located"
+
+
+@dataclass(frozen=True)
+class End:
+    """An end of a curve: its reason, with the parameter there, the kind of a special point and what else the sentence names."""
+
+    reason: EndReason
+    parameter: float | None = None
+    kind: str = ""
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return str(self.reason.value.format(parameter=self.parameter, kind=self.kind, detail=self.detail))

@@ -1,0 +1,80 @@
+"""Natural-parameter continuation: curves that have one solution at each value of one parameter and never fold."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable
+
+import numpy as np
+
+from saltus.continuation.curve import Curve, P
+
+NARROW = 1e-12  # to within which, relative to the parameter, ends and changes without a test function are located
+
+
+class NaturalCurve(Curve[P]):
+    """A curve that is followed by its parameter itself, from bound to bound. Whether there is a solution is found by trying."""
+
+    count = 1
+    scale: float  # of the parameter in the norm
+    bounds: tuple[float, float]
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Of the parameter, which is all of a place."""
+        return np.array([1.0 / self.scale])
+
+    @abstractmethod
+    def at(self, value: float) -> P | None:
+        """The solution at a value of the parameter near to that which this curve was made for; None where there is none."""
+
+    @abstractmethod
+    def turn(self, a: P, b: P) -> float:
+        """How much two solutions differ."""
+
+    def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
+        """The solution at the parameter of the guess, whatever the direction."""
+        return self.at(float(guess[-1]))
+
+    def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
+        """The solution at the parameter of the guess."""
+        return self.at(float(guess[-1]))
+
+    def advance(self, before: P | None, point: P, step: float) -> P | None:
+        """The solution a step further, which ends on the bound rather than beyond it."""
+        ahead = self.at(self.ahead(point, step))
+        return ahead if ahead is None or point.tangent[-1] > 0.0 else ahead.turned()
+
+    def ahead(self, point: P, step: float) -> float:
+        """The parameter a step further, at most the bound."""
+        bound = self._bound(point)
+        if step >= self.reach(point):
+            return bound
+        return point.parameter + math.copysign(step * self.scale, point.tangent[-1])
+
+    def reach(self, point: P) -> float:
+        """The distance from the bound ahead."""
+        return abs(self._bound(point) - point.parameter) / self.scale
+
+    def joins(self, other: Curve[P]) -> bool:
+        """Always: there is no other solution."""
+        return True
+
+    def _bound(self, point: P) -> float:
+        return self.bounds[1] if point.tangent[-1] > 0.0 else self.bounds[0]
+
+
+def bisected(point: P, beyond: float, holds: Callable[[P], bool]) -> tuple[P, float]:
+    """The last point of a natural curve for which something holds, and the parameter hardly beyond at which it does not.
+
+    It holds at the given point, and does not at the parameter `beyond`, where there may be no solution at all.
+    """
+    while abs(beyond - point.parameter) > NARROW * max(abs(point.parameter), abs(beyond)):
+        middle = 0.5 * (point.parameter + beyond)
+        found = point.curve.at(middle)
+        if found is not None and holds(found):
+            point = found
+        else:
+            beyond = middle
+    return point, beyond

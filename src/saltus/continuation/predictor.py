@@ -1,0 +1,45 @@
+"""Where a curve is expected to be: on the cubic through two of its points with their tangents."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.continuation.curve import Point
+
+MOST_STRETCHED = 3.0  # times the last step, beyond which its curvature says nothing about the next one
+
+
+def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
+    """The place a step beyond a point, on the cubic through the last two points with their tangents.
+
+    Its error is of fourth order in the step. That of the tangent, which is all there is where there is no point before or where
+    the equations have changed since, is of second.
+    """
+    straight = point.place + step * point.tangent
+    if before is None or before.curve is not point.curve:
+        return straight
+    chord = point.place - before.place
+    length = _arc(before, point, chord)
+    if not 0.0 < step <= MOST_STRETCHED * length:
+        return straight
+    u = step / length
+    bend = point.tangent * length - chord  # the cubic is the tangent and what bends it: of second and of third order
+    twist = before.tangent * length - chord
+    return np.asarray(straight + u**2 * (2.0 * bend + twist) + u**3 * (bend + twist))
+
+
+def between(a: Point, b: Point, share: float) -> np.ndarray:
+    """The place at a share of the way from a to b, on the cubic through both, or on their chord if the equations have changed."""
+    chord = b.place - a.place
+    if a.curve is not b.curve:
+        return np.asarray(a.place + share * chord)
+    length = _arc(a, b, chord)
+    begin, end = length * a.tangent - chord, length * b.tangent - chord
+    rest = 1.0 - share
+    return np.asarray(a.place + share * chord + share * rest * (rest * begin - share * end))
+
+
+def _arc(a: Point, b: Point, chord: np.ndarray) -> float:
+    """The length of the curve between two points, to the order that the cubic needs."""
+    turn = float(a.curve.norm(b.tangent - a.tangent))
+    return float(a.curve.norm(chord) * (1.0 + turn**2 / 24.0))

@@ -1,0 +1,88 @@
+"""Pseudo-arclength continuation: curves of equations with derivatives, which may fold in every parameter."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from typing import Any
+
+import numpy as np
+
+from saltus.continuation.corrector import Corrected, Evaluation, newton
+from saltus.continuation.curve import Curve, P
+from saltus.continuation.predictor import predicted
+
+FAR = 0.3  # share of a step by which its end may lie away from the tangent's: farther away it may be on another branch
+
+
+class EquationCurve(Curve[P]):
+    """A curve of equations: each point is predicted along the last ones and corrected by Newton's method in a hyperplane."""
+
+    iterations = 7  # of Newton's method in a hyperplane: where it takes more the step is too long
+    iterations_at = 12  # and at a fixed number, where the guess may be farther away
+
+    @abstractmethod
+    def evaluate(self, place: np.ndarray, thorough: bool) -> Evaluation | None:
+        """The equations at a place, with all that is wanted of a solution if `thorough`; None where they have no value."""
+
+    @abstractmethod
+    def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> P:
+        """A solution as a point."""
+
+    def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
+        """The point near a guess in the hyperplane through it normal to a direction of length 1."""
+        normal = direction * self.weights**2
+
+        def linear(found: Evaluation, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            right = -np.append(found.residual, normal @ (place - guess))
+            return np.vstack([found.derivatives(), normal]), right
+
+        found = newton(self.evaluate, linear, guess, self.iterations)
+        return None if found is None else self.with_tangent(found, direction)
+
+    def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
+        """The point near a guess with the guess's own value at an index of its place; its tangent goes along the direction."""
+        free = np.arange(guess.size) != index % guess.size
+
+        def filled(numbers: np.ndarray) -> np.ndarray:
+            place = guess.copy()
+            place[free] = numbers
+            return place
+
+        def evaluate(numbers: np.ndarray, thorough: bool) -> Evaluation | None:
+            return self.evaluate(filled(numbers), thorough)
+
+        def linear(found: Evaluation, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            return found.derivatives()[:, free], -found.residual
+
+        found = newton(evaluate, linear, guess[free], self.iterations_at)
+        if found is None:
+            return None
+        return self.with_tangent(Corrected(filled(found.place), found.evaluation, found.iterations), direction)
+
+    def with_tangent(self, found: Corrected[Any], direction: np.ndarray) -> P | None:
+        """A solution as a point, with the tangent that goes along a direction; None where the tangent is not unique."""
+        matrix = np.vstack([found.evaluation.derivatives(), direction * self.weights**2])
+        try:
+            tangent = np.linalg.solve(matrix, np.append(np.zeros(len(matrix) - 1), 1.0))
+        except np.linalg.LinAlgError:
+            return None
+        length = self.norm(tangent)
+        return self.point_at(found, tangent / length) if 0.0 < length < np.inf else None
+
+    def along_kernel(self, found: Corrected[Any]) -> P:
+        """A solution as a point, with its tangent from the kernel of the derivatives, where no direction is known."""
+        tangent = np.linalg.svd(found.evaluation.derivatives() / self.weights)[2][-1] / self.weights
+        return self.point_at(found, tangent / self.norm(tangent))
+
+    def advance(self, before: P | None, point: P, step: float) -> P | None:
+        """The point a step further; None where Newton's method does not converge or leads far away from the tangent."""
+        ahead = self.solve(predicted(before, point, step), point.tangent)
+        if ahead is None or self.norm(ahead.place - point.place - step * point.tangent) >= FAR * step:
+            return None
+        return ahead
+
+    def turn(self, a: P, b: P) -> float:
+        """The angle between the tangents, rad."""
+        cosine = float(b.tangent @ (self.weights**2 * a.tangent))
+        return math.acos(min(1.0, max(-1.0, cosine)))

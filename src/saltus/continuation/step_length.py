@@ -1,0 +1,30 @@
+"""How long the next step is: as long as the curve changes by a chosen amount in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StepSettings:
+    """The control of the steps, whose lengths are in the norm of the curve."""
+
+    aim: float = 0.12  # rad between the tangents of neighbouring points that is aimed at
+    most: float = 0.5  # rad between them above which a step is taken again, shorter
+    longest: float = 0.1  # a thirtieth of the range of the parameter, or a tenth of a unit of the unknowns
+    first: float = 1e-3  # the length of the first step
+    restart: float = 1e-3  # at most so long is the first step after the equations have changed
+    least: float = 1e-11  # below which steps have shrunk to nothing
+    shrink: float = 0.4  # the length of a step that has to be taken again, as a share of the one that failed
+    grow: tuple[float, float] = (0.5, 2.0)  # the least and the largest ratio of a step to the one before
+    easy: int = 5  # iterations of the corrector above which the next step is
+    hard: float = 0.7  # at most so long, as a share of this one
+    most_points: int = 20_000  # points after which the curve is given up
+
+    def following(self, step: float, turn: float, iterations: int) -> float:
+        """The length of the step after one that was accepted."""
+        factor = min(self.grow[1], max(self.grow[0], self.aim / max(turn, 1e-3)))
+        return min(self.longest, step * (factor if iterations <= self.easy else min(factor, self.hard)))
+
+
+STEPS = StepSettings()

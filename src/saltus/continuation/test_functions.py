@@ -1,0 +1,82 @@
+"""Test functions: they vanish at special points, which are located by bracketing and carry their evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Generic
+
+import numpy as np
+
+from saltus.continuation.curve import P
+from saltus.continuation.predictor import between
+
+
+@dataclass(frozen=True)
+class TestFunction(Generic[P]):
+    """A function of the points of a curve whose zeros are special points of one kind."""
+
+    kind: str
+    value: Callable[[P], float]
+    width: float = 1e-11  # of the bracket in the step that contains the zero; the point nearest to zero is nearer still
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a special point is known by."""
+
+    residual: float  # of the equations
+    brackets: tuple[float, ...]  # the width in each parameter within which the test function changes its sign
+    before: float  # the test function at the ends of the step that contains the point
+    after: float
+    value: float  # and at the point itself
+
+    @property
+    def bracket(self) -> float:
+        """The largest of these widths."""
+        return max(self.brackets)
+
+
+@dataclass(frozen=True, eq=False)
+class Zero(Generic[P]):
+    """A special point of a curve: the kind of its test function, the point, and the evidence."""
+
+    kind: str
+    point: P
+    evidence: Evidence
+
+
+def located(test: TestFunction[P], a: P, b: P) -> Zero[P] | None:
+    """The point between a and b at which a test function goes through zero; None if the curve cannot be followed between."""
+    from scipy.optimize import brentq
+
+    chord = b.place - a.place
+    direction = chord / a.curve.norm(chord)
+    known = {0.0: (a, test.value(a)), 1.0: (b, test.value(b))}
+
+    def value_at(share: float) -> float:
+        if share not in known:
+            point = a.curve.solve(between(a, b, share), direction)
+            known[share] = (point, np.nan if point is None else test.value(point))
+            if not np.isfinite(known[share][1]):
+                raise ArithmeticError
+        return known[share][1]
+
+    before, after = value_at(0.0), value_at(1.0)
+    if before * after > 0.0 or not np.isfinite([before, after]).all():
+        return None
+    try:
+        brentq(value_at, 0.0, 1.0, xtol=test.width, rtol=1e-15)
+    except (ArithmeticError, RuntimeError):
+        return None
+    point, value = min(known.values(), key=lambda pair: abs(pair[1]))
+    return Zero(test.kind, point, Evidence(point.residual, _brackets(point, before, known.values()), before, after, value))
+
+
+def _brackets(point: P, before: float, known: Iterable[tuple[P, float]]) -> tuple[float, ...]:
+    """How near to a zero the test function is known to have either sign, in each parameter."""
+    sides: dict[bool, list[np.ndarray]] = {True: [], False: []}
+    for other, value in known:
+        sides[(value > 0) == (before > 0)].append(np.abs(other.parameters - point.parameters))
+    widths = np.max([np.min(side, axis=0) for side in sides.values() if side], axis=0)
+    return tuple(map(float, widths))

@@ -1,0 +1,81 @@
+"""The test functions of a branch of orbits: each vanishes at one kind of special point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from saltus.continuation import TestFunction
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.orbit_curve import OrbitPoint
+from saltus.orbits.special_point import SpecialKind, UserFunction
+
+Test = TestFunction[OrbitPoint]
+
+
+def fold(point: OrbitPoint) -> float:
+    """The parameter's part of the tangent."""
+    return float(point.tangent[-1])
+
+
+@lru_cache(maxsize=4)  # a point ends one step and begins the next
+def flip(point: OrbitPoint) -> float:
+    """The determinant of the equations for perturbations that change their sign each (half) period."""
+    return scaled_determinant(point.equations.jacobian(-1.0))
+
+
+@lru_cache(maxsize=4)
+def crossing(point: OrbitPoint) -> float:
+    """The determinant of the equations with the tangent below them: it changes its sign where two branches cross."""
+    return scaled_determinant(np.vstack([point.equations.derivatives(), point.tangent * point.curve.weights**2]))
+
+
+def scaled_determinant(matrix: np.ndarray) -> float:
+    """With rows of length 1: rounding then is the same everywhere, and so is the sign."""
+    lengths = np.linalg.norm(matrix, axis=1)
+    return float(np.linalg.det(matrix / lengths[:, None])) if (lengths > 0).all() else 0.0
+
+
+@lru_cache(maxsize=4)
+def torus(point: OrbitPoint) -> float:
+    """The modulus of a complex pair of multipliers less 1; -1 where there is none.
+
+    For one degree of freedom that the impacts and the damping contract there is never one (errata 22).
+    """
+    values = point.orbit.multipliers
+    pairs = values[np.abs(values.imag) > 1e-9]
+    return float(np.abs(pairs).max(initial=0.0)) - 1.0
+
+
+def grazing(point: OrbitPoint) -> float:
+    """The least of the impacts' speeds and of the gap's inner minima: below 0 there is no orbit."""
+    return min(point.orbit.slowest, point.orbit.clearance)
+
+
+FLIP = {symmetric: Test(SpecialKind.BPC if symmetric else SpecialKind.PD, flip) for symmetric in (True, False)}
+FOLD, CROSSING, TORUS = Test(SpecialKind.LP, fold), Test(SpecialKind.BPC, crossing), Test(SpecialKind.NS, torus)
+GRAZING = Test(SpecialKind.GR, grazing, 1e-15)  # narrower than others: beside a grazing motions part by the square root
+
+
+def branch_tests(point: OrbitPoint, functions: dict[str, UserFunction]) -> Iterator[Test]:
+    """The test functions of a branch at a point that are zero at a special point, but for grazings."""
+    yield from (FOLD, FLIP[point.orbit.symmetric], CROSSING, TORUS)
+    yield from orbit_tests(point.orbit, functions)
+
+
+def orbit_tests(orbit: PeriodicOrbit, functions: dict[str, UserFunction]) -> Iterator[Test]:
+    """The model's margins and the functions of the user as test functions, each by its name."""
+
+    def margin(name: str) -> Callable[[Any], float]:
+        return lambda point: float(point.orbit.margins[name])
+
+    def value(function: UserFunction) -> Callable[[Any], float]:
+        return lambda point: float(function(point.orbit))
+
+    for name in orbit.problem.margins:
+        yield Test(name, margin(name))
+    for name, function in functions.items():
+        yield Test(name, value(function))

@@ -1,0 +1,132 @@
+"""Following orbits along one parameter, through folds and grazings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import check_bounds
+from saltus.continuation import STEPS, Continuation, Course, End, StepSettings, both_ways
+from saltus.errors import ParameterError
+from saltus.orbits.branch import START, Branch
+from saltus.orbits.branch_events import BranchEvents
+from saltus.orbits.newton import solve
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.orbit_curve import OrbitPoint, start
+from saltus.orbits.problem import Problem
+from saltus.orbits.resting import RestingOrbit
+from saltus.orbits.resting_family import RESTING_STEPS, RestingEvents, first_point
+from saltus.orbits.special_point import SpecialKind, UserFunction
+from saltus.orbits.symmetry import full_period, half, keeps_symmetry
+from saltus.progress import Progress, silent
+
+STEP = STEPS.longest  # the longest step: a thirtieth of the parameter's range, or a tenth of a radian and of a unit of speed
+# Towards a value not far away steps are as long as the way there and as the units of the phases and the speeds.
+NEARBY_STEPS = replace(STEPS, longest=1.0, first=0.1)
+
+
+def continue_orbit(
+    orbit: PeriodicOrbit,
+    path: str,
+    bounds: tuple[float, float],
+    *,
+    functions: dict[str, UserFunction] | None = None,
+    step: float = STEP,
+    progress: Progress = silent,
+) -> Branch:
+    """The branch of an orbit along a parameter, both ways, until it closes, reaches a bound, shrinks to rest or cannot go on.
+
+    Args:
+        orbit: where to begin, as from `find_orbit`.
+        path: dotted path of the parameter, such as "load.frequency".
+        bounds: the least and the largest value of the parameter.
+        functions: further functions of an orbit whose zeros are special points, by name. Those of the model's margins are
+            found anyway.
+        step: the longest step, in the norm of `OrbitCurve`.
+        progress: called with the share of the range that has been seen and the value of the parameter.
+
+    Raises:
+        ParameterError: an unknown parameter, bounds that exclude the orbit.
+    """
+    low, high = _checked(orbit, path, bounds)
+    limits: dict[str, Any] = {"bounds": np.array([[low, high]]), "names": (path,), "progress": progress}
+    if isinstance(orbit, RestingOrbit):
+        family, steps = first_point(orbit, path, (low, high)), replace(RESTING_STEPS, longest=step, first=0.1 * step)
+        return Branch.of(path, both_ways(family, lambda: RestingEvents(functions or {}), steps=steps, **limits))
+    first = start(*along(orbit, path), scale=(high - low) / 3.0)
+    return Branch.of(path, both_ways(first, lambda: BranchEvents(functions or {}), steps=_steps(step), **limits))
+
+
+def follow_stable(orbit: PeriodicOrbit, path: str, target: float) -> Branch:
+    """The branch of a stable orbit towards a value of the parameter not far away, up to there or to just beyond the loss of
+    its stability; in long steps, to find that out."""
+    value = float(orbit.system.get(path))
+    low, high = _checked(orbit, path, (min(value, target), max(value, target)))
+    first: Any
+    events: Any
+    if isinstance(orbit, RestingOrbit):
+        first, events = first_point(orbit, path, (low, high)), RestingEvents({})
+        steps = replace(RESTING_STEPS, longest=NEARBY_STEPS.longest, first=NEARBY_STEPS.first)
+    else:
+        first, events = start(*along(orbit, path), scale=high - low), BranchEvents(while_stable=True)
+        steps = NEARBY_STEPS
+    run = Continuation(np.array([[low, high]]), events, steps, (path,))
+    return _followed(run, first if target > value else first.turned(), START)
+
+
+def follow_from(
+    first: OrbitPoint,
+    bounds: tuple[float, float],
+    origin: End,
+    functions: dict[str, UserFunction] | None = None,
+    step: float = STEP,
+    until: SpecialKind | None = None,
+) -> Branch:
+    """The branch that begins at a special point of another one, in the direction of its tangent."""
+    path = first.orbit.problem.paths[0]
+    run = Continuation(np.array([bounds]), BranchEvents(functions or {}, until), _steps(step), (path,))
+    return _followed(run, first, origin, born=True)
+
+
+def _followed(run: Continuation, first: Any, origin: End, born: bool = False) -> Branch:
+    """The branch of one direction, from where it begins."""
+    run.follow(first, born)
+    assert run.end is not None
+    path = run.names[0]
+    course = Course(tuple(run.points), tuple(run.special), (origin, run.end), tuple(run.missed))
+    return replace(Branch.of(path, course), origin=origin)
+
+
+def _steps(longest: float) -> StepSettings:
+    return replace(STEPS, longest=longest)
+
+
+def _checked(orbit: PeriodicOrbit, path: str, bounds: Any) -> tuple[float, float]:
+    """Bounds of a parameter that the system allows and between which the orbit lies."""
+    low, high = check_bounds(bounds)
+    value = orbit.system.get(path) if path in orbit.system.parameters else None
+    if value is None:
+        orbit.system.get(path)  # refuses what leads nowhere
+        raise ParameterError(f"{path} is not a number, so an orbit cannot be continued along it")
+    if not low <= value <= high:
+        raise ParameterError(f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range")
+    for bound in (low, high):
+        orbit.system.with_({path: bound})  # refuses bounds beyond what the system allows
+    return low, high
+
+
+def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
+    """An orbit as a solution of the problem along a parameter, halved where it and the system are and stay symmetric."""
+    system, signature = orbit.system, orbit.signature
+    symmetric = keeps_symmetry(system, path)
+    problem = Problem(system, signature, (path,))
+    found = solve(problem, orbit.solution.unknowns, problem.values)
+    if found is None:
+        raise ParameterError(f"the orbit does not solve its own equations to be continued along {path}; find it again")
+    if signature.symmetric and not symmetric:
+        problem, found = full_period(problem, found)
+    elif symmetric and not signature.symmetric:
+        problem, found = half(problem, found) or (problem, found)
+    return PeriodicOrbit(problem, found), symmetric

@@ -1,0 +1,176 @@
+"""What happens along a branch of orbits: special points, grazings that are gone through, and the ways in which it ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from saltus.continuation import Continuation, CurveEnd, Cut, End, Events, Zero, located
+from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, grazing
+from saltus.orbits.grazing import other_side
+from saltus.orbits.images import asymmetry, falls_onto_image, halves_of, nearest, passes_image, repetition
+from saltus.orbits.orbit import TOUCH
+from saltus.orbits.orbit_curve import OrbitPoint
+from saltus.orbits.signature import Signature
+from saltus.orbits.special_point import OrbitEnd, SpecialKind, UserFunction
+
+Run = Continuation[OrbitPoint]
+Special = Zero[OrbitPoint]
+
+
+@dataclass(frozen=True)
+class BranchSettings:
+    """Where a branch is given up, and what tells its events from rounding."""
+
+    most_impacts: int = 120  # impacts of one period with which orbits are still followed
+    gathering: int = 5  # so many grazings one after the other that each add impacts are taken for endlessly many,
+    gathered: float = 1e-3  # where they lie within this share of the parameter's range,
+    small: float = 1e-2  # or where the amplitude has shrunk to this share of the largest one
+    many: int = 60  # with more impacts than this
+    steepest: float = 1e8  # multiplier beyond which motions part so fast that an orbit cannot be solved for
+    smallest: float = 1e-7  # amplitude below which an orbit has shrunk to rest
+    same_fold: float = 1e-8  # parameter within which a fold and a crossing of branches are one point
+    reaches: tuple[float, ...] = tuple(10.0 ** np.arange(-8, -0.9))  # lengths along a parent's branch, until its special point
+    # is found between the ends
+
+
+SETTINGS = BranchSettings()
+
+
+@dataclass
+class BranchEvents(Events[OrbitPoint]):
+    """The events along a branch."""
+
+    functions: dict[str, UserFunction] = field(default_factory=dict)
+    until: SpecialKind | None = None  # the kind of special point at which to end
+    while_stable: bool = False  # whether to end beyond the loss of stability
+
+    name = "branch"
+    keeps_special = True  # so that a line through the points shows the fold
+
+    def accepts(self, point: OrbitPoint, ahead: OrbitPoint) -> bool:
+        """Whether a step has not gone over to the orbits that are their own images, nor, from one grazing, beyond the next."""
+        skipped = grazing(point) <= TOUCH and grazing(ahead) < 0.0
+        return not skipped and not falls_onto_image(point, ahead)
+
+    def cut(self, point: OrbitPoint, ahead: OrbitPoint) -> Cut[OrbitPoint] | End | None:
+        """The grazing in a step, if there is one."""
+        if grazing(ahead) >= 0.0:
+            return None
+        graze = located(GRAZING, point, ahead)
+        return End(CurveEnd.NOT_LOCATED, ahead.parameter, detail="grazing") if graze is None else Cut(graze.point, graze)
+
+    def interrupted(self, run: Run, point: OrbitPoint, ahead: OrbitPoint) -> End | None:
+        """The end at the orbit's own image, on the branch from which its family is born, at its BPC or PD."""
+        if not passes_image(point, ahead):
+            return None
+        kind = SpecialKind.BPC if point.orbit.period % 2 else SpecialKind.PD
+        parent = parent_point(point, ahead)
+        if parent is not None:
+            run.points.append(parent.point)
+            run.special.append(parent)
+        return End(OrbitEnd.IMAGE, ahead.parameter if parent is None else parent.point.parameter, kind)
+
+    def tests(self, point: OrbitPoint) -> Iterator[Test]:
+        """All test functions but that of grazings."""
+        return branch_tests(point, self.functions)
+
+    def distinct(self, found: list[Special]) -> list[Special]:
+        """Special points without the crossings of branches that are folds."""
+        folds = [zero.point.parameter for zero in found if zero.kind == SpecialKind.LP]
+
+        def is_fold(zero: Special) -> bool:
+            crossing = zero.kind == SpecialKind.BPC and not zero.point.orbit.symmetric
+            return crossing and any(abs(zero.point.parameter - p) < SETTINGS.same_fold for p in folds)
+
+        return [zero for zero in found if not is_fold(zero)]
+
+    def last(self, special: Special) -> End | None:
+        """The end at the first special point of the kind that is looked for."""
+        return End(OrbitEnd.FIRST, special.point.parameter, special.kind) if special.kind == self.until else None
+
+    def ended(self, run: Run, ahead: OrbitPoint, cut: Cut[OrbitPoint] | None) -> End | None:
+        """The end of an orbit that has shrunk to rest, or has lost its stability."""
+        if ahead.orbit.amplitude < SETTINGS.smallest:
+            return End(OrbitEnd.SHRINKS, ahead.parameter)
+        if self.while_stable and cut is None and not ahead.orbit.stable:
+            return End(OrbitEnd.UNSTABLE, ahead.parameter)
+        return None
+
+    def across(self, run: Run, cut: Cut[OrbitPoint]) -> OrbitPoint | End:
+        """The point with the signature on the other side of a grazing, or why the branch does not go on."""
+        graze = cut.special
+        assert graze is not None
+        if any(_same_place(graze, earlier) for earlier in run.special):
+            return End(OrbitEnd.COMES_BACK, graze.point.parameter)
+        run.special.append(graze)
+        following = other_side(graze.point)
+        if isinstance(following, End):
+            return following
+        count, value = following.orbit.signature.impact_count, following.parameter
+        if (shorter := repetition(following)) is not None:
+            return End(OrbitEnd.GRAZES_ANOTHER, value, detail=shorter)
+        if count > SETTINGS.most_impacts:
+            return End(OrbitEnd.MANY_IMPACTS, value, detail=str(SETTINGS.most_impacts))
+        return End(OrbitEnd.ACCUMULATES, value, detail=str(count)) if _accumulate(run, following) else following
+
+    def stalled(self, run: Run, point: OrbitPoint, step: float) -> End:
+        """The end where no step is short enough, as the orbit repels too strongly or for a reason not known."""
+        largest = abs(point.orbit.multipliers[0])
+        if largest > SETTINGS.steepest and not point.orbit.grazes:
+            return End(OrbitEnd.REPELS, point.parameter, detail=f"{largest:.1g}")
+        return super().stalled(run, point, step)
+
+    def nearest(self, point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+        """A place counted from the impact from which it lies nearest to another point."""
+        return nearest(point, place, other)
+
+
+def _accumulate(run: Run, following: OrbitPoint) -> bool:
+    """Whether the last grazings have all added impacts, ever closer to one parameter or on the way to rest."""
+    grazings = [s.point for s in run.special if s.kind == SpecialKind.GR][-SETTINGS.gathering :]
+    counts = [point.orbit.signature.impact_count for point in (*grazings, following)]
+    if len(grazings) < SETTINGS.gathering or not (np.diff(counts) > 0).all():
+        return False
+    span = float(np.ptp([point.parameter for point in grazings]))
+    small = following.orbit.amplitude < SETTINGS.small * max(point.orbit.amplitude for point in run.points)
+    return span < SETTINGS.gathered * following.curve.scales[0] or (small and counts[-1] > SETTINGS.many)
+
+
+def _same_place(a: Special, b: Special) -> bool:
+    """Whether two grazings are one and the same, met from the same side."""
+    one, other = a.point, b.point
+    same = (a.kind, one.orbit.signature) == (b.kind, other.orbit.signature)
+    near = math.isclose(one.parameter, other.parameter, rel_tol=1e-10)
+    return same and near and math.isclose(one.orbit.amplitude, other.orbit.amplitude, rel_tol=1e-9)
+
+
+def parent_point(a: OrbitPoint, b: OrbitPoint) -> Special | None:
+    """The special point at which a family was born that passes through an orbit that is its own image, on the parent's branch.
+
+    There the family's own equations are singular; those of the parent, over half of the period, are not.
+    """
+    signature = a.orbit.signature
+    before, after = asymmetry(a), asymmetry(b)
+    assert before is not None
+    assert after is not None
+    length = float(np.linalg.norm(before))
+    share = length / (length + float(np.linalg.norm(after)))
+    place = a.place + share * (b.place - a.place)
+    odd = bool(signature.period % 2)
+    sides = signature.sides[: len(signature.sides) // 2]
+    short = Signature(sides, signature.period if odd else signature.period // 2, odd)
+    curve = a.curve.with_problem(a.curve.problem.with_signature(short))
+    guess = np.append(halves_of(place[:-1], signature).mean(axis=0).ravel(), place[-1])
+    middle = curve.solve_at(guess, np.append(np.zeros(curve.problem.size), 1.0))
+    if middle is None:
+        return None
+    test = FLIP[odd]
+    for reach in SETTINGS.reaches:
+        ends = [curve.solve(middle.place + sign * reach * middle.tangent, middle.tangent) for sign in (-1.0, 1.0)]
+        if ends[0] is not None and ends[1] is not None and test.value(ends[0]) * test.value(ends[1]) < 0.0:
+            return located(test, ends[0], ends[1])
+    return None

@@ -1,0 +1,101 @@
+"""An orbit in other numbers: as its own image, as another one gone round several times, renumbered from another impact."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from saltus.orbits.orbit_curve import OrbitPoint
+from saltus.orbits.problem import Problem
+from saltus.orbits.signature import Signature
+
+SAME = 1e-5  # between unknowns of orbits that coincide where both graze
+APART = 1e-6  # by which an orbit differs from its own image, to be more than rounding
+
+
+def asymmetry(point: OrbitPoint) -> np.ndarray | None:
+    """By how much the orbit differs from its own image.
+
+    That is its mirror image half a period later for an odd period of a symmetric system, and itself half a period later for an
+    even one. None where it could not be its own image, or is by construction.
+    """
+    signature, n = point.orbit.signature, len(point.orbit.signature.sides)
+    if signature.symmetric or n == 0 or n % 2:
+        return None
+    first, second = signature.sides[: n // 2], signature.sides[n // 2 :]
+    expected = tuple(-s for s in first) if signature.period % 2 else first
+    if second != expected or (signature.period % 2 and not point.curve.symmetric):
+        return None
+    halves = halves_of(point.solution.unknowns, signature)
+    return np.asarray((halves[1] - halves[0]).ravel())
+
+
+def halves_of(unknowns: np.ndarray, signature: Signature) -> np.ndarray:
+    """Phases and speeds of the impacts of both halves of a period, (2, n / 2, 2), each counted from its beginning."""
+    halves = unknowns.reshape(2, len(signature.sides) // 2, 2).copy()
+    halves[1, :, 0] -= np.pi * signature.period
+    return halves
+
+
+def passes_image(a: OrbitPoint, b: OrbitPoint) -> bool:
+    """Whether a step goes through an orbit that is its own image."""
+    before, after = asymmetry(a), asymmetry(b)
+    return before is not None and after is not None and bool(before @ after < 0.0) and np.abs(before).max() > APART
+
+
+def falls_onto_image(a: OrbitPoint, b: OrbitPoint) -> bool:
+    """Whether a step has ended on the branch of the orbits that are their own images, coming from one that is not."""
+    before, after = asymmetry(a), asymmetry(b)
+    return before is not None and after is not None and bool(np.abs(before).max() > APART > 100.0 * np.abs(after).max())
+
+
+def repetition(point: OrbitPoint) -> str | None:
+    """What an orbit is that is another one gone round several times, or its own mirror image; None for one that is not."""
+    signature, n = point.orbit.signature, len(point.orbit.signature.sides)
+    difference = asymmetry(point)
+    if signature.period % 2 and difference is not None and np.abs(difference).max() < SAME:
+        return "symmetric orbit"
+    for periods in range(1, signature.period):
+        part = n * periods // signature.period
+        if signature.period % periods or n * periods % signature.period or part == 0 or signature.symmetric:
+            continue
+        pairs = point.solution.unknowns.reshape(-1, part, 2).copy()
+        pairs[:, :, 0] -= 2.0 * math.pi * periods * np.arange(len(pairs))[:, None]
+        if signature.sides == signature.sides[:part] * len(pairs) and np.ptp(pairs, axis=0).max() < SAME:
+            return f"orbit of period {periods}"
+    return None
+
+
+def renumbered(problem: Problem, unknowns: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+    """The unknowns of an orbit, counted from another impact and shifted by forcing periods to lie nearest to those of a point.
+
+    None where the signatures differ.
+    """
+    target, signature = other.orbit.signature, problem.signature
+    n = len(signature.sides)
+    if (n, signature.period, signature.symmetric) != (len(target.sides), target.period, target.symmetric):
+        return None
+    if n == 0:
+        return unknowns if signature.side == target.side else None
+    pairs, best, least = unknowns.reshape(n, 2), None, math.inf
+    goal = other.solution.unknowns.reshape(n, 2)
+    for turn in range(n * (2 if signature.symmetric else 1)):
+        rolled = np.roll(pairs, -turn, axis=0)
+        flips = (turn + np.arange(n)) // n  # how often each has gone round the (half) period
+        sides = np.roll(signature.sides, -turn) * ((-1) ** flips if signature.symmetric else 1)
+        if tuple(sides) != tuple(target.sides):
+            continue
+        rolled = rolled + np.stack([flips * problem.closing, np.zeros(n)], axis=1)
+        rolled[:, 0] += 2.0 * math.pi * round((goal[0, 0] - rolled[0, 0]) / (2.0 * math.pi))
+        distance = float(np.abs(rolled - goal).max())
+        if distance < least:
+            best, least = rolled.ravel(), distance
+    return best
+
+
+def nearest(point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+    """A place on the equations of a point in the numbers in which it lies nearest to another point; None if it cannot."""
+    n = point.curve.problem.size
+    unknowns = renumbered(point.curve.problem, place[:n], other)
+    return None if unknowns is None else np.concatenate([unknowns, place[n:]])

@@ -1,0 +1,216 @@
+"""Curves of special points in two parameters: the borders between regions with other numbers of orbits, or of other stability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import check_bounds
+from saltus.continuation import STEPS, Continuation, CurveEnd, Cut, End, Events, TestFunction, both_ways, located
+from saltus.errors import ParameterError
+from saltus.orbits.branch_continuation import STEP
+from saltus.orbits.branch_events import SETTINGS
+from saltus.orbits.codimension import curve_test, curve_tests, room
+from saltus.orbits.conditions import Condition, Singular, Slow
+from saltus.orbits.find import divide
+from saltus.orbits.grazing import TOGETHER, inserted
+from saltus.orbits.images import nearest
+from saltus.orbits.newton import Solution
+from saltus.orbits.orbit import TOUCH
+from saltus.orbits.problem import Problem
+from saltus.orbits.resting import RestingOrbit
+from saltus.orbits.signature import Signature
+from saltus.orbits.special_curve import ConditionedCurve, SpecialCurve, SpecialCurvePoint
+from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, special_points
+from saltus.orbits.symmetry import half, keeps_symmetry, over_full_period
+from saltus.progress import Progress, silent
+
+FOLLOWED = (SpecialKind.LP, SpecialKind.PD, SpecialKind.BPC, SpecialKind.GR)
+TENFOLD = 10.0  # a parameter without bounds is followed to so many times its value, and to that part of it
+
+
+@dataclass
+class CurveEvents(Events[SpecialCurvePoint]):
+    """The events along a curve of special points of a kind."""
+
+    kind: str
+
+    def interrupted(self, run: Continuation, point: SpecialCurvePoint, ahead: SpecialCurvePoint) -> End | None:
+        """The end where the system refuses the parameters."""
+        try:
+            ahead.curve.problem.at(ahead.parameters)
+        except ParameterError as refusal:
+            return End(OrbitEnd.REFUSED, point.parameter, detail=str(refusal))
+        return None
+
+    def cut(self, point: SpecialCurvePoint, ahead: SpecialCurvePoint) -> Cut[SpecialCurvePoint] | End | None:
+        """Another grazing in a step."""
+        if room(ahead) >= 0.0:
+            return None
+        meeting = located(curve_test(SpecialKind[f"{self.kind}_GR"], room), point, ahead)
+        if meeting is None:
+            return End(CurveEnd.NOT_LOCATED, ahead.parameter, detail="grazing")
+        return Cut(meeting.point, meeting)
+
+    def across(self, run: Continuation, cut: Cut[SpecialCurvePoint]) -> End:
+        """The end at another grazing."""
+        assert cut.special is not None
+        run.special.append(cut.special)
+        return End(OrbitEnd.MEETS_GRAZING, cut.point.parameter, cut.special.kind)
+
+    def tests(self, point: SpecialCurvePoint) -> Iterable[TestFunction[SpecialCurvePoint]]:
+        """The test functions of codimension-two points."""
+        return curve_tests(self.kind, point.orbit.symmetric)
+
+    def ended(self, run: Continuation, ahead: SpecialCurvePoint, cut: Cut[SpecialCurvePoint] | None) -> End | None:
+        """The end of an orbit that has shrunk to rest."""
+        return End(OrbitEnd.SHRINKS, ahead.parameter) if ahead.orbit.amplitude < SETTINGS.smallest else None
+
+    def nearest(self, point: SpecialCurvePoint, place: np.ndarray, other: SpecialCurvePoint) -> np.ndarray | None:
+        """A place counted from the impact from which it lies nearest to another point."""
+        return nearest(point, place, other)
+
+
+def continue_special(
+    special: SpecialPoint,
+    path: str,
+    bounds: tuple[float, float] | None = None,
+    *,
+    first_bounds: tuple[float, float] | None = None,
+    step: float = STEP,
+    progress: Progress = silent,
+) -> SpecialCurve:
+    """The curve of LP, PD, BPC or GR through a special point of a branch, in the branch's parameter and a second one.
+
+    It is followed both ways, through cusps, until it closes, reaches a bound, meets another grazing or cannot go on. PD, BPC:
+    the orbits are those that lose their stability, not the ones born there.
+
+    Args:
+        special: where to begin, one of `branch.special`.
+        path: dotted path of the second parameter, such as "load.horizontal.amplitude".
+        bounds: its least and largest value; by default from a tenth to ten times what it is (from -1 to 1 for 0).
+        first_bounds: those of the branch's own parameter; by default as far to both sides as its branch was wide, or to a tenth.
+        step: the longest step, in the norm of `OrbitCurve`.
+        progress: called with the share of the first range that has been seen and the values of both parameters.
+
+    Raises:
+        ParameterError: another kind of point, an unknown parameter or the branch's own, bounds that exclude the point, a second
+            parameter that takes away the symmetry which a BPC or a grazing on both sides rests on.
+    """
+    if special.kind not in FOLLOWED:
+        raise ParameterError(f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}")
+    if isinstance(special.orbit, RestingOrbit):
+        raise ParameterError(
+            "curves are followed of orbits between impacts only, and this one rests; continue it along one parameter"
+        )
+    first_path, system = special.orbit.problem.paths[0], special.orbit.system
+    if path == first_path:
+        raise ParameterError(f"the branch already runs along {path}; name another parameter to follow its {special.kind} in")
+    if path not in system.parameters:
+        system.get(path)  # refuses what leads nowhere
+        raise ParameterError(f"{path} is not a number, so a curve cannot be continued along it")
+    limits = _limits(special, system.parameters[path], bounds, first_bounds)
+    start = _start(special, (first_path, path), limits)
+    course = both_ways(
+        start,
+        lambda: CurveEvents(special.kind),
+        np.array(limits),
+        steps=replace(STEPS, longest=step),
+        names=(first_path, path),
+        progress=progress,
+    )
+    found = special_points(course.special)
+    return SpecialCurve(special.kind, (first_path, path), course.points, found, course.ends, course.missed)
+
+
+def _limits(special: SpecialPoint, value: float, bounds: Any, first_bounds: Any) -> list[tuple[float, float]]:
+    """The bounds of both parameters, which must include the point."""
+    own, width = special.parameter, 3.0 * special.point.curve.scales[0]
+    low, high = own - width, own + width
+    if first_bounds is None:
+        first_bounds = (max(low, own / TENFOLD), high) if own > 0 else (low, min(high, own / TENFOLD) if own < 0 else high)
+    if bounds is None:
+        bounds = sorted((value / TENFOLD, value * TENFOLD)) if value else (-1.0, 1.0)
+    limits = [check_bounds(first_bounds), check_bounds(bounds)]
+    for (low, high), inside, name in zip(limits, (own, value), ("first", "second"), strict=True):
+        if not low <= inside <= high:
+            raise ParameterError(
+                f"the special point has {inside:g} as its {name} parameter, outside ({low:g}, {high:g}); widen it"
+            )
+    return limits
+
+
+def _start(special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[float, float]]) -> SpecialCurvePoint:
+    """The special point as a point of its curve."""
+    problem, solution, condition = _defined(special, paths)
+    scales = tuple((high - low) / 3.0 for low, high in limits)
+    curve = ConditionedCurve(problem, scales, condition=condition)
+    known = curve.known(solution.unknowns, solution.values)
+    if known is None:
+        raise ParameterError(f"the motion beside this {special.kind} cannot be followed, so its curve cannot; choose another")
+    first = curve.along_kernel(known)
+    exact = curve.solve(first.place, first.tangent)
+    if exact is None:
+        raise ParameterError(
+            f"Newton's method does not find this {special.kind} again; locate it on its branch with a smaller step"
+        )
+    return exact
+
+
+def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[Problem, Solution, Condition]:
+    """The problem along both parameters, the orbit as its solution, and the condition that singles it out."""
+    old, unknowns = special.orbit.problem, special.orbit.solution.unknowns
+    system, values = special.orbit.system, np.array([special.parameter, special.orbit.system.parameters[paths[1]]])
+    symmetric = keeps_symmetry(system, paths[0]) and keeps_symmetry(system, paths[1])
+    if old.signature.symmetric and not symmetric and special.kind != SpecialKind.LP:
+        raise ParameterError(
+            f"{paths[1]} takes away the mirror symmetry on which this {special.kind} rests; change it a little, follow the "
+            "branch again, and continue the special points into which this one splits"
+        )
+    if special.kind == SpecialKind.GR:
+        signature, unknowns = _touching(special)
+        problem = Problem(system, signature, paths)
+        solution = _evaluated(problem, unknowns, values)
+        return problem, solution, Slow(problem, _first_without_speed(problem, unknowns))
+    problem = Problem(system, old.signature, paths)
+    solution = _evaluated(problem, unknowns, values)
+    if special.kind == SpecialKind.LP:
+        if old.signature.symmetric and not symmetric:
+            problem, unknowns = over_full_period(problem, unknowns)
+            solution = _evaluated(problem, unknowns, values)
+        return problem, solution, Singular.near(problem, solution, 1.0)
+    if special.kind == SpecialKind.PD:
+        problem, solution = divide(problem, solution) or (problem, solution)
+    elif not old.signature.symmetric:
+        halved = half(problem, solution) if symmetric else None
+        if halved is None:
+            raise ParameterError("this BPC is a crossing of branches that no symmetry keeps: it does not persist along a curve")
+        problem, solution = halved
+    return problem, solution, Singular.near(problem, solution, -1.0)
+
+
+def _evaluated(problem: Problem, unknowns: np.ndarray, values: np.ndarray) -> Solution:
+    equations = problem.evaluate(unknowns, values, look=True)
+    if equations is None:
+        raise ParameterError("the motion of the special point cannot be followed; locate it again on its branch")
+    return Solution(unknowns, values, equations, 0)
+
+
+def _touching(special: SpecialPoint) -> tuple[Signature, np.ndarray]:
+    """The signature with more impacts of the two that meet at a grazing, and the orbit's unknowns in it."""
+    point = special.point
+    if point.orbit.slowest < TOUCH:  # then the touch is an impact of its own, whose gap has its minimum there too
+        return point.orbit.signature, point.solution.unknowns
+    problem, unknowns = inserted(point)
+    return problem.signature, unknowns
+
+
+def _first_without_speed(problem: Problem, unknowns: np.ndarray) -> int:
+    """The impact without speed, of a pair the first."""
+    phases, speeds = unknowns[::2], unknowns[1::2]
+    slow = int(np.argmin(np.abs(speeds)))
+    before = phases[slow] - phases[slow - 1] + (problem.closing if slow == 0 else 0.0)
+    return (slow - 1) % len(speeds) if len(speeds) > 1 and abs(before) < TOGETHER and abs(speeds[slow - 1]) < TOGETHER else slow

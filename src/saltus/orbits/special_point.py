@@ -1,0 +1,127 @@
+"""Special points: where the number or the stability of orbits changes along a branch, or more happens along a curve of these."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+
+from saltus.continuation import EndReason, Zero
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.orbit_curve import OrbitPoint
+
+UserFunction = Callable[[PeriodicOrbit], float]
+
+
+class SpecialKind(StrEnum):
+    """The kinds of special points; zeros of a model's margin or of a user's function have its name instead.
+
+    Those of codimension 1 lie on branches, those of codimension 2 on curves of special points in two parameters.
+    """
+
+    description: str
+    codimension: int
+
+    LP = "LP", "fold (limit point)"
+    PD = "PD", "period doubling"
+    BPC = "BPC", "branch point: symmetry breaking, or a crossing of branches"
+    NS = "NS", "Neimark-Sacker"
+    GR = "GR", "grazing"
+    RL = "RL", "a release that the load only touches: the excursion after it shrinks to rest"
+    CH = "CH", "the impacts die away only at the instant of the next release: the rest before it has no duration"
+    CP = "CP", "cusp: two folds meet", 2
+    GPD = "GPD", "degenerate period doubling: the doubled orbit changes the side on which it lies", 2
+    DBPC = "DBPC", "degenerate symmetry breaking: the unsymmetric orbits change the side on which they lie", 2
+    LP_GR = "LP-GR", "fold and grazing at once", 2
+    PD_GR = "PD-GR", "period doubling and grazing at once", 2
+    BPC_GR = "BPC-GR", "symmetry breaking and grazing at once", 2
+    LP_PD_GR = "LP-PD-GR", "a grazing at which folds and period doublings of the orbits with more impacts both end", 2
+    LP_BPC_GR = "LP-BPC-GR", "the same, with symmetry breakings of symmetric orbits", 2
+    GR_GR = "GR-GR", "two grazings at once", 2
+
+    def __new__(cls, code: str, description: str, codimension: int = 1) -> SpecialKind:
+        """A kind is its code."""
+        kind = str.__new__(cls, code)
+        kind._value_, kind.description, kind.codimension = code, description, codimension
+        return kind
+
+
+class OrbitEnd(EndReason):
+    """The reasons for which branches of orbits and curves of special points end, besides those of any curve."""
+
+    START = "start"
+    BORN = "{kind} at {parameter:.9g}"
+    FIRST = "the first {kind}"
+    UNSTABLE = "is no longer stable"
+    SHRINKS = "shrinks to rest"
+    IMAGE = "meets its own image at a {kind}"
+    GRAZES_ANOTHER = "ends at a grazing of the {detail}"
+    COMES_BACK = (
+        "comes back onto itself at {parameter:.9g}: between two branches that nearly meet it has gone over "
+        "from one to the other; use a smaller step"
+    )
+    MANY_IMPACTS = "more than {detail} impacts a period"
+    ACCUMULATES = "grazings accumulate near {parameter:.9g}: {detail} impacts and more"
+    REPELS = "the orbit repels too strongly to be followed: its largest multiplier is {detail}"
+    NOT_UNIQUE = "an impact loses its speed while both sides push outward: the motion is not unique there"
+    GRAZES_INTO_REST = "the orbit shrinks to rest"
+    NO_MOTION = "the motion cannot be followed {detail} the grazing"
+    NO_DIRECTION = "neither direction after the grazing leads to orbits of the system"
+    MEETS_GRAZING = "meets another grazing: {kind}"
+    REFUSED = "the system ends there: {detail}"
+    NO_PULL = "shrinks to rest at {parameter:.10g}: from there on the load no longer pulls the contact open on side {detail}"
+    REST_VANISHES = (
+        "at {parameter:.10g} a rest has no duration left; beyond, the load pulls before the impacts have died away: "
+        "find_orbit finds the orbit there"
+    )
+    REST_BEGINS = (
+        "at {parameter:.10g} a further rest begins, as impacts die away before a release: find_orbit finds the orbit beyond"
+    )
+    LEAPS = "at {parameter:.10g} the orbit leaps to one that differs by {detail}: find_orbit finds it"
+    RELEASE_LOST = "at {parameter:.10g} a release is lost: find_orbit finds the orbit beyond"
+    RELEASE_BORN = "at {parameter:.10g} a release is born: find_orbit finds the orbit beyond"
+    OTHER_RESTS = "beyond {parameter:.10g} no orbit with these rests follows from the release at {detail}"
+    NO_ORBIT = "beyond {parameter:.10g} there is no such motion: {detail}"
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint(Zero[OrbitPoint]):
+    """A special point of a branch or of a curve, with its orbit and its evidence; its kind is one of `SpecialKind`, or a name."""
+
+    @property
+    def orbit(self) -> PeriodicOrbit:
+        """The orbit."""
+        return self.point.orbit
+
+    @property
+    def parameter(self) -> float:
+        """The parameter of the branch, the first one of a curve."""
+        return self.point.parameter
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """The parameter of a branch, or both of a curve."""
+        return tuple(map(float, self.point.parameters))
+
+    @property
+    def amplitude(self) -> float:
+        """max abs(theta) of the orbit."""
+        return self.orbit.amplitude
+
+    @property
+    def defect(self) -> float:
+        """The distance of the orbit from itself a period later, by direct simulation."""
+        return self.orbit.defect
+
+    def __repr__(self) -> str:
+        place = ", ".join(f"{value:.12g}" for value in self.parameters)
+        return (
+            f"SpecialPoint(kind='{self.kind}', {'parameter' if len(self.parameters) == 1 else 'parameters'}={place}, "
+            f"amplitude={self.amplitude:.9g}, period {self.orbit.period}, {self.orbit.signature.impact_count} impacts, "
+            f"bracket {self.evidence.bracket:.1g})"
+        )
+
+
+def special_points(found: Iterable[Zero]) -> tuple[SpecialPoint, ...]:
+    """The special points that a continuation has located."""
+    return tuple(SpecialPoint(zero.kind, zero.point, zero.evidence) for zero in found)
