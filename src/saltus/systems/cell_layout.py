@@ -52,7 +52,7 @@ class CellLayout:
         right = [corner + edge for corner in left]
         slider_1 = _slider(left[0], right[1], half_diagonal, phi[0])
         slider_2 = _slider(right[1], left[2], half_diagonal, phi[1])
-        points = {}
+        points: dict[str, Point] = {}
         for row, at_left, at_right in zip(("lower", "middle", "upper"), left, right, strict=True):
             points |= {f"{row}_left": at_left, f"{row}_right": at_right}
         points |= {"slider_1_in": slider_1[0], "slider_1_out": slider_1[1]}
