@@ -8,7 +8,7 @@ import inspect
 import math
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from saltus.systems import System
 
 P = ParamSpec("P")
-R = TypeVar("R")
+R = TypeVar("R", covariant=True)
 
 RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
 HALF_WIDTH = 1.5  # of the window that is taken where none is given: about the size of the motions that the paper shows
@@ -206,13 +206,25 @@ def check_states(name: str, states: Any) -> np.ndarray:
     return array
 
 
-def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """A decorator by which a function refuses arguments without meaning before it begins; `function.check(...)` does that alone.
+class Checked(Protocol[P, R]):
+    """A function whose arguments can be checked without computing anything."""
+
+    __name__: str
+
+    def __call__(self, *given: P.args, **named: P.kwargs) -> R:
+        """What the function gives."""
+
+    def check(self, *given: P.args, **named: P.kwargs) -> None:
+        """Refuse what the function would refuse."""
+
+
+def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Checked[P, R]]:
+    """A decorator by which a function refuses arguments without meaning before it begins, and has `function.check(...)`.
 
     `check` is called with every argument of the function by its name, defaults included.
     """
 
-    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+    def decorate(function: Callable[P, R]) -> Checked[P, R]:
         signature = inspect.signature(function)
         open_ended = [p.name for p in signature.parameters.values() if p.kind is p.VAR_KEYWORD]
 
@@ -232,7 +244,7 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Calla
             return function(*given, **named)
 
         vars(call)["check"] = refuse
-        return call
+        return cast(Checked[P, R], call)
 
     return decorate
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow import motions_from, stroboscopic
-from saltus.systems import Load, Record, System
+from saltus.systems import Load, Record, System, check_system
 
 
 def with_clock(system: System) -> System:
@@ -17,11 +17,7 @@ def with_clock(system: System) -> System:
     Raises:
         ParameterError: several coordinates, or a load of records, which never repeats.
     """
-    if not isinstance(system, System):
-        raise ParameterError(f"attractors are those of a System(model=..., load=..., impact=...), got {system!r}")
-    if len(system.model.coordinates) > 1:
-        names = ", ".join(system.model.coordinates)
-        raise ParameterError(f"attractors and basins are for models with one coordinate, and this one has {names}")
+    check_system(system, "the search of attractors", coordinates=1)
     check_periodic(system)
     if system.load.frequency is not None:
         return system

@@ -13,8 +13,7 @@ from saltus.bounds.adiabatic_invariant import budget, first_guess, largest_start
 from saltus.bounds.energy_barrier import WIDEST, climb
 from saltus.bounds.gap_equation import SPEED, Leaves, Opening, reads
 from saltus.bounds.intervals import SLACK, Interval, enclose
-from saltus.errors import ParameterError
-from saltus.systems import System, broadcast_arrays, check_parameters, finite_array, parameter_table
+from saltus.systems import System, broadcast_arrays, check_parameters, check_system, finite_array, parameter_table
 from saltus.taylor import Expr, Trace, differentiate, number, record_table, substitute, trace
 
 CELLS = 16  # of the forcing period
@@ -59,8 +58,7 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
         ParameterError: what is no system; a path that is not a number of it; values that are none or that it refuses; shapes
             that do not fit.
     """
-    if not isinstance(system, System):
-        raise ParameterError(f"capture_speed takes a System(model=..., load=..., impact=...), got {system!r}")
+    check_system(system, "capture_speed")
     arrays = {path: finite_array(path, given) for path, given in parameter_table(system, parameters).items()}
     dims, shape, coords, columns = broadcast_arrays(arrays)
     check_parameters(system, columns)

@@ -18,7 +18,7 @@ from saltus.flow.motion import Motion
 from saltus.flow.recorder import Recorder
 from saltus.flow.stops import Stop
 from saltus.progress import Progress, silent
-from saltus.systems import Model, Record, System, children, is_number, numbers
+from saltus.systems import Model, Record, System, check_system, children, is_number, numbers
 from saltus.taylor import Trace, record_table, trace
 
 WHAT = "following the motion"  # for the progress
@@ -145,8 +145,7 @@ def follow(
     coordinates: dict[str, float],
 ) -> Followed:
     """`simulate`, and its tangent if `sensitivities` is not None."""
-    if not isinstance(system, System):
-        raise ParameterError(f"simulate takes a System(model=..., load=..., impact=...), got {system!r}")
+    check_system(system, "simulate")
     position, speeds = _start_state(system, velocity, coordinates)
     limits = limits_of(system, stop_at)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import check_count
-from saltus.errors import MotionError, ParameterError
+from saltus.errors import MotionError
 from saltus.flow import (
     RECURRENCE,
     EventKind,
@@ -25,7 +25,7 @@ from saltus.orbits.problem import Problem
 from saltus.orbits.resting import resting_near
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import half, is_symmetric, keeps_symmetry
-from saltus.systems import System
+from saltus.systems import System, check_system
 
 LONGEST = 12  # forcing periods of an orbit that is looked for if none are named
 ROUNDS = 5  # of settling, each longer than the one before
@@ -58,8 +58,7 @@ def find_orbit(
         ParameterError: an argument without meaning.
         MotionError: the motion comes to rest for good, does not settle, or Newton's method does not converge; with what to do.
     """
-    if not isinstance(system, System):
-        raise ParameterError(f"find_orbit takes a System(model=..., load=..., impact=...), got {system!r}")
+    check_system(system, "find_orbit")
     if period is not None:
         check_count("period", period, 1)
     check_count("max_period", max_period, 1)

@@ -27,7 +27,7 @@ def _check(system: System, rows: int, store: Any, workers: object, scheduler: ob
     check_count("rows", rows, 1)
     if store is not None and Path(store).exists():
         _check_store(Path(store), system)
-    basins_of_attraction.check(system, **options)  # type: ignore[attr-defined]
+    basins_of_attraction.check(system, **options)
 
 
 @checked_by(_check)

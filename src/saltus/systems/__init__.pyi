@@ -11,7 +11,7 @@ from .rocking_block import RockingBlock
 from .scenarios import Impact, LayerState, Scenario, TableRow, name_impact, other_impulse, table_1
 from .si_units import PhysicalCell
 from .signals import Constant, Harmonic, Record, Signal, Sum
-from .system import System
+from .system import System, check_system
 from .two_layer import TwoLayer
 from .unit_cell import UnitCell
 from .wall_oscillator import WallOscillator
@@ -45,6 +45,7 @@ __all__ = [
     "WallOscillator",
     "broadcast_arrays",
     "check_parameters",
+    "check_system",
     "children",
     "finite_array",
     "is_number",

@@ -22,7 +22,7 @@ from saltus.systems.impact import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
-from saltus.systems.system import System
+from saltus.systems.system import System, check_system
 
 TRIED = (0.3, 2.0)  # speeds at which a reset is compared with its inverse
 
@@ -52,8 +52,7 @@ def reversed_system(system: System) -> System:
         ParameterError: an impact law without an inverse (`VelocityReduction` with e > 0 has one), or a reset of the model that
             this law does not undo.
     """
-    if not isinstance(system, System):
-        raise ParameterError(f"reversed_system takes a System(model=..., load=..., impact=...), got {system!r}")
+    check_system(system, "reversed_system")
     impact = system.impact
     if not isinstance(impact, VelocityReduction) or impact.e <= 0.0:
         raise ParameterError(f"{impact!r} cannot be followed backward; only VelocityReduction(e) with e > 0 can", "impact")

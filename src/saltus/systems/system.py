@@ -129,3 +129,17 @@ class System:
         except ValueError as error:
             raise ParameterError(f"this is not the TOML of a system: {error}") from None
         return cls.from_dict(data)
+
+
+def check_system(system: Any, asking: str, *, coordinates: int | None = None) -> None:
+    """Refuse what is no System, or one whose model has another number of coordinates than `asking` is for.
+
+    Raises:
+        ParameterError: with what `asking` takes.
+    """
+    if not isinstance(system, System):
+        raise ParameterError(f"{asking} takes a System(model=..., load=..., impact=...), got {system!r}", "system")
+    names = system.model.coordinates
+    if coordinates is not None and len(names) != coordinates:
+        wanted = "one coordinate" if coordinates == 1 else f"{coordinates} coordinates"
+        raise ParameterError(f"{asking} is for models with {wanted}, and this one has {', '.join(names)}", "system")

@@ -17,7 +17,7 @@ from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.flow import Inputs, read_inputs, simulate_many, stop_names
-from saltus.systems import System
+from saltus.systems import System, check_system
 
 if TYPE_CHECKING:
     import xarray
@@ -60,8 +60,7 @@ def lyapunov_many(
     Raises:
         ParameterError: an argument without meaning; several coordinates; a load by records.
     """
-    if not isinstance(system, System):
-        raise ParameterError(f"lyapunov_many takes a System(model=..., load=..., impact=...), got {system!r}")
+    check_system(system, "lyapunov_many")
     if len(system.model.coordinates) > 1:
         raise ParameterError(
             "lyapunov_many works on models with one coordinate; lyapunov_spectrum takes any, one motion at a time"

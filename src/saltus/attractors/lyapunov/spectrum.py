@@ -14,9 +14,8 @@ from saltus.attractors.lyapunov.averages import BATCHES, average, uncertainty
 from saltus.attractors.lyapunov.renormalisation import check_run, first_frame, pieces_of
 from saltus.attractors.lyapunov.two_trajectory import shadow_growth
 from saltus.attractors.stroboscopic_section import check_periodic
-from saltus.errors import ParameterError
 from saltus.flow import Motion, Stop, sensitivities, simulate
-from saltus.systems import System
+from saltus.systems import System, check_system
 
 SHADOW = 1e-5  # what a shadow at a distance of 1e-7, whose motion has errors of its own, may miss of an exponent
 
@@ -118,8 +117,7 @@ def lyapunov_spectrum(
         ParameterError: an argument without meaning; a load by records, which has no period.
         MotionError: as for `simulate`.
     """
-    if not isinstance(system, System):
-        raise ParameterError(f"lyapunov_spectrum takes a System(model=..., load=..., impact=...), got {system!r}")
+    check_system(system, "lyapunov_spectrum")
     check_periodic(system)
     check_run(periods, transient)
     state: dict[str, Any] = {**coordinates, "velocity": velocity}

@@ -9,8 +9,7 @@ import numpy as np
 
 from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.bounds import Interval, Leaves, enclose, reads
-from saltus.errors import ParameterError
-from saltus.systems import System
+from saltus.systems import System, check_system
 from saltus.taylor import Expr, Trace, differentiate, substitute, trace
 
 CELLS = 4096  # of the forcing period
@@ -36,8 +35,7 @@ def excludes_tori(system: System) -> str | None:
     Raises:
         ParameterError: what is no system; a load by records.
     """
-    if not isinstance(system, System):
-        raise ParameterError(f"excludes_tori takes a System(model=..., load=..., impact=...), got {system!r}")
+    check_system(system, "excludes_tori")
     check_periodic(system)
     if len(system.model.coordinates) > 1:
         return None

@@ -17,7 +17,7 @@ from saltus.flow.ensemble.threads import Jobs, Lanes, available_cores
 from saltus.flow.forcing_time import Clock, clock
 from saltus.flow.simulation import Program, check_gap, limits_of, program
 from saltus.progress import Progress, silent
-from saltus.systems import System, numbers
+from saltus.systems import System, check_system, numbers
 from saltus.taylor import Emitter
 
 if TYPE_CHECKING:
@@ -83,8 +83,7 @@ def simulate_many(
     Raises:
         ParameterError: an argument without meaning. A trajectory that cannot go on raises nothing: `stop` says so.
     """
-    if not isinstance(system, System):
-        raise ParameterError(f"simulate_many takes a System(model=..., load=..., impact=...), got {system!r}")
+    check_system(system, "simulate_many")
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     wanted = Wanted(
         tol=tol,

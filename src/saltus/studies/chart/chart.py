@@ -92,7 +92,7 @@ def stability_chart(
 
 def _check_bordered(system: System, curves: int, progress: object, **options: Any) -> None:
     check_count("curves", curves, 0)
-    stability_chart.check(system, **options)  # type: ignore[attr-defined]
+    stability_chart.check(system, **options)
 
 
 @checked_by(_check_bordered)

@@ -13,7 +13,7 @@ from saltus.checks import check_along, check_axis, check_count, check_number, ch
 from saltus.errors import ParameterError
 from saltus.provenance import provenance
 from saltus.studies.chart.motions import KEPT
-from saltus.systems import System
+from saltus.systems import System, check_system
 from saltus.theory import amplitude_limits
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class ChartRequest:
     rows: int = 1
 
     def __post_init__(self) -> None:
-        check_system(self.system)
+        _check_driven(self.system)
         for name in ("horizontal", "vertical"):
             object.__setattr__(self, name, check_axis(name, getattr(self, name)))
         _check_paths(self.system, self.paths, (self.horizontal, self.vertical))
@@ -143,14 +143,11 @@ class ChartRequest:
         }
 
 
-def check_system(system: Any) -> None:
+def _check_driven(system: Any) -> None:
     """Refuse what has no chart."""
-    if not isinstance(system, System):
-        raise ParameterError(f"stability_chart takes a System(model=..., load=..., impact=...), got {system!r}")
+    check_system(system, "stability_chart", coordinates=1)
     if system.load.frequency is None:
         raise ParameterError("a stability chart needs a load with a frequency, Load(frequency=..., ...)")
-    if len(system.model.coordinates) > 1:
-        raise ParameterError("stability_chart works on models with one coordinate")
 
 
 def _check_paths(system: System, paths: Any, axes: tuple[np.ndarray, np.ndarray]) -> None:

@@ -113,7 +113,7 @@ def orbit_diagram(
     return tree
 
 
-@checked_by(orbit_diagram.check)  # type: ignore[attr-defined]
+@checked_by(orbit_diagram.check)
 def response_spectrum(
     system: System,
     path: str = "load.frequency",
@@ -127,7 +127,7 @@ def response_spectrum(
     return orbit_diagram(system, path, bounds, **options)
 
 
-@checked_by(orbit_diagram.check)  # type: ignore[attr-defined]
+@checked_by(orbit_diagram.check)
 def bifurcation_diagram(
     system: System,
     path: str = "load.horizontal.amplitude",
