@@ -14,7 +14,7 @@ from saltus.attractors.basins.grid import basins_of_attraction
 from saltus.attractors.manifolds.phase_plane import saddles, separatrices
 from saltus.attractors.manifolds.saddle_manifolds import OFFSET, Manifold, stable_manifold, unstable_manifold
 from saltus.errors import ParameterError
-from saltus.paper.figures.manifolds import manifold
+from reference_manifolds import manifold
 from saltus.systems.reversed import reversed_load, reversed_system
 from saltus.theory import equilibria, wall_orbits
 

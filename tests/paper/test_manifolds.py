@@ -1,12 +1,13 @@
-"""The separatrices are invariant under the exact flow, which goes the other way in time."""
+"""Separatrices of a portrait, and the reference that other tests compare the engine with, are invariant under the exact flow."""
 
 import numpy as np
 import pytest
+from reference_manifolds import manifold
 
+from saltus.attractors import separatrices
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.paper.figures.manifolds import manifold
-from saltus.paper.figures.portrait import circled, loop_area, portrait, separatrices, system
+from saltus.paper.figures.phase_portraits import circled, closed, constant_load, loop_area, outward, portrait
 from saltus.systems import EnergyRestitution
 from saltus.theory import equilibria, total_energy
 
@@ -20,7 +21,7 @@ def saddles(model):
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("outward", [True, False])
 def test_a_stable_manifold_is_carried_along_itself_by_the_flow(case, outward):
-    model = system(**CASES[case])
+    model = constant_load(**CASES[case])
     branch = manifold(model, saddles(model)[-1], stable=True, outward=outward, span=24.0, bound=4.0)
     known = np.flatnonzero(np.isfinite(branch.theta) & (branch.theta != 0))
     late = known[branch.time[known] < -14]
@@ -38,7 +39,7 @@ def test_a_stable_manifold_is_carried_along_itself_by_the_flow(case, outward):
 
 
 def test_an_unstable_manifold_is_carried_along_itself_by_the_flow():
-    model = system(damping=0.1, e=0.9)
+    model = constant_load(damping=0.1, e=0.9)
     branch = manifold(model, saddles(model)[0], stable=False, outward=False, span=22.0)
     near, far = np.searchsorted(branch.time, [17.0, 21.0])
     assert np.isfinite(branch.theta[[near, far]]).all()
@@ -50,36 +51,44 @@ def test_an_unstable_manifold_is_carried_along_itself_by_the_flow():
 
 @pytest.mark.parametrize("stiffness", [0.5, 1.0, 1.1])
 def test_without_losses_every_separatrix_keeps_the_energy_of_its_saddle_and_closes(stiffness):
-    model = system(stiffness=stiffness)
-    for branch in separatrices(model, equilibria(model), bound=4.0):
+    model = constant_load(stiffness=stiffness)
+    for branch in separatrices(model, ((-4.0, 4.0), (-4.0, 4.0))):
         energy = total_energy(model, branch.theta, branch.velocity)
         assert np.ptp(energy) < 1e-9
-        assert np.isfinite(branch.ends_at) or stiffness != 1.0
+    assert closed(portrait(model, [(0.3, 0.0)], 1.0, 4.0, 10)).all()
 
 
 def test_a_symmetric_portrait_has_mirror_symmetric_separatrices():
-    model = system(damping=0.1)
-    branches = separatrices(model, equilibria(model), bound=2.5)
-    for one, two in zip(branches[:2], branches[2:], strict=True):
-        ends = [np.array([branch.time[-1], abs(branch.theta[-1]), abs(branch.velocity[-1])]) for branch in (one, two)]
-        assert np.allclose(*ends, rtol=1e-7)
-        assert np.sign(one.theta[-1]) == -np.sign(two.theta[-1])
+    data = portrait(constant_load(damping=0.1), [(0.3, 0.0)], 1.0, 2.5, 10)
+    theta, velocity = data["separatrix_theta"].values, data["separatrix_velocity"].values
+    assert len(theta) == 4
+    for one, two in ((0, 3), (1, 2)):
+        np.testing.assert_allclose(theta[one], -theta[two], atol=1e-7)
+        np.testing.assert_allclose(velocity[one], -velocity[two], atol=1e-7)
+    assert data["separates"].values.all()
+    assert not closed(data).any()
+
+
+def test_impact_losses_leave_the_loops_and_open_the_rest():
+    data = portrait(constant_load(e=0.8), [(0.3, 0.0)], 1.0, 2.55, 10)
+    assert len(outward(data)) == 2
+    assert data["separates"].values.tolist() == closed(data).tolist() == [False, True, True, False]
 
 
 def test_only_saddles_have_separatrices():
-    model = system()
+    model = constant_load()
     with pytest.raises(ParameterError, match="not a saddle"):
         manifold(model, equilibria(model)[0], stable=True, outward=True)
 
 
 def test_an_impact_law_that_cannot_be_reversed_is_refused():
-    model = system().with_({"impact": EnergyRestitution(0.8)})
+    model = constant_load().with_({"impact": EnergyRestitution(0.8)})
     with pytest.raises(ParameterError, match="e > 0"):
         manifold(model, saddles(model)[0], stable=True, outward=True)
 
 
 def test_the_loop_area_is_that_of_the_energy_level():
-    model = system()
+    model = constant_load()
     data = portrait(model, [(1.0, 0.0)], 5.0, 2.5, 50)
     saddle = saddles(model)[-1]
     theta = np.linspace(saddle.theta, 2.0, 400001)

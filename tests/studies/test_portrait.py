@@ -9,7 +9,7 @@ from shared_systems import steady
 
 from saltus.attractors.manifolds.equilibria import equilibria
 from saltus.errors import ParameterError
-from saltus.paper.figures.manifolds import manifold
+from reference_manifolds import manifold
 from saltus.studies import phase_portrait
 from saltus.systems import (
     EnergyRestitution,

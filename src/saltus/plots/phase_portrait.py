@@ -23,7 +23,7 @@ def draw_portrait(ax: Any, data: Any, xlim: tuple[float, float], ylim: tuple[flo
     for name in ("line_limit", "kinematic_limit"):
         limit_lines(ax, float(data[name]), rf"${np.rad2deg(float(data[name])):.0f}^\circ$")
     for theta, velocity, bounds in zip(
-        data["manifold_theta"].values, data["manifold_velocity"].values, data["manifold_separates"].values, strict=True
+        data["separatrix_theta"].values, data["separatrix_velocity"].values, data["separates"].values, strict=True
     ):
         if bounds:
             ax.plot(theta, velocity, zorder=3, **SEPARATRIX_LINE)

@@ -9,7 +9,7 @@ import numpy as np
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import TOLERANCE, tree
 from saltus.paper.figures.figure import paper_figure
-from saltus.paper.figures.portrait import circled, portrait, system
+from saltus.paper.figures.phase_portraits import circled, constant_load, portrait
 from saltus.plots import SINGLE_COLUMN, draw_space, new_figure, styled
 
 STARTS = [(2.3, 0.0), (-2.38, 0.0), (2.5, 0.0)]
@@ -20,7 +20,7 @@ def compute(samples: int = 1600) -> Any:
     """The data of Fig. 4c (k = 1, m = 0, C = 0.1, e = 1) from three starts, one for each attractor; energies; potential."""
     from saltus.theory import potential_energy
 
-    damped = system(damping=0.1)
+    damped = constant_load(damping=0.1)
     data = portrait(damped, STARTS, DURATION, 2.6, samples)
     theta = np.linspace(-2.5, 2.5, 251)
     data = data.assign_coords(potential_theta=("potential_point", theta, {"units": "rad"}))

@@ -9,7 +9,7 @@ import numpy as np
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import TOLERANCE, tree
 from saltus.paper.figures.figure import paper_figure
-from saltus.paper.figures.portrait import BETA0, VERTICAL, circled, portrait, system
+from saltus.paper.figures.phase_portraits import BETA0, VERTICAL, circled, closed, constant_load, outward, portrait
 from saltus.plots import DOUBLE_COLUMN, draw_portrait, new_figure, panel_label, styled
 
 BOUND = 2.55  # rad, a little outside the axes
@@ -25,7 +25,7 @@ DURATIONS = {"a": 34.0, "b": 60.0, "c": 70.0}
 
 def systems() -> dict[str, Any]:
     """(a) no dissipation, (b) at impacts only, (c) viscous damping only."""
-    return {"a": system(), "b": system(e=0.8), "c": system(damping=0.1)}
+    return {"a": constant_load(), "b": constant_load(e=0.8), "c": constant_load(damping=0.1)}
 
 
 def compute(samples: int = 900) -> Any:
@@ -56,7 +56,7 @@ def measure(data: Any) -> dict[str, Measured]:
     """The fixed points, and what the text says of each panel."""
     a, b, c = data["a"], data["b"], data["c"]
     stable = a["equilibrium"].values[a["stable"].values.astype(bool)]
-    rounds_a, wrong = circled(a), a["wrong_reaction"].values
+    rounds_a, wrong = [len(r) for r in circled(a)], a["wrong_reaction"].values
     outer_b = [i for i, (theta, _) in enumerate(STARTS["b"]) if abs(theta) > 2 or abs(theta) < 0.5]
     inner_b = [i for i in range(len(STARTS["b"])) if i not in outer_b]
     rounds_c = [len(r) for r in circled(c)]
@@ -77,7 +77,9 @@ def measure(data: Any) -> dict[str, Measured]:
             line_limit=np.rad2deg(float(a["line_limit"])),
         ),
         "fig04a-regions": measured(
-            sorted({len(r) for r in rounds_a}) == [1, 3] and _closed(a), motions=len(rounds_a), circled=[len(r) for r in rounds_a]
+            sorted(set(rounds_a)) == [1, 3] and bool(closed(a).all()),
+            motions=len(rounds_a),
+            circled=rounds_a,
         ),
         "fig04a-one-layer": measured(bool(wrong.max() == 0), shares=wrong.round(3).tolist()),
         "fig04a-energy": measured(_energy_drift(a), duration=DURATIONS["a"]),
@@ -98,27 +100,19 @@ def measure(data: Any) -> dict[str, Measured]:
     }
 
 
-def _closed(panel: Any) -> bool:
-    return bool(np.isfinite(panel["manifold_starts_at"].values).all())
-
-
 def _drift(panel: Any, i: int) -> float:
     energy = panel["energy"][i].values
     return float(np.nanmax(energy) - np.nanmin(energy))
 
 
 def _energy_drift(panel: Any) -> float:
-    return max(_drift(panel, i) for i in range(panel.sizes["trajectory"]))
+    return max(_drift(panel, i) for i in range(panel.sizes["motion"]))
 
 
 def _loop_shift(first: Any, second: Any) -> float:
-    """The largest distance between the outward branches, which never touch theta = 0, of two portraits."""
-    shift = 0.0
-    for i in range(0, first.sizes["manifold"], 2):
-        for name in ("manifold_theta", "manifold_velocity"):
-            one, two = (panel[name][i].dropna("point").values for panel in (first, second))
-            shift = max(shift, float(abs(one - two).max()) if one.size == two.size else np.inf)
-    return shift
+    """The largest distance between the loops of the separatrices of two portraits, which never touch theta = 0."""
+    pairs = zip(outward(first), outward(second), strict=True)
+    return max(float(np.abs(one - two).max()) if one.shape == two.shape else np.inf for one, two in pairs)
 
 
 FIGURE = paper_figure("fig04", compute=compute, draw=draw, measure=measure)

@@ -9,7 +9,7 @@ import numpy as np
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import TOLERANCE, tree
 from saltus.paper.figures.figure import paper_figure
-from saltus.paper.figures.portrait import BETA0, VERTICAL, circled, loop_area, portrait, system
+from saltus.paper.figures.phase_portraits import BETA0, VERTICAL, circled, constant_load, loop_area, portrait
 from saltus.plots import DOUBLE_COLUMN, draw_portrait, new_figure, panel_label, styled
 
 STIFFNESS = {"a": 0.5, "b": 1.1}
@@ -23,8 +23,8 @@ DURATION = 40.0
 
 def compute(samples: int = 1200) -> Any:
     """Both portraits; k = 1 for comparison of its separatrix."""
-    groups = {name: portrait(system(stiffness=k), STARTS[name], DURATION, 4.0, samples) for name, k in STIFFNESS.items()}
-    groups["symmetric"] = portrait(system(), [(0.3, 0.0)], 1.0, 4.0, 10)
+    groups = {name: portrait(constant_load(stiffness=k), STARTS[name], DURATION, 4.0, samples) for name, k in STIFFNESS.items()}
+    groups["symmetric"] = portrait(constant_load(), [(0.3, 0.0)], 1.0, 4.0, 10)
     return tree(groups, what="phase portraits of non-symmetric conservative systems, V = -1.5 / sin(beta0)", tol=TOLERANCE)
 
 
@@ -44,6 +44,7 @@ def measure(data: Any) -> dict[str, Measured]:
     """theta_I (erratum 9), the separatrix regions, and the motion round two equilibria."""
     found = {name: _summary(data[name]) for name in ("a", "b", "symmetric")}
     (soft, _, soft_area), (stiff, _, stiff_area), (_, _, area) = (found[n] for n in ("a", "b", "symmetric"))
+    largest, limit = float(np.nanmax(data["a"]["separatrix_theta"].values)), float(data["a"]["kinematic_limit"])
     misprint, wrong = 1.384, data["a"]["wrong_reaction"].values
     stiffness = VERTICAL * float(np.cos(BETA0 + misprint)) / misprint
     rest = np.array(circled(data["a"])[1]), np.array(circled(data["b"])[2])
@@ -64,10 +65,10 @@ def measure(data: Any) -> dict[str, Measured]:
         ),
         "fig05a-one-layer": measured(bool(wrong.max() == 0), bool(wrong.max() > 0), shares=wrong.round(3).tolist()),
         "fig05a-limit": measured(
-            bool(np.nanmax(data["a"]["manifold_theta"].values) < float(data["a"]["kinematic_limit"])),
-            bool(np.nanmax(data["a"]["manifold_theta"].values) > float(data["a"]["kinematic_limit"])),
-            largest=np.nanmax(data["a"]["manifold_theta"].values),
-            kinematic_limit=float(data["a"]["kinematic_limit"]),
+            largest < limit,
+            largest > limit,
+            largest=largest,
+            kinematic_limit=limit,
             start=STARTS["a"][-1][0],
             share=float(data["a"]["beyond_limit"][-1]),
         ),
