@@ -14,7 +14,7 @@ from saltus.cli.interrupt import interruptible
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
-    monkeypatch.setattr(interrupt, "PATIENCE", 0.05)
+    monkeypatch.setattr(interrupt, "REMINDER_AFTER", 0.05)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)

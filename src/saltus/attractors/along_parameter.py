@@ -11,7 +11,7 @@ import numpy as np
 from saltus.attractors.attractor import REST, Attractor, Attractors, Target
 from saltus.attractors.attractors_dataset import coordinate, provenance
 from saltus.attractors.find import find_attractors
-from saltus.checks import Rectangle, check_number
+from saltus.checks import Rectangle, check_number, check_path
 from saltus.errors import ParameterError
 from saltus.systems import System
 
@@ -162,16 +162,14 @@ def _events(grid: np.ndarray, names: list[dict[int, int]]) -> list[Event]:
 
 
 def _values(system: System, path: str, values: Any) -> np.ndarray:
-    if path not in system.parameters:
-        system.get(path)  # refuses what leads nowhere
-        raise ParameterError(f"{path} is not a number, so attractors cannot be followed along it")
+    check_path(system, path)
     try:
         grid = np.atleast_1d(np.asarray(list(values), dtype=float))
     except (TypeError, ValueError):
         grid = np.empty(0)
     steps = np.diff(grid)
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all() or not ((steps > 0).all() or (steps < 0).all()):
-        raise ParameterError(f"values must be numbers of {path} that increase, or that decrease, got {values!r}")
+        raise ParameterError(f"values must be numbers of {path} that increase, or that decrease, got {values!r}", "values")
     for value in grid:
         system.with_({path: float(value)})  # refuses what the system does
     return grid

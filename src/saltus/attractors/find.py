@@ -139,7 +139,7 @@ def _known(system: System, known: Any) -> list[PeriodicOrbit]:
         elif isinstance(item, PeriodicOrbit):
             orbits.append(item)
         else:
-            raise ParameterError(f"known must be periodic orbits or branches, got {item!r}")
+            raise ParameterError(f"known must be periodic orbits or branches, got {item!r}", "known")
     for orbit in orbits:
         theirs = orbit.system.parameters
         unlike = [

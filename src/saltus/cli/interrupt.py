@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
-PATIENCE = 1.0  # s; ample for the clean-up after an interrupt, and then the next one is due
+REMINDER_AFTER = 1.0  # s; ample for the clean-up after an interrupt, and then the next one is due
 
 
 @contextmanager
@@ -28,7 +28,7 @@ def interruptible() -> Iterator[None]:
     reminders: list[threading.Timer] = []
 
     def interrupt(*_: Any) -> NoReturn:
-        reminder = threading.Timer(PATIENCE, _remind)
+        reminder = threading.Timer(REMINDER_AFTER, _remind)
         reminder.daemon = True
         reminder.start()
         reminders.append(reminder)

@@ -23,7 +23,7 @@ from saltus.theory import (
     vibrations,
 )
 
-SMALL = 0.1  # rad; the start of the free vibration whose period is given where the study has none
+SMALL_START = 0.1  # rad; the start of the free vibration whose period is given where the study has none
 
 
 def _metainterface(system: System, start: float | None) -> Iterator[Block]:
@@ -33,7 +33,7 @@ def _metainterface(system: System, start: float | None) -> Iterator[Block]:
     model = dataclasses.replace(model, smoothing=None)
     still = System(model=model, load=mean_load(system.load), impact=system.impact)
     yield _equilibria(still)
-    yield _vibrations(still, model, start or SMALL)
+    yield _vibrations(still, model, start or SMALL_START)
     yield _critical_loads(still, model, system.load.frequency)
     yield _limits(model)
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from saltus.flow import Motion
 
 MOST_SAMPLES = 1_000_000  # written unless the study asks for more
-LONG = 20_000  # periods; beyond this a motion is sampled as it goes, so that memory is bounded
+LONG_MOTION = 20_000  # periods; beyond this a motion is sampled as it goes, so that memory is bounded
 
 
 def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
@@ -61,7 +61,7 @@ def long_samples(study: Study) -> Any:
 
     given, period = study.settings().arguments, study.system.load.period
     span = given["periods"] * (period or 1.0) if "periods" in given else given["duration"]
-    if span / (period or 2 * np.pi) <= LONG:
+    if span / (period or 2 * np.pi) <= LONG_MOTION:
         return None
     start = given.get("time", 0.0)
     return np.linspace(start, start + span, study.settings().samples or MOST_SAMPLES)

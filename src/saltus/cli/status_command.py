@@ -15,8 +15,8 @@ from rich.text import Text
 if TYPE_CHECKING:
     from saltus.sweep import Status
 
-WIDTH = 40  # columns of the bar
-TOLD = 5  # failed chunks that are named
+BAR_WIDTH = 40  # columns of the bar
+FAILURES_NAMED = 5  # failed chunks that are named
 
 
 def print_status(path: Path) -> None:
@@ -32,7 +32,7 @@ def print_status(path: Path) -> None:
     console.print(f"[bold]{found.kind[:1].upper()}{found.kind[1:].replace('_', ' ')}[/] ", end="")
     console.print(f"in {path}", markup=False, soft_wrap=True)
     if console.is_terminal:
-        console.print(ProgressBar(total=found.total, completed=found.done, width=WIDTH), "", sep="\n")
+        console.print(ProgressBar(total=found.total, completed=found.done, width=BAR_WIDTH), "", sep="\n")
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
@@ -51,10 +51,10 @@ def rows(found: Status) -> Iterator[tuple[str, str]]:
     yield "last written", moment(found.updated) if found.updated else "nothing yet"
     if found.failures:
         yield "failed", str(found.failed)
-    for failure in found.failures[:TOLD]:
+    for failure in found.failures[:FAILURES_NAMED]:
         yield "", str(failure)
-    if found.failed > TOLD:
-        yield "", f"and {found.failed - TOLD} more"
+    if found.failed > FAILURES_NAMED:
+        yield "", f"and {found.failed - FAILURES_NAMED} more"
 
 
 def ending(found: Status) -> str:

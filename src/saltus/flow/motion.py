@@ -127,9 +127,9 @@ class Motion:
         try:
             asked = np.atleast_1d(np.asarray(times, dtype=float))
         except (TypeError, ValueError):
-            raise ParameterError(f"times must be a number or an array of numbers, got {times!r}") from None
+            raise ParameterError(f"times must be a number or an array of numbers, got {times!r}", "times") from None
         if asked.ndim > 1:
-            raise ParameterError(f"times must be a number or a list of numbers, got an array of shape {asked.shape}")
+            raise ParameterError(f"times must be a number or a list of numbers, got an array of shape {asked.shape}", "times")
         position, velocity, _ = self._states(asked)
         if len(self.system.model.coordinates) == 1:
             position, velocity = position[0], velocity[0]
@@ -142,7 +142,7 @@ class Motion:
             raise ParameterError("this motion was not kept densely: only its end, its events and its `samples` are known")
         slack = 1e-12 * max(1.0, abs(self.time))
         if times.size and not (times.min() >= self.start - slack and times.max() <= self.time + slack):
-            raise ParameterError(f"times must lie in [{self.start:g}, {self.time:g}], the span of the motion")
+            raise ParameterError(f"times must lie in [{self.start:g}, {self.time:g}], the span of the motion", "times")
         if self.dense is None:
             position, velocity = np.atleast_1d(self.position), np.atleast_1d(self.velocity)
             tile = np.ones(times.size)

@@ -119,7 +119,9 @@ def _paths(parameters: Iterable[str]) -> tuple[str, ...]:
     try:
         return (parameters,) if isinstance(parameters, str) else tuple(parameters)
     except TypeError:
-        raise ParameterError(f"parameters must be dotted paths, such as ['load.frequency'], got {parameters!r}") from None
+        raise ParameterError(
+            f"parameters must be dotted paths, such as ['load.frequency'], got {parameters!r}", "parameters"
+        ) from None
 
 
 def _end_shift(followed: Followed, paths: tuple[str, ...], periods: float | None) -> np.ndarray:

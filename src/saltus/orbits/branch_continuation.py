@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_bounds
+from saltus.checks import check_along, check_bounds, check_path
 from saltus.continuation import STEPS, Continuation, Course, End, StepSettings, both_ways
 from saltus.errors import ParameterError
 from saltus.orbits.branch import START, Branch
@@ -106,14 +106,11 @@ def _steps(longest: float) -> StepSettings:
 def _checked(orbit: PeriodicOrbit, path: str, bounds: Any) -> tuple[float, float]:
     """Bounds of a parameter that the system allows and between which the orbit lies."""
     low, high = check_bounds(bounds)
-    value = orbit.system.get(path) if path in orbit.system.parameters else None
-    if value is None:
-        orbit.system.get(path)  # refuses what leads nowhere
-        raise ParameterError(f"{path} is not a number, so an orbit cannot be continued along it")
+    check_path(orbit.system, path)
+    value = orbit.system.get(path)
     if not low <= value <= high:
         raise ParameterError(f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range")
-    for bound in (low, high):
-        orbit.system.with_({path: bound})  # refuses bounds beyond what the system allows
+    check_along(orbit.system, path, (low, high), "bounds")
     return low, high
 
 

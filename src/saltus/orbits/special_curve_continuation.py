@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_bounds
+from saltus.checks import check_bounds, check_path
 from saltus.continuation import STEPS, Continuation, CurveEnd, Cut, End, Events, TestFunction, both_ways, located
 from saltus.errors import ParameterError
 from saltus.orbits.branch_continuation import STEP
@@ -109,9 +109,7 @@ def continue_special(
     first_path, system = special.orbit.problem.paths[0], special.orbit.system
     if path == first_path:
         raise ParameterError(f"the branch already runs along {path}; name another parameter to follow its {special.kind} in")
-    if path not in system.parameters:
-        system.get(path)  # refuses what leads nowhere
-        raise ParameterError(f"{path} is not a number, so a curve cannot be continued along it")
+    check_path(system, path)
     limits = _limits(special, system.parameters[path], bounds, first_bounds)
     start = _start(special, (first_path, path), limits)
     course = both_ways(

@@ -49,7 +49,7 @@ def resolve(function: str) -> Callable[[Any, dict[str, np.ndarray]], Mapping[str
     """
     module, colon, name = function.partition(":") if isinstance(function, str) else ("", "", "")
     if not (module and colon and name):
-        raise ParameterError(f"function must be 'package.module:name', got {function!r}")
+        raise ParameterError(f"function must be 'package.module:name', got {function!r}", "function")
     if module == "__main__":
         raise ParameterError(f"function {function!r} is in a script; other processes need it in a module that they can import")
     try:

@@ -170,18 +170,20 @@ def _here(plan: Plan, queue: deque[Index]) -> Outcomes:
 def _check(plan: Any, store: Any, workers: Any, scheduler: Any, progress: Any, retries: Any) -> Path | None:
     """The store's path, if the arguments have a meaning."""
     if not isinstance(plan, Plan):
-        raise ParameterError(f"plan must be a Plan, got {plan!r:.80}")
+        raise ParameterError(f"plan must be a Plan, got {plan!r:.80}", "plan")
     check_count("retries", retries, 0)
     if workers is not None:
         check_count("workers", workers, 1)
     if scheduler is not None and (not isinstance(scheduler, str) or "://" not in scheduler):
-        raise ParameterError(f"scheduler must be an address such as 'tcp://host:8786', got {scheduler!r}")
+        raise ParameterError(f"scheduler must be an address such as 'tcp://host:8786', got {scheduler!r}", "scheduler")
     if scheduler is not None and workers is not None:
         raise ParameterError("workers and scheduler are given both; a cluster has workers of its own")
     if not callable(progress):
-        raise ParameterError(f"progress must be a function of the fraction done and of what is being done, got {progress!r}")
+        raise ParameterError(
+            f"progress must be a function of the fraction done and of what is being done, got {progress!r}", "progress"
+        )
     if store is not None and not isinstance(store, str | Path):
-        raise ParameterError(f"store must be the path of a folder, or None, got {store!r:.80}")
+        raise ParameterError(f"store must be the path of a folder, or None, got {store!r:.80}", "store")
     if isinstance(store, str) and "://" in store:
-        raise ParameterError(f"store must be a folder on this machine, got the address {store!r}")
+        raise ParameterError(f"store must be a folder on this machine, got the address {store!r}", "store")
     return None if store is None else Path(store)

@@ -35,9 +35,11 @@ class Variable:
         try:
             dtype = np.dtype(self.dtype)
         except TypeError:
-            raise ParameterError(f"dtype must be a NumPy type such as 'f8' or 'i2', got {self.dtype!r}") from None
+            raise ParameterError(f"dtype must be a NumPy type such as 'f8' or 'i2', got {self.dtype!r}", "dtype") from None
         if dtype.kind not in "biufc" or dtype.itemsize > (16 if dtype.kind == "c" else 8):
-            raise ParameterError(f"dtype must be boolean, integer, real or complex, of up to 64 bits a part, got {self.dtype!r}")
+            raise ParameterError(
+                f"dtype must be boolean, integer, real or complex, of up to 64 bits a part, got {self.dtype!r}", "dtype"
+            )
         extra = tuple((str(name), int(size)) for name, size in self.extra)
         for name, size in extra:
             _check_name(name, "a dimension")
@@ -47,7 +49,7 @@ class Variable:
         try:
             fill = dtype.type(fill).item()
         except (TypeError, ValueError, OverflowError):
-            raise ParameterError(f"fill must be a value of type {dtype}, got {fill!r}") from None
+            raise ParameterError(f"fill must be a value of type {dtype}, got {fill!r}", "fill") from None
         for name, value in (("dtype", dtype.name), ("extra", extra), ("attrs", as_json(self.attrs, "attrs")), ("fill", fill)):
             object.__setattr__(self, name, value)
 
@@ -94,7 +96,7 @@ class Plan:
             "attrs": as_json(self.attrs, "attrs"),
         }
         if "plan" in values["attrs"]:
-            raise ParameterError("attrs must not have the key 'plan'; the plan itself is kept there")
+            raise ParameterError("attrs must not have the key 'plan'; the plan itself is kept there", "attrs")
         for name, value in values.items():
             object.__setattr__(self, name, value)
 

@@ -8,7 +8,7 @@ from .parameters import children, is_number, numbers, substitute
 from .registry import IMPACTS, MODELS, register
 from .reversed import reversed_system
 from .rocking_block import RockingBlock
-from .scenarios import Impact, LayerState, Scenario, TableRow, name_impact, other_impulse, table_1
+from .scenarios import LayerState, NamedImpact, Scenario, TableRow, name_impact, other_impulse, table_1
 from .si_units import PhysicalCell
 from .signals import Constant, Harmonic, Record, Signal, Sum
 from .system import System, check_system
@@ -24,13 +24,13 @@ __all__ = [
     "Constant",
     "EnergyRestitution",
     "Harmonic",
-    "Impact",
     "ImpactLaw",
     "InelasticImpact",
     "LayerState",
     "Load",
     "Metainterface",
     "Model",
+    "NamedImpact",
     "PhysicalCell",
     "Record",
     "RockingBlock",

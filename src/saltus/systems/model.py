@@ -68,11 +68,15 @@ class Model:
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
         """The kinetic energy; impact laws that conserve or restitute energy need it."""
-        raise ParameterError(f"{type(self).__name__} defines no kinetic_energy, so this impact law cannot be used with it")
+        raise ParameterError(
+            f"{type(self).__name__} defines no kinetic_energy, so this impact law cannot be used with it", "impact"
+        )
 
     def inelastic_factor(self, side: Any) -> Any:
         """The velocity factor of a frictionless, perfectly inelastic impact that ends the mode `side`."""
-        raise ParameterError(f"{type(self).__name__} defines no inelastic_factor, so InelasticImpact() cannot be used with it")
+        raise ParameterError(
+            f"{type(self).__name__} defines no inelastic_factor, so InelasticImpact() cannot be used with it", "impact"
+        )
 
     def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Any) -> dict[str, Any]:
         """Named quantities that must stay positive for the motion to be one of the real mechanism."""

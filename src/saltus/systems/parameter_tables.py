@@ -23,7 +23,9 @@ def parameter_table(system: System, parameters: Any) -> dict[str, Any]:
     if parameters is None:
         return {}
     if not isinstance(parameters, Mapping):
-        raise ParameterError(f"parameters must be arrays by dotted path, such as {{'load.frequency': ...}}, got {parameters!r}")
+        raise ParameterError(
+            f"parameters must be arrays by dotted path, such as {{'load.frequency': ...}}, got {parameters!r}", "parameters"
+        )
     known = [path for path, _ in numbers(system)]
     for path in parameters:
         if path not in known:

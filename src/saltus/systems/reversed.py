@@ -24,7 +24,7 @@ from saltus.systems.model import Model
 from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
 from saltus.systems.system import System, check_system
 
-TRIED = (0.3, 2.0)  # speeds at which a reset is compared with its inverse
+RESET_SPEEDS = (0.3, 2.0)  # speeds at which a reset is compared with its inverse
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +143,7 @@ def _turned(velocity: Any) -> Any:
 def _check_resets(system: System, backward: System) -> None:
     """Refuse a model whose reset is not undone by the reversed law."""
     for side in system.model.sides:
-        for speed in TRIED:
+        for speed in RESET_SPEEDS:
             out = float(system.model.gap(system.model.contact + 1.0, side) - system.model.gap(system.model.contact, side))
             before = -math.copysign(speed, out)
             following, after = system.model.reset(0.0, before, side, system.load, system.impact)

@@ -30,7 +30,7 @@ class LayerState(NamedTuple):
     velocity: Two
 
 
-class Impact(NamedTuple):
+class NamedImpact(NamedTuple):
     """An impact named: the scenario, the impacting layer s (1 lower, 2 upper) and the numbers of deformed layers."""
 
     scenario: Scenario
@@ -64,7 +64,7 @@ def table_1() -> tuple[TableRow, ...]:
     )
 
 
-def name_impact(before: LayerState, after: LayerState, *, model: TwoLayer | None = None, tolerance: float = 1e-9) -> Impact:
+def name_impact(before: LayerState, after: LayerState, *, model: TwoLayer | None = None, tolerance: float = 1e-9) -> NamedImpact:
     """The scenario of Table 1 that leads from the state just before an impact to the one just after it.
 
     A velocity below `tolerance` times the largest one counts as zero, an angle below `tolerance` rad as closed. With a
@@ -94,7 +94,7 @@ def name_impact(before: LayerState, after: LayerState, *, model: TwoLayer | None
     kind = Scenario.NO_BOUNCING
     if turns:
         kind = Scenario.PARTIAL_BOUNCING if opens and not other_open else Scenario.BOUNCING
-    return Impact(kind, s + 1, 1 + other_open, int(turns) + int(opens))
+    return NamedImpact(kind, s + 1, 1 + other_open, int(turns) + int(opens))
 
 
 def other_impulse(model: TwoLayer, before: LayerState, after: LayerState, layer: int) -> float:

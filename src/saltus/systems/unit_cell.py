@@ -15,7 +15,7 @@ from saltus.systems.metainterface import Metainterface
 from saltus.systems.si_units import PhysicalCell
 from saltus.systems.two_layer import TwoLayer
 
-ROUNDING = 1e-12  # an angle past a limit by no more than this is rounded onto it
+ANGLE_ROUNDING = 1e-12  # an angle past a limit by no more than this is rounded onto it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +114,7 @@ class UnitCell:
             ParameterError: abs(phi) above `max_misalignment`, or a layer other than 1 and 2.
         """
         if layer not in (1, 2):
-            raise ParameterError(f"layer must be 1 (lower) or 2 (upper), got {layer!r}")
+            raise ParameterError(f"layer must be 1 (lower) or 2 (upper), got {layer!r}", "layer")
         beta = self.beta_of_phi(phi)
         beta = 2 * math.pi - beta if past_line else beta
         return -((-1) ** layer) * (beta - self.beta0)
@@ -187,7 +187,7 @@ class UnitCell:
     def _lowering(self, theta: Any) -> Any:
         """cos(beta0) - cos(beta_j), as a product so that it keeps its digits near theta = 0."""
         size = np.abs(theta)
-        if np.any(size > self.kinematic_limit + ROUNDING):
+        if np.any(size > self.kinematic_limit + ANGLE_ROUNDING):
             worst = float(np.max(size))
             raise ParameterError(
                 f"abs(theta) must not pass the kinematic limit 2 (pi - beta0) = {self.kinematic_limit:.6g} rad, got {worst!r}"
@@ -195,6 +195,6 @@ class UnitCell:
         return np.maximum(2 * np.sin(self.beta0 + size / 2) * np.sin(size / 2), 0.0)
 
     def _check_phi(self, phi: Any) -> None:
-        if not np.all(np.abs(phi) <= self.max_misalignment + ROUNDING):
+        if not np.all(np.abs(phi) <= self.max_misalignment + ANGLE_ROUNDING):
             worst = float(np.max(np.abs(phi)))
             raise ParameterError(f"abs(phi) must lie in [0, {self.max_misalignment:.6g}] rad in this cell, got {worst!r}")

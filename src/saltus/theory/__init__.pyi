@@ -18,7 +18,7 @@ from .quasi_static import (
     subcritical_vertical,
     unloaded_fold,
 )
-from .restitution import Contact, energy_factor, energy_jump, inelastic_contact, velocity_factor
+from .restitution import InelasticContact, energy_factor, energy_jump, inelastic_contact, velocity_factor
 from .rocking import (
     housner_restitution,
     rocking_energy_decreases,
@@ -42,9 +42,9 @@ from .static_divergence import Divergence, divergence, linear_equilibria
 
 __all__ = [
     "AmplitudeLimit",
-    "Contact",
     "Divergence",
     "Equilibrium",
+    "InelasticContact",
     "Layer",
     "LinearMotion",
     "Peaks",

@@ -147,7 +147,7 @@ def reciprocal(system: System, theta0: float) -> tuple[System, float]:
 
 def _fall_speed(layer: Layer, peak: float) -> float:
     if peak == 0:
-        raise ParameterError("theta0 must not be 0: a motion with two peaks starts at one of them")
+        raise ParameterError("theta0 must not be 0: a motion with two peaks starts at one of them", "theta0")
     if peak > layer.kinematic_limit:
         raise ParameterError(f"abs(theta0) must lie in (0, {layer.kinematic_limit:.6g}] rad, the kinematic limit, got {peak!r}")
     start = float(layer.potential(peak))

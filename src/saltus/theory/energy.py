@@ -43,7 +43,9 @@ def total_energy(system: System, theta: Any, velocity: Any, side: Any = None) ->
     lower, upper = layers(system)
     if side is None:
         if lower.mass != upper.mass and np.any((theta == 0) & (velocity != 0)):
-            raise ParameterError("side must be given where theta is 0, since the layers' masses differ; it says which one moves")
+            raise ParameterError(
+                "side must be given where theta is 0, since the layers' masses differ; it says which one moves", "side"
+            )
         side = np.where(theta < 0, -1, 1)
     kinetic = system.model.kinetic_energy(0.0, theta, velocity, np.asarray(side), system.load)
     energy = kinetic + potential_energy(system, theta)

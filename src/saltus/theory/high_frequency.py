@@ -48,7 +48,7 @@ def high_frequency_onset(frequency: Any, *, beta0: float, vertical: float, dampi
     if not np.all(frequency > slowest):
         raise ParameterError(f"the onset is for high frequency, far above {slowest:.6g} here, got {frequency!r}")
     if order not in (1, 2):
-        raise ParameterError(f"order must be 1 or 2, got {order!r}")
+        raise ParameterError(f"order must be 1 or 2, got {order!r}", "order")
     onset = closing / math.sin(beta0) * damping * math.pi**3 / (24 * frequency)
     if order == 2:
         stiff = (math.pi**2 / 5 - 1) * stiffness

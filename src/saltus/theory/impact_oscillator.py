@@ -234,7 +234,7 @@ def wall_orbits(system: System, period: int = 1) -> WallOrbits:
         most = 2 * math.sqrt(model.stiffness)
         raise ParameterError(f"wall_orbits needs damping below critical, 2 sqrt(k) = {most:.6g}, got {model.damping!r}")
     if isinstance(period, bool) or period != int(period) or period < 1:
-        raise ParameterError(f"period must be a whole number of forcing periods, at least 1, got {period!r}")
+        raise ParameterError(f"period must be a whole number of forcing periods, at least 1, got {period!r}", "period")
     factors = [float(system.impact.velocity_after(model, t, v, 1, 1, load)) / v for t, v in ((0.0, 1.0), (1.0, 0.125))]
     if not math.isclose(*factors, rel_tol=1e-12):
         raise ParameterError(f"wall_orbits needs an impact law v+ = -e v- with a constant e, got {system.impact!r}")

@@ -12,7 +12,7 @@ from itertools import pairwise
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
 
-ROUNDING = 4e-15  # moments below this share of a layer's scale are zero
+MOMENT_ROUNDING = 4e-15  # moments below this share of a layer's scale are zero
 
 
 class Stability(Enum):
@@ -68,7 +68,7 @@ def undeformed_stability(system: System) -> Stability | None:
     closing = (slope_sign(lower), slope_sign(upper))
     if min(closing) > 0:
         return Stability.STABLE
-    pushes = [layer.push(0.0) > ROUNDING * layer.scale for layer in (lower, upper)]
+    pushes = [layer.push(0.0) > MOMENT_ROUNDING * layer.scale for layer in (lower, upper)]
     return None if pushes[0] != pushes[1] else Stability.UNSTABLE
 
 
@@ -98,7 +98,7 @@ def slope_sign(layer: Layer) -> int:
 
 
 def _sign(value: float, layer: Layer) -> int:
-    return 0 if abs(value) <= ROUNDING * layer.scale else (1 if value > 0 else -1)
+    return 0 if abs(value) <= MOMENT_ROUNDING * layer.scale else (1 if value > 0 else -1)
 
 
 def _past_contact(layer: Layer, end: float, sign: int) -> float:

@@ -80,7 +80,9 @@ class LinearMotion:
         """
         tau = np.asarray(tau, dtype=float)
         if np.any((tau < 0) | (tau > self.end)):
-            raise ParameterError(f"tau must lie in [0, {self.end:.6g}], where this motion was computed; ask for more impacts")
+            raise ParameterError(
+                f"tau must lie in [0, {self.end:.6g}], where this motion was computed; ask for more impacts", "tau"
+            )
         theta, velocity = np.empty_like(tau), np.empty_like(tau)
         index = np.searchsorted(self.impact_times, tau, side="right")
         for i in np.unique(index):

@@ -138,7 +138,9 @@ def equivalent_angle(beta0: float, ground_amplitude: Any) -> Any:
     _check_angle(beta0)
     amplitude, largest = np.asarray(ground_amplitude, dtype=float), 1 + math.cos(beta0)
     if not np.all((amplitude >= 0) & (amplitude <= largest)):
-        raise ParameterError(f"zetahat must lie in [0, {largest:.6g}], that is 1 + cos(beta0), got {ground_amplitude!r}")
+        raise ParameterError(
+            f"zetahat must lie in [0, {largest:.6g}], that is 1 + cos(beta0), got {ground_amplitude!r}", "ground_amplitude"
+        )
     return (np.arccos(np.maximum(math.cos(beta0) - amplitude, -1.0)) - beta0)[()]
 
 

@@ -15,7 +15,7 @@ from saltus.theory.layer import metainterface
 
 
 @dataclass(frozen=True, slots=True)
-class Contact:
+class InelasticContact:
     """A frictionless, perfectly inelastic impact that ends one side."""
 
     factor: float  # theta'+ / theta'-, 0 where the motion stops
@@ -25,7 +25,7 @@ class Contact:
     ]  # over theta'-: of the constraints theta_1 >= 0 and theta_2 <= 0, rows one and two of M [[theta']]
 
 
-def inelastic_contact(beta0: float, mass_ratio: float, side: int) -> Contact:
+def inelastic_contact(beta0: float, mass_ratio: float, side: int) -> InelasticContact:
     """The impact that ends `side` (+1: from lower to upper) from the momentum balance M0 [[theta']] = impulses (errata 25).
 
     M0 = [[1+m, -cos(2 beta0)], [-cos(2 beta0), 1]] is M of `eomnl` at theta = 0. The layer that arrives is stopped by its
@@ -43,7 +43,7 @@ def inelastic_contact(beta0: float, mass_ratio: float, side: int) -> Contact:
     check_number("beta0", beta0, above=0.0, below=math.pi, unit="rad")
     check_number("mass_ratio", mass_ratio, at_least=0.0)
     if side not in (1, -1):
-        raise ParameterError(f"side must be +1 (lower) or -1 (upper), got {side!r}")
+        raise ParameterError(f"side must be +1 (lower) or -1 (upper), got {side!r}", "side")
     coupling = -math.cos(2 * beta0)
     matrix = ((1 + mass_ratio, coupling), (coupling, 1.0))
     hit, free = (0, 1) if side > 0 else (1, 0)
@@ -51,7 +51,7 @@ def inelastic_contact(beta0: float, mass_ratio: float, side: int) -> Contact:
     jump = [0.0, 0.0]
     jump[hit], jump[free] = -1.0, factor
     impulses = tuple(row[0] * jump[0] + row[1] * jump[1] for row in matrix)
-    return Contact(factor, factor**2 * matrix[free][free] / matrix[hit][hit], (impulses[0], impulses[1]))
+    return InelasticContact(factor, factor**2 * matrix[free][free] / matrix[hit][hit], (impulses[0], impulses[1]))
 
 
 def energy_factor(system: System, velocity: float, side: int, e: float, tau: float = 0.0) -> float:

@@ -90,7 +90,9 @@ def housner_restitution(alpha: float) -> float:
     _check(alpha, 1.0)
     factor = 1 - 1.5 * math.sin(alpha) ** 2
     if factor <= 0:
-        raise ParameterError(f"alpha must be below {math.asin(math.sqrt(2 / 3)):.6g} rad for the block to rock on, got {alpha!r}")
+        raise ParameterError(
+            f"alpha must be below {math.asin(math.sqrt(2 / 3)):.6g} rad for the block to rock on, got {alpha!r}", "alpha"
+        )
     return factor**2
 
 

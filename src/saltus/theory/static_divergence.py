@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
-from saltus.theory.loaded_equilibria import ROUNDING, Equilibrium, Stability, slope_sign, undeformed_stability
+from saltus.theory.loaded_equilibria import MOMENT_ROUNDING, Equilibrium, Stability, slope_sign, undeformed_stability
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,12 +59,12 @@ def _threshold(layer: Layer) -> float | None:
     if slope_sign(layer) < 0:
         return 0.0
     kappa, push = float(layer.curvature(0.0)), float(layer.push(0.0))
-    return push / kappa if kappa < -ROUNDING * layer.scale else None
+    return push / kappa if kappa < -MOMENT_ROUNDING * layer.scale else None
 
 
 def _linear_equilibrium(layer: Layer) -> Equilibrium | None:
     kappa, push = float(layer.curvature(0.0)), float(layer.push(0.0))
-    if min(abs(kappa), abs(push)) <= ROUNDING * layer.scale or push / kappa < 0:
+    if min(abs(kappa), abs(push)) <= MOMENT_ROUNDING * layer.scale or push / kappa < 0:
         return None
     x = push / kappa
     root = cmath.sqrt(layer.damping**2 - 4 * layer.mass * kappa)

@@ -202,5 +202,7 @@ def _labels(labels: Any) -> np.ndarray:
     except (TypeError, ValueError):
         array, grid = np.empty((0, 0)), np.empty((0, 0), dtype=int)
     if grid.ndim not in (1, 2) or not grid.size or not np.array_equal(array, grid):
-        raise ParameterError(f"labels must be whole numbers over one or two dimensions, got an array of shape {np.shape(labels)}")
+        raise ParameterError(
+            f"labels must be whole numbers over one or two dimensions, got an array of shape {np.shape(labels)}", "labels"
+        )
     return grid

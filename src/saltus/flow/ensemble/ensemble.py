@@ -162,20 +162,20 @@ def _kept(last: Any, legs: int) -> int:
     if isinstance(last, str) and last == "all":
         return legs
     if isinstance(last, bool) or not isinstance(last, (int, np.integer)) or last < 1:
-        raise ParameterError(f'last must be a whole number of forcing periods from 1 on, or "all", got {last!r}')
+        raise ParameterError(f'last must be a whole number of forcing periods from 1 on, or "all", got {last!r}', "last")
     return max(1, min(int(last), legs))
 
 
 def _side(side: Any) -> int:
     if side is not None and (np.ndim(side) or side not in (1, -1)):
-        raise ParameterError(f"side must be +1 or -1, got {side!r}")
+        raise ParameterError(f"side must be +1 or -1, got {side!r}", "side")
     return side or 0
 
 
 def _threads(threads: Any) -> int:
     threads = available_cores() if threads is None else threads
     if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-        raise ParameterError(f"threads must be a whole number of at least 1, got {threads!r}")
+        raise ParameterError(f"threads must be a whole number of at least 1, got {threads!r}", "threads")
     return int(threads)
 
 

@@ -60,7 +60,7 @@ def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, 
             raise ParameterError(f"the state at the start needs {name}=...")
     speeds = (velocity,) if len(names) == 1 else velocity
     if not isinstance(speeds, (tuple, list)) or len(speeds) != len(names):
-        raise ParameterError(f"velocity must be a tuple of {len(names)} numbers or arrays, got {velocity!r}")
+        raise ParameterError(f"velocity must be a tuple of {len(names)} numbers or arrays, got {velocity!r}", "velocity")
     starts = {name: coordinates[name] for name in names}
     starts |= {rate_name(name, names): speed for name, speed in zip(names, speeds, strict=True)}
     return starts | {"time": time}

@@ -33,7 +33,9 @@ def _check(
     _values(bounds, values)
     check_window(window, system)
     if not (progress is None or callable(progress)):
-        raise ParameterError(f"progress must be a function of the fraction done and of what is being done, got {progress!r}")
+        raise ParameterError(
+            f"progress must be a function of the fraction done and of what is being done, got {progress!r}", "progress"
+        )
 
 
 @checked_by(_check)
