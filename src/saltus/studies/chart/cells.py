@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import Window
-from saltus.flow import Stop, simulate_many, stop_names
+from saltus.flow import find_recurrence
 from saltus.orbits import initial_states
 from saltus.studies.chart.motions import MOTION, SIDES, TOLERANCES, distinct, has_alike, is_alike, motions_in, table
 from saltus.studies.chart.request import ChartRequest
@@ -143,36 +143,21 @@ def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple
     motions = motions.copy()
     if not len(motions):
         return motions, np.zeros(0, dtype=bool)
-    ends, name = _simulated(request, motions, periods), request.coordinate
-    captured = np.isin(stop_names(ends), [Stop.CAPTURED, Stop.REST])
-    period = ends["recurrence_period"].values
-    settled = (period > 0) & (period <= request.max_period) & ~captured
-    motions["period"] = np.where(settled, period, 0)
-    motions["state"] = np.stack([ends[name].values, ends["velocity"].values], axis=1)
-    # Extrema and impacts are those of the last period of the motion, or of the last forcing periods where it has none yet.
-    length = np.where(settled, period, request.max_period)
-    last = np.arange(ends.sizes["period"])[::-1] < length[:, None]
-    high, low = (
-        np.nanmax(np.where(last, side, np.nan), axis=1, initial=-np.inf)
-        for side in (ends[f"largest_{name}"].values, -ends[f"smallest_{name}"].values)
-    )
-    motions["amplitude"], motions["other"] = np.maximum(high, low), np.minimum(high, low)
-    motions["impact_count"] = np.nansum(np.where(last, ends["period_impact_count"].values, 0.0), axis=1)
-    return motions, captured
-
-
-def _simulated(request: ChartRequest, motions: np.ndarray, periods: int) -> Any:
-    states: dict[str, Any] = {request.coordinate: motions["state"][:, 0], "velocity": motions["state"][:, 1]}
-    return simulate_many(
+    ends = find_recurrence(
         request.system,
-        **states,
+        motions["state"],
+        periods,
         parameters={path: values[motions["cell"]] for path, values in request.parameters.items()},
-        periods=periods,
+        max_period=request.max_period,
+        kept=0,
+        extrema=True,
+        impact_count=True,
         tol=request.tol,
-        until=("rest", "settled"),
-        sample=("extrema", "impact_count"),
-        last=request.max_period,
     )
+    high, low = ends.highest, -ends.lowest
+    motions["state"], motions["period"], motions["impact_count"] = ends.last, ends.period, ends.impact_count
+    motions["amplitude"], motions["other"] = np.maximum(high, low), np.minimum(high, low)
+    return motions, ends.rest
 
 
 def joined(motions: np.ndarray) -> np.ndarray:
