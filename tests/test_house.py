@@ -29,7 +29,7 @@ MAY_IMPORT = {
     "flow": {"systems", "taylor", "bounds"},
     "continuation": set(),
     "orbits": {"systems", "taylor", "flow", "continuation"},
-    "attractors": {"systems", "taylor", "bounds", "flow", "continuation", "orbits"},
+    "attractors": {"systems", "taylor", "bounds", "flow", "continuation", "orbits", "sweep"},
     "sweep": set(),
     "studies": {"systems", "theory", "flow", "continuation", "orbits", "attractors", "sweep"},
     "plots": set(),

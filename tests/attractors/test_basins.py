@@ -10,7 +10,8 @@ import xarray
 from attractor_cases import strobes
 from shared_systems import forced, steady, walled
 
-from saltus.attractors.basins.grid import basins_of_attraction, cell_arguments, cells
+from saltus.attractors import basins_of_attraction
+from saltus.attractors.basins.basin_cells import cell_arguments, cells
 from saltus.attractors.find import Attractors, find_attractors
 from saltus.errors import ParameterError
 from saltus.plots.basins import draw_basins

@@ -1,7 +1,7 @@
 from .along_parameter import attractors_along
 from .attractor import Attractor, Attractors, Target
 from .basins.fractal import BasinEntropy, UncertaintyExponent, Wada, basin_entropy, uncertainty_exponent, wada
-from .basins.grid import basins_of_attraction, cell_arguments
+from .basins.grid import basins_of_attraction
 from .find import find_attractors
 from .lyapunov.ensemble import lyapunov_many
 from .lyapunov.largest_exponent import largest_exponents
@@ -30,7 +30,6 @@ __all__ = [
     "attractors_along",
     "basin_entropy",
     "basins_of_attraction",
-    "cell_arguments",
     "classify",
     "equilibria",
     "excludes_tori",

@@ -88,7 +88,10 @@ def function_of(ask: Ask) -> Callable[..., Any]:
     """The function that answers a question."""
     from saltus import attractors, studies
 
-    special: dict[str, Callable[..., Any]] = {"attractors": attractors.find_attractors, "basins": studies.basin_sweep}
+    special: dict[str, Callable[..., Any]] = {
+        "attractors": attractors.find_attractors,
+        "basins": attractors.basins_of_attraction,
+    }
     if ask.kind == "stability_chart" and "curves" in ask.options:
         return studies.bordered_chart
     return special.get(ask.kind) or getattr(studies, ask.kind)

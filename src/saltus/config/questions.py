@@ -19,7 +19,7 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
     "response_spectrum": ("studies:response_spectrum", "studies:orbit_diagram"),
     "bifurcation_diagram": ("studies:bifurcation_diagram", "studies:orbit_diagram"),
     "attractors": ("attractors:find_attractors",),
-    "basins": ("studies:basin_sweep", "attractors:basins_of_attraction"),
+    "basins": ("attractors:basins_of_attraction",),
     "stability_chart": ("studies:bordered_chart", "studies:stability_chart"),
 }  # the function that answers each question, then the one to which it hands its further options
 NOT_IN_FILES = ("system", "store", "workers", "scheduler")  # they are given by the rest of the file or on the command line

@@ -1,4 +1,3 @@
-from .basins import basin_sweep
 from .chart.borders import Borders, exact_borders, with_borders
 from .chart.chart import bordered_chart, stability_chart
 from .chart.disagreements import disagreements
@@ -8,7 +7,6 @@ from .portrait import phase_portrait
 
 __all__ = [
     "Borders",
-    "basin_sweep",
     "bifurcation_diagram",
     "bordered_chart",
     "chaotic_bands",

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.attractors.attractor import NEAR, REST, UNDECIDED, Attractor, Attractors, Target
 from saltus.attractors.attractors_dataset import attractor_table, coordinate, labels, provenance
+from saltus.attractors.basins.basin_cells import PERIODS, WITHIN, Grid, check_basin_store, computed_cells
 from saltus.attractors.basins.labelling import label_states
 from saltus.attractors.find import find_attractors
 from saltus.attractors.stroboscopic_section import with_clock
 from saltus.checks import Window, check_axis, check_count, check_number, check_window, checked_by
 from saltus.errors import ParameterError
+from saltus.progress import Progress, part_of, silent
 from saltus.systems import System, reversed_system
 
 if TYPE_CHECKING:
@@ -23,12 +26,9 @@ if TYPE_CHECKING:
 
 CELLS = 201  # along an axis for which no numbers are given
 NARROWEST = 1e-6  # half width of a window around a grid of one point
-PERIODS = 500
-WITHIN = 1e-2
+ROWS = 25  # velocities in a chunk, which then takes seconds
 MOST_NEW = 64  # states of cells that end nowhere known from which new attractors are looked for, at a time
 ROUNDS = 3
-
-Grid = tuple[np.ndarray, np.ndarray]  # velocities, coordinates
 
 
 def _check(
@@ -39,7 +39,10 @@ def _check(
     within: float,
     curves: bool,
     tol: float,
-    compute: object,
+    rows: int,
+    store: Any,
+    workers: object,
+    scheduler: object,
     progress: object,
     **coordinates: Any,
 ) -> None:
@@ -51,6 +54,9 @@ def _check(
         raise ParameterError("found holds the attractors of another system; leave it out, or compute it for this one", "found")
     if curves:
         _check_curves(system, grid)
+    check_count("rows", rows, 1)
+    if store is not None and Path(store).exists():
+        check_basin_store(Path(store), system)
 
 
 @checked_by(_check)
@@ -63,8 +69,11 @@ def basins_of_attraction(
     within: float = WITHIN,
     curves: bool = False,
     tol: float = 1e-11,
-    compute: Callable[[dict[str, Any], dict[str, np.ndarray]], tuple[np.ndarray, np.ndarray]] | None = None,
-    progress: Callable[[float], object] | None = None,
+    rows: int = ROWS,
+    store: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress = silent,
     **coordinates: Iterable[float],
 ) -> xarray.Dataset:
     """The attractor on which the motion from each state (coordinate, velocity) of a grid at phase 0 ends, and the time it takes.
@@ -83,9 +92,10 @@ def basins_of_attraction(
         curves: adds the curves at which basins meet, computed by the backward flow (see `boundaries`), as `boundary_...` over
             `boundary_point`, nan between pieces.
         tol: the error of a step.
-        compute: computes the labels and times of the grid from the arguments of `cells` and the axes, such as by a sweep; by
-            default they are computed here.
-        progress: called with the fraction done, first when all arguments have been checked.
+        rows: velocities of the grid in one chunk of a store, or of what a worker computes.
+        store, workers, scheduler: where the cells are kept and who computes them, see `saltus.sweep.run`; the attractors are
+            found first, and the curves at the end, at every run. Where none is given all cells are computed at once.
+        progress: called with the fraction done and what is being done, first when all arguments have been checked.
         coordinates: the coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201).
 
     Returns:
@@ -97,62 +107,19 @@ def basins_of_attraction(
     """
     clock = with_clock(system)
     grid = _grid(clock, velocity, coordinates, found)
-    say = progress or (lambda _: None)
-    say(0.0)
+    progress(0.0, "attractors")
     if found is None:
-        found = find_attractors(system, window=_around(clock, grid), tol=tol, progress=lambda done: say(0.1 * done))
-    if compute is None:
-        label, time = _all_cells(clock, found.targets, grid, periods, within, tol, lambda done: say(0.1 + 0.8 * done))
-    else:
-        arguments = cell_arguments(found, periods=periods, within=within, tol=tol)
-        label, time = map(np.array, compute(arguments, {"velocity": grid[0], system.model.coordinates[0]: grid[1]}))
+        window = _around(clock, grid)
+        found = find_attractors(system, window=window, tol=tol, progress=lambda done: progress(0.1 * done, "attractors"))
+    numbers: dict[str, Any] = {"periods": periods, "within": within, "tol": tol}
+    where = {"store": store, "workers": workers, "scheduler": scheduler}
+    label, time = computed_cells(found, grid, numbers, int(rows), part_of(progress, 0.1, 0.9), **where)
     members, label, time, reasons = _with_new(system, found, grid, label, time, periods, within, tol)
-    numbers = {"periods": periods, "within": within, "tol": tol, "reasons": reasons}
-    data = _dataset(system, members, grid, label, time, numbers)
+    data = _dataset(system, members, grid, label, time, numbers | {"reasons": reasons})
     if curves:
         data = data.assign(_meeting(replace(found, members=members), grid, label, periods, within, tol))
-    say(1.0)
+    progress(1.0, "cells")
     return data
-
-
-def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Labels and times of one block of a grid: what a sweep calls for each of its chunks.
-
-    Args:
-        arguments: as `cell_arguments` makes them, plain as JSON.
-        block: {"velocity": values, the coordinate's name: values}.
-
-    Returns:
-        {"label": int16 (velocities, coordinates), "time": float (velocities, coordinates)}.
-    """
-    system = System.from_dict(arguments["system"])
-    targets = [Target.from_dict(item) for item in arguments["attractors"]]
-    grid = np.asarray(block["velocity"], dtype=float), np.asarray(block[system.model.coordinates[0]], dtype=float)
-    numbers = (int(arguments["periods"]), float(arguments["within"]), float(arguments["tol"]))
-    label, time = _all_cells(with_clock(system), targets, grid, *numbers)
-    return {"label": label, "time": time}
-
-
-def cell_arguments(found: Attractors, *, periods: int = PERIODS, within: float = WITHIN, tol: float = 1e-11) -> dict[str, Any]:
-    """The arguments of `cells` that are the same for all blocks."""
-    targets = [target.to_dict() for target in found.targets]
-    return {"system": found.system.to_dict(), "attractors": targets, "periods": periods, "within": within, "tol": tol}
-
-
-def _all_cells(
-    system: System,
-    targets: Iterable[Target],
-    grid: Grid,
-    periods: int,
-    within: float,
-    tol: float,
-    say: Callable[[float], object] = lambda _: None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Labels and times over the grid."""
-    states = np.stack(np.meshgrid(grid[1], grid[0]), axis=-1).reshape(-1, 2)
-    label, time = label_states(system, targets, states, periods, within, tol, say)
-    shape = (len(grid[0]), len(grid[1]))
-    return label.reshape(shape), time.reshape(shape)
 
 
 def _with_new(
