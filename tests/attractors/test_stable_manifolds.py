@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from attractor_cases import strobes
+from reference_manifolds import manifold
 from scipy.optimize import brentq
 from scipy.spatial import cKDTree
 from shared_systems import forced, steady, walled
@@ -14,7 +15,6 @@ from saltus.attractors.basins.grid import basins_of_attraction
 from saltus.attractors.manifolds.phase_plane import saddles, separatrices
 from saltus.attractors.manifolds.saddle_manifolds import OFFSET, Manifold, stable_manifold, unstable_manifold
 from saltus.errors import ParameterError
-from reference_manifolds import manifold
 from saltus.systems.reversed import reversed_load, reversed_system
 from saltus.theory import equilibria, wall_orbits
 

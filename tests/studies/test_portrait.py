@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from reference_manifolds import manifold
 from shared_systems import steady
 
 from saltus.attractors.manifolds.equilibria import equilibria
 from saltus.errors import ParameterError
-from reference_manifolds import manifold
 from saltus.studies import phase_portrait
 from saltus.systems import (
     EnergyRestitution,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Generic
 
@@ -13,36 +13,40 @@ from saltus.continuation.end import CurveEnd, End
 from saltus.continuation.events import Cut, Events
 from saltus.continuation.step_length import STEPS, StepSettings
 from saltus.continuation.test_functions import Zero, located
-from saltus.progress import Progress
+from saltus.progress import Progress, silent
 
 AHEAD = 1e-6  # of a point along its tangent, to know its direction in other numbers
 WIDE = 0.2  # share of a step by which the first point of a curve may lie beside it for the curve to close
 
 
+Bounds = Mapping[str, tuple[float, float]]  # the least and the largest value of each parameter, by its name
+
+
 class Watch(Generic[P]):
     """Tells how much of a curve has been seen: of the range of its first parameter, or of the points it may have."""
 
-    def __init__(self, progress: Progress, names: Sequence[str], bounds: np.ndarray, most_points: int) -> None:
-        self.progress, self.names, self.bounds, self.most_points = progress, names, bounds, most_points
-        self.low, self.high, self.points = np.inf, -np.inf, 0
+    def __init__(self, progress: Progress, bounds: Bounds, most_points: int) -> None:
+        self.progress, self.names, self.most_points = progress, tuple(bounds), most_points
+        self.bounds, self.seen, self.points = next(iter(bounds.values())), (np.inf, -np.inf), 0
 
     def __call__(self, point: P) -> None:
         """Tell of a new point."""
-        self.low, self.high, self.points = min(self.low, point.parameter), max(self.high, point.parameter), self.points + 1
-        least, largest = self.bounds[0]
-        share = (min(self.high, largest) - max(self.low, least)) / (largest - least)
+        if self.progress is silent:
+            return
+        self.seen, self.points = (min(self.seen[0], point.parameter), max(self.seen[1], point.parameter)), self.points + 1
+        low, high = np.clip(self.seen, *self.bounds)
+        share = max((high - low) / (self.bounds[1] - self.bounds[0]), self.points / self.most_points)
         what = ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, point.parameters, strict=True))
-        self.progress(min(1.0, max(share, self.points / self.most_points)), what)
+        self.progress(min(1.0, float(share)), what)
 
 
 @dataclass
 class Continuation(Generic[P]):
     """One direction of a curve while it is being followed."""
 
-    bounds: np.ndarray  # (k, 2): the least and the largest value of each parameter
+    bounds: Bounds
     events: Events[P]
     steps: StepSettings = STEPS
-    names: tuple[str, ...] = ()  # of the parameters; with several, the end on a bound says which one it is
     watch: Callable[[P], object] = lambda point: None
     points: list[P] = field(default_factory=list)
     special: list[Zero[P]] = field(default_factory=list)
@@ -133,19 +137,19 @@ class Continuation(Generic[P]):
     def _on_a_bound(self, point: P) -> End | None:
         """The end of a curve that starts on a bound and leads beyond it."""
         tangent = point.tangent[-len(self.bounds) :]
-        for i, ((low, high), value, rate) in enumerate(zip(self.bounds, point.parameters, tangent, strict=True)):
+        for (name, (low, high)), value, rate in zip(self.bounds.items(), point.parameters, tangent, strict=True):
             if (value <= low and rate < 0.0) or (value >= high and rate > 0.0):
-                return self._bound(i, value)
+                return self._bound(name, value)
         return None
 
-    def _bound(self, index: int, value: float) -> End:
-        return End(CurveEnd.BOUND, float(value), detail=f"{self.names[index]} = " if len(self.bounds) > 1 else "")
+    def _bound(self, name: str, value: float) -> End:
+        return End(CurveEnd.BOUND, float(value), detail=f"{name} = " if len(self.bounds) > 1 else "")
 
     def _beyond(self, a: P, b: P) -> tuple[P, End] | None:
         """The point on the first bound that a step goes over or ends on, and the end there."""
         start, chord = a.parameters, b.parameters - a.parameters
         shares = []
-        for i, (low, high) in enumerate(self.bounds):
+        for i, (low, high) in enumerate(self.bounds.values()):
             for bound, passed in ((low, b.parameters[i] < low), (high, b.parameters[i] > high)):
                 if passed and chord[i] != 0.0:
                     shares.append(((bound - start[i]) / chord[i], i, bound))
@@ -155,7 +159,7 @@ class Continuation(Generic[P]):
         share, index, bound = min(shares)
         guess, place = a.place + share * (b.place - a.place), index - len(self.bounds)
         guess[place] = bound
-        return a.curve.solve_at(guess, b.place - a.place, place) or b, self._bound(index, bound)
+        return a.curve.solve_at(guess, b.place - a.place, place) or b, self._bound(list(self.bounds)[index], bound)
 
     def _closes(self, a: P, b: P) -> bool:
         """Whether a step goes by the first point of the curve, in the direction in which the curve was followed there."""

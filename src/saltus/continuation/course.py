@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Generic
 
-import numpy as np
-
-from saltus.continuation.continuation_loop import Continuation, Watch
+from saltus.continuation.continuation_loop import Bounds, Continuation, Watch
 from saltus.continuation.curve import P
 from saltus.continuation.end import CurveEnd, End
 from saltus.continuation.events import Events
@@ -31,17 +29,16 @@ class Course(Generic[P]):
 def both_ways(
     first: P,
     events: Callable[[], Events[P]],
-    bounds: np.ndarray,
+    bounds: Bounds,
     *,
     steps: StepSettings = STEPS,
-    names: tuple[str, ...] = (),
     progress: Progress = silent,
 ) -> Course[P]:
     """The curve through a point, followed against its tangent and then along it, or once if it closes."""
-    watch: Watch[P] = Watch(progress, names, bounds, steps.most_points)
+    watch: Watch[P] = Watch(progress, bounds, steps.most_points)
     runs = []
     for point in (first.turned(), first):
-        run: Continuation[P] = Continuation(bounds, events(), steps, names, watch)
+        run: Continuation[P] = Continuation(bounds, events(), steps, watch)
         run.follow(point)
         assert run.end is not None
         if run.end.reason is CurveEnd.CLOSED:

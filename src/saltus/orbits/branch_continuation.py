@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from saltus.checks import check_along, check_bounds, check_path
 from saltus.continuation import STEPS, Continuation, Course, End, StepSettings, both_ways
 from saltus.errors import ParameterError
@@ -51,7 +49,7 @@ def continue_orbit(
         ParameterError: an unknown parameter, bounds that exclude the orbit.
     """
     low, high = _checked(orbit, path, bounds)
-    limits: dict[str, Any] = {"bounds": np.array([[low, high]]), "names": (path,), "progress": progress}
+    limits: dict[str, Any] = {"bounds": {path: (low, high)}, "progress": progress}
     if isinstance(orbit, RestingOrbit):
         family, steps = first_point(orbit, path, (low, high)), replace(RESTING_STEPS, longest=step, first=0.1 * step)
         return Branch.of(path, both_ways(family, lambda: RestingEvents(functions or {}), steps=steps, **limits))
@@ -72,7 +70,7 @@ def follow_stable(orbit: PeriodicOrbit, path: str, target: float) -> Branch:
     else:
         first, events = start(*along(orbit, path), scale=high - low), BranchEvents(while_stable=True)
         steps = NEARBY_STEPS
-    run = Continuation(np.array([[low, high]]), events, steps, (path,))
+    run = Continuation({path: (low, high)}, events, steps)
     return _followed(run, first if target > value else first.turned(), START)
 
 
@@ -86,7 +84,7 @@ def follow_from(
 ) -> Branch:
     """The branch that begins at a special point of another one, in the direction of its tangent."""
     path = first.orbit.problem.paths[0]
-    run = Continuation(np.array([bounds]), BranchEvents(functions or {}, until), _steps(step), (path,))
+    run = Continuation({path: bounds}, BranchEvents(functions or {}, until), _steps(step))
     return _followed(run, first, origin, born=True)
 
 
@@ -94,7 +92,7 @@ def _followed(run: Continuation, first: Any, origin: End, born: bool = False) ->
     """The branch of one direction, from where it begins."""
     run.follow(first, born)
     assert run.end is not None
-    path = run.names[0]
+    (path,) = run.bounds
     course = Course(tuple(run.points), tuple(run.special), (origin, run.end), tuple(run.missed))
     return replace(Branch.of(path, course), origin=origin)
 

@@ -115,9 +115,8 @@ def continue_special(
     course = both_ways(
         start,
         lambda: CurveEvents(special.kind),
-        np.array(limits),
+        {first_path: limits[0], path: limits[1]},
         steps=replace(STEPS, longest=step),
-        names=(first_path, path),
         progress=progress,
     )
     found = special_points(course.special)

@@ -1,0 +1,242 @@
+"""The loop of a continuation on curves whose points, folds and ends are known in closed form."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from saltus.continuation import (
+    STEPS,
+    Corrected,
+    CurveEnd,
+    Cut,
+    End,
+    EndReason,
+    EquationCurve,
+    Events,
+    NaturalCurve,
+    Point,
+    bisected,
+    both_ways,
+    located,
+    newton,
+    solved_at,
+)
+from saltus.continuation import TestFunction as Function  # whose name pytest would take for that of a test
+
+FOLD = Function("fold", lambda point: float(point.tangent[-1]))
+
+
+@dataclass(frozen=True)
+class Values:
+    """Equations at a place."""
+
+    residual: np.ndarray
+    matrix: np.ndarray
+
+    def derivatives(self) -> np.ndarray:
+        return self.matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Explicit(EquationCurve[Point]):
+    """A curve given by functions of a place, with all weights 1."""
+
+    function: Callable[[np.ndarray], np.ndarray]
+    slopes: Callable[[np.ndarray], np.ndarray]
+    size: int = 2
+    count: int = 1
+
+    @property
+    def weights(self):
+        return np.ones(self.size)
+
+    def evaluate(self, place, thorough):
+        return Values(np.atleast_1d(self.function(place)), np.atleast_2d(self.slopes(place)))
+
+    def point_at(self, found, tangent):
+        return Point(self, found.place, tangent, found.iterations)
+
+    def start(self, *place):
+        """The point at a place, to be followed along the kernel of the derivatives."""
+        place = np.array(place, dtype=float)
+        return self.along_kernel(Corrected(place, self.evaluate(place, True), 0))
+
+
+class Folds(Events[Point]):
+    """Folds, and nothing else."""
+
+    keeps_special = True
+
+    def tests(self, point):
+        return (FOLD,)
+
+
+def circle():
+    return Explicit(lambda z: z @ z - 1.0, lambda z: 2.0 * z)
+
+
+def cubic():
+    """p = y - y^3, with folds at y = +-1 / sqrt(3)."""
+    return Explicit(lambda z: z[1] - z[0] + z[0] ** 3, lambda z: np.array([3.0 * z[0] ** 2 - 1.0, 1.0]))
+
+
+WIDE = {"p": (-9.0, 9.0)}
+
+
+def test_a_loop_closes_in_its_first_point_with_both_folds():
+    found = both_ways(circle().start(0.6, 0.8), Folds, WIDE)
+    assert found.ends == (End(CurveEnd.CLOSED), End(CurveEnd.CLOSED))
+    assert found.points[0] is found.points[-1]
+    assert sorted(zero.point.parameter for zero in found.special) == pytest.approx([-1.0, 1.0], abs=1e-13)
+    assert not found.missed
+    places = np.array([point.place for point in found.points])
+    assert np.abs(np.hypot(*places.T) - 1.0).max() < 1e-13
+    turned = np.unwrap(np.arctan2(places[:, 1], places[:, 0]))
+    assert abs(turned[-1] - turned[0]) == pytest.approx(2.0 * math.pi)
+
+
+@pytest.mark.parametrize("longest", [0.02, 0.1, 0.5])
+def test_folds_do_not_depend_on_the_step(longest):
+    found = both_ways(cubic().start(0.0, 0.0), Folds, {"p": (-1.0, 1.0)}, steps=replace(STEPS, longest=longest))
+    size = 2.0 / 3.0**1.5
+    assert sorted(zero.point.parameter for zero in found.special) == pytest.approx([-size, size], abs=1e-14)
+    for zero in found.special:
+        assert zero.evidence.before * zero.evidence.after < 0.0
+        assert zero.evidence.bracket < 1e-10
+    assert {end.parameter for end in found.ends} == {-1.0, 1.0}
+    assert {end.reason for end in found.ends} == {CurveEnd.BOUND}
+
+
+def test_all_solutions_at_a_value():
+    found = both_ways(cubic().start(0.0, 0.0), Folds, {"p": (-1.0, 1.0)})
+    roots = np.sort(np.roots([1.0, 0.0, -1.0, 0.2]).real)
+    assert sorted(point.place[0] for point in solved_at(found.points, 0.2)) == pytest.approx(roots, abs=1e-13)
+    assert [point.parameter for point in solved_at(found.points, found.points[-1].parameter)] == [found.points[-1].parameter]
+    assert solved_at(found.points, 1.5) == []
+
+
+def test_two_parameters_and_which_bound_is_met():
+    """The line where a plane cuts a sphere, from bound to bound."""
+    sphere = Explicit(
+        lambda z: np.array([z @ z - 1.0, z[0] - 0.1 * z[1]]), lambda z: np.array([2.0 * z, [1.0, -0.1, 0.0]]), size=3, count=2
+    )
+    bounds = {"one": (-2.0, 0.5), "other": (-2.0, 2.0)}
+    found = both_ways(sphere.start(0.0, 0.0, 1.0), Events, bounds)
+    assert [str(end) for end in found.ends] == ["bound one = 0.5"] * 2
+    assert [point.parameters[0] for point in (found.points[0], found.points[-1])] == [0.5, 0.5]
+    assert all(abs(point.place @ point.place - 1.0) < 1e-13 for point in found.points)
+
+
+def test_a_start_on_a_bound_is_followed_inwards_only():
+    line = Explicit(lambda z: z[0] - z[1], lambda z: np.array([1.0, -1.0]))
+    found = both_ways(line.start(1.0, 1.0), Events, {"p": (0.0, 1.0)})
+    assert sorted(point.parameter for point in found.points)[-2] < 1.0
+    assert {end.parameter for end in found.ends} == {0.0, 1.0}
+
+
+def test_progress_is_the_share_of_the_range_that_was_seen():
+    heard = []
+    line = Explicit(lambda z: z[0] - z[1], lambda z: np.array([1.0, -1.0]))
+    both_ways(line.start(0.5, 0.5), Events, {"p": (0.0, 1.0)}, progress=lambda *told: heard.append(told))
+    shares = [share for share, _ in heard]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert {"p = 0", "p = 1"} <= {what for _, what in heard}
+
+
+class Corner(Events[Point]):
+    """y = p for p < 0, y = 2 p beyond: the equations change at 0."""
+
+    def __init__(self):
+        self.beyond = Explicit(lambda z: z[0] - 2.0 * z[1], lambda z: np.array([1.0, -2.0]))
+
+    def cut(self, point, ahead):
+        if point.curve is self.beyond or ahead.place[0] <= 0.0:
+            return None
+        corner = located(Function("corner", lambda point: float(point.place[0])), point, ahead)
+        return Cut(corner.point, corner)
+
+    def across(self, run, cut):
+        run.special.append(cut.special)
+        start = self.beyond.start(*cut.point.place)
+        return start if start.tangent[-1] > 0.0 else start.turned()
+
+
+def test_a_step_is_cut_where_the_equations_change_and_goes_on_with_others():
+    line = Explicit(lambda z: z[0] - z[1], lambda z: np.array([1.0, -1.0]))
+    found = both_ways(line.start(-1.0, -1.0), Corner, {"p": (-1.0, 1.0)})
+    (corner,) = found.special
+    assert (corner.kind, corner.point.parameter) == ("corner", pytest.approx(0.0, abs=1e-14))
+    assert max(point.place[0] for point in found.points) == pytest.approx(2.0, abs=1e-13)
+    assert solved_at(found.points, 0.5)[0].place[0] == pytest.approx(1.0, abs=1e-13)
+
+
+def test_where_no_step_is_short_enough_the_end_says_so():
+    spike = Explicit(
+        lambda z: z[1] - abs(z[0]) ** 0.5, lambda z: np.array([-0.5 * np.sign(z[0]) / max(abs(z[0]), 1e-300) ** 0.5, 1.0])
+    )
+    found = both_ways(spike.start(1.0, 1.0), Events, WIDE, steps=replace(STEPS, most_points=2000))
+    assert {end.reason for end in found.ends} == {CurveEnd.NO_STEP, CurveEnd.BOUND}
+    assert min(abs(point.parameter) for point in found.points) < 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Root(NaturalCurve[Point]):
+    """y = sqrt(0.3 - p) as far as there is one."""
+
+    bounds: tuple[float, float] = (-1.0, 1.0)
+    scale: float = 1.0
+
+    def at(self, value):
+        return None if value > 0.3 else Point(self, np.array([value]), np.array([self.scale]), 0)
+
+    def turn(self, a, b):
+        return abs((0.3 - a.parameter) ** 0.5 - (0.3 - b.parameter) ** 0.5)
+
+
+class EndOfRoot(Events[Point]):
+    """The end where there is no solution left."""
+
+    def stalled(self, run, point, step):
+        last, beyond = bisected(point, point.curve.ahead(point, step), lambda other: True)
+        run.points.append(last)
+        assert abs(beyond - last.parameter) < 1e-12
+        return End(CurveEnd.NO_STEP, last.parameter, detail="root")
+
+
+def test_a_natural_curve_is_followed_by_its_parameter_to_where_it_ends():
+    curve = Root()
+    found = both_ways(curve.at(0.0), EndOfRoot, {"p": (-1.0, 1.0)}, steps=replace(STEPS, most=0.2, aim=0.06, least=1e-6))
+    assert found.points[0].parameter == -1.0
+    assert found.ends[0] == End(CurveEnd.BOUND, -1.0)
+    assert found.ends[1].parameter == pytest.approx(0.3, abs=1e-12)
+    parameters = np.array([point.parameter for point in found.points])
+    assert (np.diff(parameters) > 0.0).all()
+    assert np.diff(parameters)[-2] < 0.5 * np.diff(parameters).max()  # shorter steps where the solution changes faster
+
+
+def test_reasons_are_data_and_their_text_is_a_sentence():
+    class Mine(EndReason):
+        NEAR = "comes near {detail} at {parameter:.3g}, a {kind}"
+
+    end = End(Mine.NEAR, 0.123456, "fold", "another")
+    assert str(end) == "comes near another at 0.123, a fold"
+    assert end.reason.code == "near"
+    assert end == End(Mine.NEAR, 0.123456, "fold", "another")
+
+
+def test_newton_takes_what_rounding_leaves_and_refuses_what_diverges():
+    def evaluate(place, thorough):
+        return Values(place**2 - 2.0, np.diag(2.0 * place))
+
+    def linear(found, place):
+        return found.matrix, -found.residual
+
+    found = newton(evaluate, linear, np.array([1.0, 3.0]), 12)
+    assert found.place == pytest.approx([math.sqrt(2.0)] * 2, abs=1e-15)
+    assert newton(evaluate, linear, np.array([1.0, 3.0]), 2) is None
+    assert newton(evaluate, linear, np.array([0.0, 1.0]), 12) is None
+    assert newton(lambda place, thorough: None, linear, np.array([1.0]), 12) is None
