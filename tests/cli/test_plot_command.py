@@ -58,7 +58,7 @@ def test_what_is_no_result_is_told(refused, tmp_path):
         ("cut.nc", "is no netCDF file that can be read"),
         ("folder", "is not a store: it has no zarr.json"),
         ("foreign.nc", "it does not say of what kind it is; it draws motion, phase_portrait"),
-        ("other.nc", "its kind is 'rain_fall'"),
+        ("other.nc", "its kind is 'rain fall'"),
     ):
         assert problem in refused("plot", tmp_path / name)
 

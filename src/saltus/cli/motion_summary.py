@@ -11,12 +11,6 @@ from rich.table import Table
 if TYPE_CHECKING:
     from saltus.flow import Motion
 
-ENDINGS = {
-    "horizon": "the time asked for is over",
-    "rest": "the time asked for is over, at rest",
-    "limit": "a limit is reached",
-}
-
 
 def print_summary(motion: Motion, console: Console) -> None:
     """Print the end state, the impacts, why the motion ended, and whether the mechanism could follow it."""
@@ -38,7 +32,7 @@ def _state(motion: Motion) -> list[tuple[str, str]]:
         rows.append((f"{name}' at the end", f"{velocity:.15g}"))
     period = motion.system.load.period
     count = "" if period is None else f", {(motion.time - motion.start) / period:.6g} forcing periods"
-    end = ENDINGS[motion.stop.value] + (f": {motion.limit}" if motion.limit else "")
+    end = motion.stop.meaning + (f": {motion.limit}" if motion.limit else "")
     return [("end", end), ("time", f"{motion.start:.12g} to {motion.time:.12g}{count}"), *rows]
 
 

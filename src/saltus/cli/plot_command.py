@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +10,14 @@ from rich.console import Console
 from saltus.errors import ParameterError
 
 DRAWN = {
-    "motion": "motion:draw_motion",
-    "phase_portrait": "plane:draw_plane",
-    "response_spectrum": "diagram:draw_diagram",
-    "bifurcation_diagram": "diagram:draw_diagram",
-    "attractors": "attractors:draw_attractors",
-    "basins": "basins:draw_basins",
-    "stability_chart": "chart:draw_stability_chart",
-}  # modules and functions of `saltus.plots`
+    "motion": "draw_motion",
+    "phase_portrait": "draw_plane",
+    "response_spectrum": "draw_diagram",
+    "bifurcation_diagram": "draw_diagram",
+    "attractors": "draw_attractors",
+    "basins": "draw_basins",
+    "stability_chart": "draw_stability_chart",
+}  # functions of `saltus.plots`
 
 
 def plot_store(path: Path, output: Path | None) -> None:
@@ -42,20 +41,18 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     Raises:
         ParameterError: it is of no kind that has a picture, or lacks what its kind has.
     """
+    from saltus import plots
     from saltus.files import write_figure
-    from saltus.plots import style
 
     kind = kind_of(data)
     if kind not in DRAWN:
         what = f"its kind is {kind!r}" if kind else "it does not say of what kind it is"
         raise ParameterError(f"{path} is no result that `saltus plot` draws: {what}; it draws {', '.join(DRAWN)}")
-    module, name = DRAWN[kind].split(":")
-    draw = getattr(import_module(f"saltus.plots.{module}"), name)
     try:
-        figure = draw(data)
+        figure = getattr(plots, DRAWN[kind])(data)
     except (LookupError, AttributeError, StopIteration) as error:
         raise ParameterError(f"{path} says that it is of the kind {kind!r}, but lacks {error}; compute it again") from error
-    with style():
+    with plots.style():
         return write_figure(stem, figure)
 
 
@@ -97,6 +94,5 @@ def _first_line(error: Exception) -> str:
 
 
 def kind_of(data: Any) -> str:
-    """What a result says that it is, in its attributes."""
-    kind = str(data.attrs.get("kind", "")) or str(data.attrs.get("title", "")).removesuffix(" computed by saltus")
-    return kind.replace(" ", "_")
+    """What a result is, by its attributes; empty where they do not name it."""
+    return str(data.attrs.get("kind", ""))

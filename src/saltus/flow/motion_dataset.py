@@ -38,7 +38,7 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
     for name in ("time", "velocity_before", "velocity_after"):
         unit = "1" if name == "time" else motion.system.model.unit_of(names[0])
         dataset[f"impact_{name}"] = ("impact", getattr(impacts, name), {"units": unit})
-    dataset.attrs = {"title": "motion computed by saltus"} | provenance(motion.system, tol=motion.tol)
+    dataset.attrs = {"title": "motion computed by saltus", "kind": "motion"} | provenance(motion.system, tol=motion.tol)
     dataset.attrs |= {
         "stop": motion.stop.value + (f" ({motion.limit})" if motion.limit else ""),
         "end_time": motion.time,

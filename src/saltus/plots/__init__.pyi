@@ -1,12 +1,15 @@
-from .chart import chart_legend, curves_of, data_is_tree, draw_chart, draw_closed_form, draw_lines
+from .attractors import draw_attractors
+from .basins import draw_basins
+from .chart import chart_legend, curves_of, data_is_tree, draw_chart, draw_closed_form, draw_lines, draw_stability_chart
 from .conventions import DOUBLE_COLUMN, FAINT, SINGLE_COLUMN, STABLE, UNSTABLE, new_figure, panel_label, style, styled
-from .diagram import POINTS
+from .diagram import POINTS, draw_diagram
 from .energy_space import draw_space
 from .impact_approach import draw_history, draw_phase
 from .loading_paths import draw_domain, draw_path
 from .motion import draw_motion
 from .peak_ratio import draw_family
 from .phase_portrait import draw_portrait
+from .plane import draw_plane
 from .response import (
     draw_bands,
     draw_critical,
@@ -31,11 +34,14 @@ __all__ = [
     "chart_legend",
     "curves_of",
     "data_is_tree",
+    "draw_attractors",
     "draw_bands",
+    "draw_basins",
     "draw_cell",
     "draw_chart",
     "draw_closed_form",
     "draw_critical",
+    "draw_diagram",
     "draw_domain",
     "draw_errors",
     "draw_family",
@@ -49,9 +55,11 @@ __all__ = [
     "draw_path",
     "draw_periods",
     "draw_phase",
+    "draw_plane",
     "draw_portrait",
     "draw_response",
     "draw_space",
+    "draw_stability_chart",
     "draw_zoom",
     "highest",
     "label_deformed",

@@ -105,7 +105,12 @@ class ChartRequest:
         from saltus.sweep import Plan
 
         more = {name: getattr(self, name) for name in NUMBERS if name not in ("tol", "seed")}
-        more |= {"path": list(self.paths), "window": np.ravel(self.window).tolist(), "coordinate": self.coordinate}
+        more |= {
+            "kind": "stability_chart",
+            "path": list(self.paths),
+            "window": np.ravel(self.window).tolist(),
+            "coordinate": self.coordinate,
+        }
         return Plan(
             function=CELLS,
             arguments=self.to_arguments(),
