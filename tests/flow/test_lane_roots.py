@@ -6,10 +6,8 @@ from numba import njit, types
 
 from saltus.flow.ensemble.lane_layout import HIGHEST_ORDER, LOWEST_ORDER, POSITIONS, STRIDE, VELOCITIES
 from saltus.flow.ensemble.lane_steps import motion_at, only_root
-from saltus.taylor.private_numba import OPTIONS
-from saltus.taylor.vectors import (
+from saltus.taylor.lane_vectors import (
     ALL,
-    WIDTH,
     load,
     rough_exp2,
     rough_inverse,
@@ -17,6 +15,8 @@ from saltus.taylor.vectors import (
     rough_root,
     store,
 )
+from saltus.taylor.private_numba import OPTIONS
+from saltus.taylor.vectors import WIDTH
 
 EPS = 2.0**-52
 H = 0.7  # the step

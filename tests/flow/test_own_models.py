@@ -150,13 +150,13 @@ class Tabulated(Model):
 
 
 def test_an_array_in_a_model_is_not_taken_from_another_one():
-    from interpreted import Interpreted
+    from generated_functions import Generated
 
     from saltus.flow.simulation import structure_key
 
     one, four = (System(model=Tabulated(factors=np.array([f]))) for f in (1.0, 4.0))
     assert structure_key(one) != structure_key(four)
-    assert [Interpreted(s).coefficients(0.0, 0.5, 0.0, 3)[0, 2] for s in (one, four)] == [-0.25, -1.0]
+    assert [Generated(s).coefficients(0.0, 0.5, 0.0, 3)[0, 2] for s in (one, four)] == [-0.25, -1.0]
 
 
 @pytest.mark.parametrize(("gap", "message"), [("1 - x**2", "one contact point, not two stops"), ("2 - x", "must be 0 at")])

@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
+from generated_functions import Generated
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from interpreted import Interpreted
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 from scipy_motion import by_scipy
@@ -263,7 +263,7 @@ def test_records_of_different_spans_and_kinds_are_read_together():
         ground_vertical=Record(GROUND_TIMES, GROUND, "displacement") + Record([1.0, 4.0], [0.2, -0.1], "acceleration"),
     )
     system = System(model=Metainterface(beta0=1.3, mass_ratio=0.4), load=load, impact=EnergyRestitution(0.9))
-    generated = Interpreted(system)
+    generated = Generated(system)
     breaks = generated.env[2]
     assert breaks == pytest.approx(np.unique(np.concatenate([[-1, 0.5, 2, 0, 3.5, 0.2, 0.9, 1.7, 2.4, 1, 4], GROUND_TIMES])))
     for t in np.concatenate([[-5.0], 0.5 * (breaks[1:] + breaks[:-1]), [9.0]]):

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from interpreted import Interpreted
+from generated_functions import Generated
 
+from saltus.flow.event_derivatives import saltation
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,
@@ -19,7 +20,7 @@ from saltus.systems import (
     WallOscillator,
 )
 from saltus.systems.parameters import numbers
-from saltus.taylor import derivatives as tangent
+from saltus.taylor.derivatives import tangent_leaves
 from saltus.taylor.graph import Expr, differentiate, ordered
 from saltus.taylor.tracing import record_table, trace
 
@@ -109,12 +110,12 @@ def test_the_saltation_is_the_derivative_of_the_jump(name):
     t, period = 2.3, 2 * math.pi / system.load.frequency
     traced = trace(system, (), paths)
     assert (traced.dof, traced.columns) == (1, 2 + len(paths))
-    jumps = tangent.saltation(traced)
+    jumps = saltation(traced)
     origin = 3 * period  # the kernel's time is t - origin
     leaves = {("parameter", i): x for i, (_, x) in enumerate(numbers(system))}
     leaves |= {"time": t - origin, "origin": origin, "side": float(side), ("velocity", 0): before}
     for j, expected in enumerate(columns(system, side, t, before, paths)):
-        (u,), (z,) = tangent.leaves(traced, j)
+        (u,), (z,) = tangent_leaves(traced, j)
         start = {("coordinate", u.value): float(j == 0), ("velocity", z.value): float(j == 1)}
         computed = [value(part[j], leaves | start) for part in (jumps.coordinate, jumps.velocity, jumps.shift)]
         np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-9, err_msg=f"column {j}")
@@ -126,12 +127,12 @@ def test_the_determinant_of_the_saltation_is_that_of_the_law(name):
     if name == "wall":  # the point of contact does not move: it is no parameter here
         system = system.with_({"model.wall": 0.0})
     traced = trace(system, (), ())
-    jumps = tangent.saltation(traced)
+    jumps = saltation(traced)
     leaves = {("parameter", i): x for i, (_, x) in enumerate(numbers(system))}
     leaves |= {"time": 0.4, "origin": 0.0, "side": float(side), ("velocity", 0): before}
     matrix = np.zeros((2, 2))
     for j in (0, 1):
-        (u,), (z,) = tangent.leaves(traced, j)
+        (u,), (z,) = tangent_leaves(traced, j)
         start = leaves | {("coordinate", u.value): float(j == 0), ("velocity", z.value): float(j == 1)}
         matrix[:, j] = value(jumps.coordinate[j], start), value(jumps.velocity[j], start)
     after = system.model.reset(0.4, before, side, system.load, system.impact)[1]
@@ -144,8 +145,8 @@ def test_the_series_of_the_columns_are_those_of_the_differences():
     load = Load(frequency=0.9, horizontal=Harmonic(0.3), vertical=-0.5)
     system = System(model=TwoLayer(beta0=1.4, damping=0.1, mass_ratio=0.4), load=load)
     position, velocity, order = np.array([0.3, -0.5]), np.array([0.7, 0.2]), 8
-    own = Interpreted(system)
-    extended = Interpreted(system, sensitivities=())
+    own = Generated(system)
+    extended = Generated(system, sensitivities=())
     u, z = np.eye(4)[:, :2].ravel(), np.eye(4)[:, 2:].ravel()
     computed = extended.coefficients(0.4, [*position, *u], [*velocity, *z], order)
     np.testing.assert_array_equal(computed[:2], own.coefficients(0.4, position, velocity, order))

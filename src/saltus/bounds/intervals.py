@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.taylor import Expr, ordered
+from saltus.taylor import FUNCTIONS, Expr, ordered
 
 ROUNDING = 2.0**-51  # relative, four times that of + - * / and sqrt: a literal factor such as 1/3 may be rounded too
 LIBRARY = 2.0**-48  # relative, of the elementary functions: NumPy promises 4 units in the last place
@@ -109,7 +109,8 @@ def enclose(roots: list[Expr], leaf: Callable[[Expr], Interval]) -> list[Interva
 def _apply(node: Expr, x: list[Interval]) -> Interval:
     if node.op == "mul" and node.args[0] is node.args[1]:
         return x[0].square()
-    return _OPERATIONS[node.op](*x)
+    known = _OPERATIONS.get(node.op)
+    return Interval(np.nan) if known is None else known(*x)  # NaN: nothing is known
 
 
 def _increasing(function: Any) -> Callable[[Interval], Interval]:
@@ -171,16 +172,12 @@ def _where(condition: Interval, x: Interval, y: Interval) -> Interval:
 
 
 _OPERATIONS: dict[str, Callable[..., Interval]] = {
+    **{name: _increasing(function.numpy) for name, function in FUNCTIONS.items() if function.increasing},
     "add": Interval.__add__,
     "sub": Interval.__sub__,
     "mul": Interval.__mul__,
     "div": Interval.__truediv__,
     "pow": _pow,
-    "sqrt": _increasing(np.sqrt),
-    "exp": _increasing(np.exp),
-    "log": _increasing(np.log),
-    "sinh": _increasing(np.sinh),
-    "tanh": _increasing(np.tanh),
     "cosh": _cosh,
     "sin": _wave(np.sin, math.pi / 2),
     "cos": _wave(np.cos, 0.0),

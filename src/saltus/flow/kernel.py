@@ -1,8 +1,8 @@
 """The robust scalar flow: arcs, impacts, rest and release, accumulations of impacts, chatter.
 
 The texts of `layout.py`, `roots.py`, `steps.py`, `contact.py`, `chatter.py` and this file are compiled as one, once for every
-model: the functions that `emit.py` generates for a structure, `series`, `contact_series`, `reset` and `contact_damping`, are
-arguments. So these files are plain loops under the decorator `jit`, and share one namespace.
+model: the functions that are generated for a structure (see `compiled.py`), `series`, `contact_series`, `reset` and
+`contact_damping`, are arguments. So these files are plain loops under the decorator `jit`, and share one namespace.
 
 A motion is in one of four modes. ARC: a smooth motion on one side. CONTACT: at the contact, to be decided. REST: held at the
 contact until an acceleration points outward. CHATTER: impacts without loss, too small and too many to follow one by one.
@@ -25,6 +25,7 @@ import numpy as np
 
 from saltus.flow.chatter import chatter_decay
 from saltus.flow.contact import contact_accelerations, decide, hold, impact, leading, rate_of
+from saltus.flow.function_types import ADVANCE
 from saltus.flow.kernel_layout import (
     ARC,
     BATCH,
@@ -70,7 +71,7 @@ from saltus.flow.kernel_layout import (
 )
 from saltus.flow.roots import NEVER, SIMPLE, first_root, horner, scale_gap
 from saltus.flow.steps import column_step, leaps, record_event, record_shift, record_step, step_size
-from saltus.taylor import ADVANCE, jit
+from saltus.taylor import jit
 from saltus.taylor import not_here as cached_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

@@ -12,10 +12,11 @@ import math
 import numpy as np
 
 from saltus.flow.contact import rate_of
+from saltus.flow.function_types import IMPACT_EQUATIONS, SEGMENTS
 from saltus.flow.kernel_layout import COLUMNS, DOF, ORDER, OWN, RESET_SLOPES, ROUGHER, ROWS, SIDES, STATE, STEEP, STOPS, TOLERANCE
 from saltus.flow.roots import DEPTH, NARROW, NOISE, horner, newton, scale_gap, split, to_bernstein, variations
 from saltus.flow.steps import column_step, leaps, step_size
-from saltus.taylor import IMPACT_EQUATIONS, SEGMENTS, jit
+from saltus.taylor import jit
 from saltus.taylor import not_here as cached_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

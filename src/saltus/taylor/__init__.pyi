@@ -1,27 +1,9 @@
 from .cache import cache_directory, compiled_part, digest, is_compiled, load_module, module_name
-from .derivatives import FREQUENCY
-from .graph import Expr, differentiate, number, ordered, substitute
-from .memory_layout import (
-    FIRST_PART,
-    HIGHEST_ORDER,
-    LOWEST_ORDER,
-    SERIES_LENGTH,
-    EventCode,
-    LanePart,
-    LaneSlot,
-    ReleaseDetail,
-    RestDetail,
-    StatePlace,
-)
-from .private_numba import ADVANCE, IMPACT_EQUATIONS, SEGMENTS, Pointer, inline_jit, jit, lean_jit, not_here
-from .records import anchor, expand_record
-from .scalar_source import Emitter
-from .tracing import Trace, record_table, trace
-from .vector_functions import Slots
-from .vectors import (
+from .derivatives import FREQUENCY, derivative_along, partial_derivative, tangent_leaves, time_derivative
+from .generated import Case, function_text, generated_header
+from .graph import RECORD_WIDTH, Expr, differentiate, is_steep, number, ordered, substitute
+from .lane_vectors import (
     ALL,
-    CACHE_LINE,
-    WIDTH,
     absolute,
     bits,
     first_lane,
@@ -41,42 +23,44 @@ from .vectors import (
     vector_lane,
     with_lane,
 )
+from .memory import Places
+from .private_numba import entry_point, inline_jit, jit, lean_jit, not_here, pointer, pointers
+from .records import anchor, expand_record
+from .rules import FUNCTIONS
+from .series import Rows
+from .tapes import shared_constants, tape
+from .tracing import Trace, record_table, trace
+from .vectors import CACHE_LINE, WIDTH
 
 __all__ = [
-    "ADVANCE",
     "ALL",
     "CACHE_LINE",
-    "FIRST_PART",
     "FREQUENCY",
-    "HIGHEST_ORDER",
-    "IMPACT_EQUATIONS",
-    "LOWEST_ORDER",
-    "SEGMENTS",
-    "SERIES_LENGTH",
+    "FUNCTIONS",
+    "RECORD_WIDTH",
     "WIDTH",
-    "Emitter",
-    "EventCode",
+    "Case",
     "Expr",
-    "LanePart",
-    "LaneSlot",
-    "Pointer",
-    "ReleaseDetail",
-    "RestDetail",
-    "Slots",
-    "StatePlace",
+    "Places",
+    "Rows",
     "Trace",
     "absolute",
     "anchor",
     "bits",
     "cache_directory",
     "compiled_part",
+    "derivative_along",
     "differentiate",
     "digest",
+    "entry_point",
     "expand_record",
     "first_lane",
     "fma",
+    "function_text",
+    "generated_header",
     "inline_jit",
     "is_compiled",
+    "is_steep",
     "jit",
     "lane_count",
     "lean_jit",
@@ -89,15 +73,22 @@ __all__ = [
     "not_here",
     "number",
     "ordered",
+    "partial_derivative",
+    "pointer",
+    "pointers",
     "record_table",
     "rough_exp2",
     "rough_inverse",
     "rough_log2",
     "rough_root",
     "select",
+    "shared_constants",
     "splat",
     "store",
     "substitute",
+    "tangent_leaves",
+    "tape",
+    "time_derivative",
     "trace",
     "vector_lane",
     "with_lane",

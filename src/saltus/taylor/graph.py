@@ -11,24 +11,20 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import TraceError
+from saltus.taylor.rules import FUNCTIONS
 
 # What a reset, evaluated at one instant, may use besides the operations that have a Taylor recurrence.
 POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
 LEAVES = ("number", "parameter", "time", "origin", "side", "coordinate", "velocity", "acceleration", "record")
+RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
 
 ALLOWED = (
-    "+ - * /, powers, NumPy's sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, and abs of the coordinate "
-    "(the sign of the coordinate is `side`)"
+    f"+ - * /, powers, NumPy's {', '.join(function.numpy.__name__ for function in FUNCTIONS.values())}, tan, and abs of the "
+    "coordinate (the sign of the coordinate is `side`)"
 )
-_SAME = "sqrt exp log sin cos tan sinh cosh tanh maximum minimum greater less greater_equal less_equal absolute negative positive"
-UFUNCS = {name: name for name in _SAME.split()} | {
-    "add": "add",
-    "subtract": "sub",
-    "multiply": "mul",
-    "divide": "div",
-    "power": "pow",
-    "square": "square",
-}
+ARITHMETIC = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow"}  # NumPy's names, and ours
+_AS_THEY_ARE = ("tan", "square", "absolute", "negative", "positive", *POINTWISE)
+UFUNCS = ARITHMETIC | {name: name for name in _AS_THEY_ARE} | {f.numpy.__name__: name for name, f in FUNCTIONS.items()}
 
 
 class Expr:
@@ -145,22 +141,21 @@ class Expr:
 
 def _degree(op: str, args: tuple[Expr, ...]) -> int | None:
     """The degree in the time of the node's Taylor series, or None where it does not end."""
-    if op in ("number", "parameter", "origin", "side"):
-        return 0
     if op in ("coordinate", "velocity", "acceleration"):
         return None
-    if op in ("time", "record"):
-        return 1 if op == "time" else 4
-    degrees = [a.degree for a in args]
+    if op in LEAVES:
+        return {"time": 1, "record": RECORD_WIDTH - 1}.get(op, 0)
+    return degree(op, [a.degree for a in args])
+
+
+def degree(op: str, degrees: list[int | None]) -> int | None:
+    """The degree of what an operation makes of series of these degrees, or None where it does not end."""
     if all(d == 0 for d in degrees):
         return 0
-    if None in degrees or op not in ("add", "sub", "mul", "div"):
+    a, b = degrees[0], degrees[-1]
+    if a is None or b is None or op not in ("add", "sub", "mul", "div") or (op == "div" and b > 0):
         return None
-    if op in ("add", "sub"):
-        return max(d for d in degrees if d is not None)
-    if op == "mul":
-        return sum(d for d in degrees if d is not None)
-    return degrees[0] if degrees[1] == 0 else None
+    return a + b if op == "mul" else max(a, b)
 
 
 def number(value: float) -> Expr:
@@ -198,6 +193,8 @@ def combine(op: str, *operands: Any) -> Expr:
         return args[0]
     if op == "div" and values[0] == 0.0:
         return number(0.0)
+    if op == "where" and values[0] is not None:
+        return args[1] if values[0] else args[2]
     return Expr(op, args)
 
 
@@ -245,8 +242,11 @@ def _apply(name: str, inputs: tuple[Any, ...]) -> Expr:
 
 
 def _numeric(op: str, values: list[Any]) -> float:
-    names = {"sub": "subtract", "mul": "multiply", "div": "divide", "pow": "power"}
-    return float(getattr(np, names.get(op, op))(*values))
+    ufunc = FUNCTIONS[op].numpy if op in FUNCTIONS else getattr(np, NAMES.get(op, op))
+    return float(ufunc(*values))
+
+
+NAMES = {name: numpy for numpy, name in ARITHMETIC.items()}
 
 
 def ordered(roots: list[Expr]) -> list[Expr]:
@@ -263,6 +263,11 @@ def ordered(roots: list[Expr]) -> list[Expr]:
             stack.append((node, True))
             stack.extend((a, False) for a in reversed(node.args))
     return order
+
+
+def is_steep(roots: list[Expr]) -> bool:
+    """Whether there is a function in the roots that may bend where a series from afar does not show it."""
+    return any(node.op in FUNCTIONS and FUNCTIONS[node.op].steep and node.degree is None for node in ordered(roots))
 
 
 def substitute(root: Expr, leaves: dict[Expr, Any]) -> Expr:
@@ -290,26 +295,18 @@ def differentiate(root: Expr, leaf: Expr) -> Expr:
 def _chain(node: Expr, d: list[Expr]) -> Expr:
     """The derivative of a node from those of its operands."""
     a, b = node.args[0], node.args[-1]
+    if node.op.startswith(("greater", "less")) or all(x is number(0.0) for x in d):
+        return number(0.0)
+    if node.op in FUNCTIONS:
+        return as_expr(FUNCTIONS[node.op].slope(a, node) * d[0])
     rules: dict[str, Any] = {
         "add": lambda: d[0] + d[1],
         "sub": lambda: d[0] - d[1],
         "mul": lambda: d[0] * b + a * d[1],
         "div": lambda: (d[0] - node * d[1]) / b,
-        "pow": lambda: b * power(a, b - 1) * d[0] + (0.0 if d[1] is number(0.0) else node * combine("log", a) * d[1]),
-        "sqrt": lambda: d[0] / (2.0 * node),
-        "exp": lambda: node * d[0],
-        "log": lambda: d[0] / a,
-        "sin": lambda: combine("cos", a) * d[0],
-        "cos": lambda: -combine("sin", a) * d[0],
-        "sinh": lambda: combine("cosh", a) * d[0],
-        "cosh": lambda: combine("sinh", a) * d[0],
-        "tanh": lambda: (1.0 - node * node) * d[0],
+        "pow": lambda: b * power(a, b - 1) * d[0] + (0.0 if d[1] is number(0.0) else node * np.log(a) * d[1]),
         "where": lambda: combine("where", a, d[1], d[2]),
         "maximum": lambda: combine("where", combine("greater", a, b), d[0], d[1]),
         "minimum": lambda: combine("where", combine("less", a, b), d[0], d[1]),
     }
-    if node.op.startswith(("greater", "less")) or all(x.op == "number" and x.value == 0.0 for x in d):
-        return number(0.0)
-    if node.op not in rules:
-        raise TraceError(f"{node.op} has no derivative")
     return as_expr(rules[node.op]())

@@ -1,43 +1,91 @@
-"""The one way in which saltus compiles: numba, without Python's exceptions for division, and with fused multiply-adds.
+"""The one way in which saltus compiles, and the one file that uses what numba does not promise to keep.
 
-The kernel is compiled once and calls the functions of a structure through pointers, so their types are fixed here.
+saltus compiles with numba, without Python's exceptions for division and with fused multiply-adds. Tested with numba 0.60.0 and
+0.68.1 (see tests/taylor/test_numba_versions.py); pyproject.toml allows what lies between.
+
+What numba promises is used as its documentation has it: `njit` and its options, `types`, the first-class function types, and the
+extension interface (`intrinsic`, `register_model`, `lower_builtin`, `type_callable`). These are not promised, and each has a
+plain answer where a numba lacks it:
+
+* the option `_nrt`, which turns reference counting off: then references are counted, which costs time;
+* `FunctionCache`, its `_load_overload` and `rtsys`, with which compiled code is loaded from disk without the registries of all
+  that numba could compile: then numba's own `cache=True`;
+* `WrapperAddressProtocol` and a compile result's `library` and `entry_point`, with which a function's address is looked up once
+  and calls skip numba's dispatch: then numba looks it up, at every call.
 """
 
 from __future__ import annotations
 
+import importlib
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import product
 from typing import Any
 
+from llvmlite import ir
 from numba import njit, types
-from numba.core.caching import FunctionCache
-from numba.core.errors import NumbaExperimentalFeatureWarning
-from numba.core.runtime import rtsys
+from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
-OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
-jit: Callable[[Any], Any] = njit(**OPTIONS | {"_nrt": True})
+
+def _private(module: str, name: str) -> Any:
+    """Something of numba's that may not be there: None then."""
+    try:
+        return getattr(importlib.import_module(module), name, None)
+    except ImportError:
+        return None
+
+
+CPU_OPTIONS = _private("numba.core.cpu", "CPUTargetOptions")
+FUNCTION_CACHE = _private("numba.core.caching", "FunctionCache")
+RUNTIME = _private("numba.core.runtime", "rtsys")
+ADDRESS_PROTOCOL = _private("numba.core.types", "WrapperAddressProtocol")
+EXPERIMENTAL = _private("numba.core.errors", "NumbaExperimentalFeatureWarning")
+
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
 # For functions that make no array and that only compiled code may call: numba then counts no references, which would cost more
 # than the work between two calls, and writes no wrappers.
-_LEAN: Any = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, **OPTIONS}
-lean_jit: Callable[[Any], Any] = njit(**_LEAN)
-inline_jit: Callable[[Any], Any] = njit(**_LEAN, forceinline=True)  # for what every step of the lanes calls
+LEAN: dict[str, Any] = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-class _Kept(FunctionCache):
-    """Compiled code on disk, loaded without the registries of all that numba could compile: they take longer than all else."""
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The code for a signature, or None."""
-        rtsys.initialize(target_context)  # without which arrays cannot be counted
-        with self._guard_against_spurious_io_errors():
-            return self._load_overload(sig, target_context)
+def _njit(**options: Any) -> Callable[[Any], Any]:
+    """numba's `njit` with saltus's options and those of the given ones that this numba knows."""
+    known = {name: value for name, value in options.items() if not name.startswith("_") or hasattr(CPU_OPTIONS, name)}
+    decorator: Callable[[Any], Any] = njit(**OPTIONS | known)
+    return decorator
 
 
-def _kept(signature: Any, options: Any) -> Callable[[Any], Any]:
+jit = _njit(_nrt=True)
+lean_jit = _njit(**LEAN)
+inline_jit = _njit(**LEAN, forceinline=True)  # for what every step of the lanes calls
+
+
+# --- compiled at once, and kept on disk ------------------------------------------------------------------------------------
+
+
+def _kept(function: Any) -> Any:
+    """A cache on disk that is read without the registries of all that numba could compile; None where numba has another one."""
+    if RUNTIME is None or not hasattr(FUNCTION_CACHE, "_load_overload"):
+        return None
+
+    class Kept(FUNCTION_CACHE):  # type: ignore[misc,valid-type]
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            """The code for a signature, or None."""
+            RUNTIME.initialize(target_context)  # without which arrays cannot be counted
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
+
+    return Kept(function)
+
+
+def _compiled(signature: Any, **options: Any) -> Callable[[Any], Any]:
     def compiled(function: Any) -> Any:
-        dispatcher = njit(**options)(function)
-        dispatcher._cache = _Kept(function)
+        dispatcher = _njit(**options)(function)
+        kept = _kept(function)
+        if kept is None:
+            dispatcher.enable_caching()
+        else:
+            dispatcher._cache = kept
         dispatcher.compile(signature)
         dispatcher.disable_compile()
         return dispatcher
@@ -47,65 +95,151 @@ def _kept(signature: Any, options: Any) -> Callable[[Any], Any]:
 
 def cached_jit(signature: Any, nogil: bool = False) -> Callable[[Any], Any]:
     """Compile for one signature at once, and keep the result on disk; if asked, without Python's lock."""
-    return _kept(signature, OPTIONS | {"nogil": nogil})
+    return _compiled(signature, nogil=nogil)
 
 
-def pointed_jit(signature: Any, fused: bool = True, python: bool = False) -> Callable[[Any], Any]:
-    """The same for a function that makes no array and is called through pointers, or, if asked, from Python too.
-
-    Not fused, it has no fused multiply-adds: a law that takes the difference of two equal products must get 0, not the rounding
-    of one of them.
-    """
-    return _kept(signature, {"_nrt": False, "no_cpython_wrapper": not python, **OPTIONS} | ({} if fused else {"fastmath": False}))
-
-
-class Pointer(types.WrapperAddressProtocol):
-    """A compiled function as an argument for another one; its address is looked up once, not at every call."""
-
-    def __init__(self, function: Any) -> None:
-        (self._signature,) = function.nopython_signatures
-        result = function.get_compile_result(self._signature)
-        self._address = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
-
-    def __wrapper_address__(self) -> int:
-        return int(self._address)
-
-    def signature(self) -> Any:
-        """The function's numba signature."""
-        return self._signature
+def pointed_jit(signature: Any, python: bool = False) -> Callable[[Any], Any]:
+    """The same for a function that makes no array and is called through pointers, or, if asked, from Python too."""
+    return _compiled(signature, _nrt=False, no_cpython_wrapper=not python)
 
 
 def not_here(signature: Any, **options: Any) -> Callable[[Any], Any]:
-    """Stands for `cached_jit` where a text is only read or imported for its constants, and compiled elsewhere."""
+    """Stands for `cached_jit` where a file is only read or imported for its constants, and compiled elsewhere."""
     return lambda function: function
 
 
-_f, _i = types.float64, types.int64
-_f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
-_i1, _i2 = (types.Array(_i, n, "C") for n in (1, 2))
-ENV = types.Tuple((_f1, _f1, _f1, _f3))  # parameters, constants, record breakpoints, record table
-
-CONSTANTS = types.void(_f1, _f1)
-GEOMETRY = types.void(ENV, _f1)
-SERIES = types.void(_f, _f, _f, ENV, _i, _f2, _f2, _f2, _f1, _f2, _f2, _i)
-CONTACT_SERIES = types.void(_f, _f, _f, ENV, _i, _f1, _f2, _i)
-RESET = types.UniTuple(_f, 2)(_f, _f, _f, _f, ENV, _i)
-CONTACT_DAMPING = _f(_f, _f, _f, ENV, _i)
-TANGENT = types.void(_i, _i, _f, _f, _f, ENV, _i, _f1)
+# --- calls -----------------------------------------------------------------------------------------------------------------
 
 
 @contextmanager
 def pointers() -> Iterator[None]:
     """Within it numba does not remark that calls through pointers are experimental; the tests run every kernel through them."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
+        if EXPERIMENTAL is not None:
+            warnings.simplefilter("ignore", EXPERIMENTAL)
         yield
 
 
-with pointers():
-    _functions = [types.FunctionType(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING, TANGENT)]
-    MODEL = types.Tuple((*_functions[:4], _f1, _functions[4]))
-STEP_BUFFERS, EVENT_BUFFERS = types.Tuple((_i2, _f2, _f3)), types.Tuple((_i2, _f2))
-ADVANCE = _i(_i1, _f1, _f1, ENV, MODEL, STEP_BUFFERS, EVENT_BUFFERS)
-SEGMENTS = _i(_i1, _f1, ENV, MODEL, _f2, _i2, _f2, _f2, _f3, _f2)
-IMPACT_EQUATIONS = types.void(_f2, _f1, _f1, _f, _i, _f2, _f3, _f2, _f3, _f3, _f3)
+def entry_point(function: Any) -> Callable[..., Any]:
+    """A compiled function of one signature without numba's dispatch on the types of its arguments."""
+    (result,) = function.overloads.values()
+    entry: Callable[..., Any] = getattr(result, "entry_point", function)
+    return entry
+
+
+def pointer(function: Any) -> Any:
+    """A compiled function as an argument for another one; its address is looked up once, not at every call."""
+    if ADDRESS_PROTOCOL is None:
+        return function
+    (signature,) = function.nopython_signatures
+    result = function.get_compile_result(signature)
+    address = int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+    methods = {"__wrapper_address__": lambda self: address, "signature": lambda self: signature}
+    return type("Pointer", (ADDRESS_PROTOCOL,), methods)()
+
+
+# --- code that is written for LLVM -----------------------------------------------------------------------------------------
+
+
+class Array:
+    """A C-contiguous array in code that is written for LLVM: where its first element is, and its lengths."""
+
+    def __init__(self, context: Any, builder: Any, kind: Any, value: Any) -> None:
+        made = context.make_array(kind)(context, builder, value)
+        self.data = made.data
+        self.shape = tuple(builder.extract_value(made.shape, i) for i in range(kind.ndim))
+
+
+def _argument(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """An argument of numba's as LLVM's number, an `Array`, or a tuple of them."""
+    if isinstance(kind, types.Array):
+        return Array(context, builder, kind, value)
+    if isinstance(kind, types.BaseTuple):
+        parts = [builder.extract_value(value, i) for i in range(len(kind))]
+        return tuple(_argument(context, builder, each, part) for each, part in zip(kind, parts, strict=True))  # type: ignore[call-overload]
+    return value
+
+
+def written(write: Callable[..., list[Any]], results: int) -> Any:
+    """A function of compiled code that takes one tuple; `write(builder, *arguments)` writes LLVM's code and gives the results."""
+    double = types.float64
+    kind = (types.void, double)[results] if results < 2 else types.UniTuple(double, results)
+
+    @intrinsic
+    def function(typing: Any, arguments: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            values = write(builder, *_argument(context, builder, signature.args[0], args[0]))
+            if results > 1:
+                return context.make_tuple(builder, kind, values)
+            return values[0] if results else context.get_dummy_value()
+
+        return kind(arguments), code
+
+    return function
+
+
+def inlined(result: Any, write: Callable[..., Any], count: int) -> Any:
+    """A function of compiled code of `count` arguments; `write(builder, types, *arguments)` gives LLVM's value of its result."""
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        given = [_argument(context, builder, kind, value) for kind, value in zip(signature.args, args, strict=True)]
+        value = write(builder, signature.args, *given)
+        return context.get_dummy_value() if result == types.void else value
+
+    if count == 1:
+        return intrinsic(lambda typing, a: (result(a), code))
+    if count == 2:
+        return intrinsic(lambda typing, a, b: (result(a, b), code))
+    return intrinsic(lambda typing, a, b, c: (result(a, b, c), code))
+
+
+def register_type(kind: type, llvm: Any) -> None:
+    """Let numba keep values of one of its types in an LLVM type."""
+
+    class Model(models.PrimitiveModel):
+        def __init__(self, manager: Any, each: Any) -> None:
+            super().__init__(manager, each, llvm)
+
+    register_model(kind)(Model)
+
+
+def operator_meaning(symbol: Any, kind: type, result: Any, write: Callable[..., Any], count: int = 2) -> None:
+    """Let Python's operator mean `write` where a value of this type is among its operands; the others may be numbers.
+
+    numba's `overload` would compile a function for every pair of types.
+    """
+
+    def fits(*given: Any) -> Any:
+        own = [isinstance(each, kind) for each in given]
+        fit = any(own) and all(o or isinstance(each, types.Number) for o, each in zip(own, given, strict=True))
+        return result if fit else None
+
+    @type_callable(symbol)
+    def typer(context: Any) -> Any:
+        return {1: lambda a: fits(a), 2: lambda a, b: fits(a, b)}[count]
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return write(builder, signature.args, *args)
+
+    for kinds in product((kind, types.Number), repeat=count):
+        if kind in kinds:
+            lower_builtin(symbol, *kinds)(code)
+
+
+def stack_of_cache_lines(function: Any, line: int) -> None:
+    """Have the vectors that find no register lie in one line of the cache each, or every use would touch two.
+
+    LLVM aligns the stack by itself for variables, but not for what it finds too late to be more than the registers hold. A
+    function taken into its caller would lose the attribute.
+    """
+    function.attributes.alignstack = line
+    function.attributes.add("noinline")
+
+
+def constant_table(builder: Any, numbers: list[float]) -> Any:
+    """LLVM's pointer to an array of numbers that the code carries along."""
+    values = ir.Constant(ir.ArrayType(ir.DoubleType(), len(numbers)), numbers)
+    module = builder.module
+    table = ir.GlobalVariable(module, values.type, module.get_unique_name("numbers"))
+    table.linkage, table.global_constant, table.initializer = "internal", True, values
+    return table

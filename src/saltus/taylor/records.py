@@ -1,6 +1,6 @@
-"""Records of samples inside a kernel: pieces of polynomials, expanded or evaluated at a time.
+"""Records of samples inside a kernel: the pieces of polynomials that they are made of, expanded about a time.
 
-This text is compiled together with the functions of each structure (see `compile.py`).
+This part is compiled together with the lanes; `memory.py` runs the same functions while it writes the code of one motion.
 """
 
 from __future__ import annotations
@@ -25,12 +25,3 @@ def expand_record(coefficients, start, t, row):
     for k in range(width - 1):  # repeated synthetic division: p(x + t - start)
         for j in range(width - 2, k - 1, -1):
             row[j] += (t - start) * row[j + 1]
-
-
-@jit
-def record_value(coefficients, start, t):
-    """A record's piece at `t`."""
-    value = 0.0
-    for k in range(coefficients.size - 1, -1, -1):
-        value = value * (t - start) + coefficients[k]
-    return value

@@ -1,15 +1,68 @@
-"""The Taylor recurrences of `taylor/scalar_source.py` on tapes, for one order of one node: see `series.py`.
+"""The elementary functions, each in one rule, and the Taylor recurrences of arithmetic.
 
-A rule is given the node's own series, without the coefficient of this order, and those of its operands; it appends that
-coefficient.
+An elementary function y = f(u) is added to everything (tracing, derivatives, one motion, ensembles) by one entry of FUNCTIONS
+under the name that it has in the C library: NumPy's function, its slope f'(u) in terms of u and y, written
+with NumPy, and what else is known of it. The
+Taylor coefficients follow from y' = f'(u) u', as the slope is a series like any other,
+
+    k y_k = sum_{j=1}^{k} j u_j s_{k-j},    s = f'(u).
+
+Where a recurrence without a series of its own for the slope is known, as for the logarithm, the entry gives it. The tests go
+through the table by themselves and compare each function's coefficients with 40 digits (tests/taylor/test_series.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from saltus.taylor.series import Coefficient, Row, Series
-from saltus.taylor.vector_code import add, multiply, negative, subtract
+import numpy as np
+
+from saltus.taylor.vectors import add, multiply, subtract
+
+if TYPE_CHECKING:
+    from saltus.taylor.series import Coefficient, Row, Series
+
+Rule = Callable[..., None]  # of the writer, the node's own series, which lacks the coefficient of this order, and its operands'
+
+
+@dataclass(frozen=True)
+class Function:
+    """An elementary function y = f(u)."""
+
+    numpy: Callable[..., Any]
+    slope: Callable[[Any, Any], Any]  # f'(u) of u and y
+    increasing: bool = False  # wherever it is defined: its bounds over an interval are then its values at the ends
+    steep: bool = False  # whether it may bend sharply far from where it is expanded, by terms that are below rounding there
+    recurrence: Rule | None = None  # in place of the one that follows from the slope
+
+
+def by_slope(w: Series, own: Row, u: Row, slope: Row, factor: float, name: str) -> None:
+    """y_k = (factor/k) sum_{j=1}^{k} j u_j s_{k-j}, where f'(u) = factor s."""
+    if w.starts:
+        w.push(own, w.start(u).function(name))
+    else:
+        w.push(own, w.per_order(multiply(factor, w.product(w.scaled(u), slope, first=False))))
+
+
+def _logarithm(w: Series, own: Row, u: Row) -> None:
+    """u y' = u': k u_0 y_k = k u_k - sum_{j=1}^{k-1} j y_j u_{k-j}."""
+    if w.starts:
+        w.push(own, w.start(u).function("log"))
+    else:
+        below = w.per_order(w.product(w.scaled(own, newest=False), u, first=False, last=False))
+        w.push(own, w.over(subtract(w.now(u), below), u))
+    w.scaled(own)
+
+
+def _square_root(w: Series, own: Row, u: Row) -> None:
+    """y y = u: 2 y_0 y_k = u_k - sum_{j=1}^{k-1} y_j y_{k-j}."""
+    if w.starts:
+        w.push(own, w.start(u).function("sqrt"))
+    else:
+        above = subtract(w.now(u), w.product(own, own, first=False, last=False))
+        w.push(own, multiply(0.5, w.over(above, own)))
 
 
 def _product(w: Series, own: Row, a: Row, b: Row) -> None:
@@ -17,84 +70,34 @@ def _product(w: Series, own: Row, a: Row, b: Row) -> None:
 
 
 def _quotient(w: Series, own: Row, a: Row, b: Row) -> None:
-    above = subtract(w.now(a), w.product(b, own, first=False))
-    w.push(own, multiply(above, w.inverse(b)))
-
-
-def _derivative(w: Series, u: Row, other: Row, sign: float = 1.0) -> Coefficient:
-    """(1/k) sum_{j=1}^{k} j u_j other_{k-j}: of a series whose derivative is u' times another one, or minus that."""
-    return w.per_order(w.product(w.scaled(u), other, first=False), sign)
-
-
-def _sine(w: Series, own: Row, u: Row) -> None:
-    s, c = (w.beside(u, name, own.degree, own.early) for name in ("sin", "cos"))
-    sine, cosine = w.start(u).sin_cos() if w.starts else (_derivative(w, u, c), _derivative(w, u, s, -1.0))
-    w.push(s, sine)
-    w.push(c, cosine)
-
-
-def _hyperbolic(name: str, other: str) -> Callable[..., None]:
-    def rule(w: Series, own: Row, u: Row) -> None:
-        twin = w.beside(own, other, own.degree, own.early)
-        values = [w.start(u).lane_by_lane(f) if w.starts else _derivative(w, u, g) for f, g in ((name, twin), (other, own))]
-        w.push(own, values[0])
-        w.push(twin, values[1])
-
-    return rule
-
-
-def _hyperbolic_tangent(w: Series, own: Row, u: Row) -> None:
-    square = w.beside(own, "1 - tanh^2", own.degree, own.early)
-    w.push(own, w.start(u).lane_by_lane("tanh") if w.starts else _derivative(w, u, square))
-    below = negative(w.product(own, own))
-    w.push(square, add(1.0, below) if w.starts else below)
-
-
-def _exponential(w: Series, own: Row, u: Row) -> None:
-    w.push(own, w.start(u).lane_by_lane("exp") if w.starts else _derivative(w, u, own))
-
-
-def _logarithm(w: Series, own: Row, u: Row) -> None:
-    if w.starts:
-        w.push(own, w.start(u).lane_by_lane("log"))
-    else:
-        below = w.per_order(w.product(w.scaled(own, newest=False), u, first=False, last=False))
-        w.push(own, multiply(subtract(w.now(u), below), w.inverse(u)))
-    w.scaled(own)
-
-
-def _square_root(w: Series, own: Row, u: Row) -> None:
-    if w.starts:
-        w.push(own, w.start(u).sqrt())
-    else:
-        above = subtract(w.now(u), w.product(own, own, first=False, last=False))
-        w.push(own, multiply(multiply(0.5, w.inverse(own)), above))
+    w.push(own, w.over(subtract(w.now(a), w.product(b, own, first=False)), b))
 
 
 def _power(w: Series, own: Row, u: Row, exponent: Row) -> None:
-    """u r' = p u' r for r = u^p: k u_0 r_k = p sum_{j=1}^{k} j u_j r_{k-j} - sum_{j=1}^{k-1} u_j (k - j) r_{k-j}."""
+    """u y' = p u' y for y = u^p: k u_0 y_k = p sum_{j=1}^{k} j u_j y_{k-j} - sum_{j=1}^{k-1} u_j (k - j) y_{k-j}."""
     p = exponent.first[0]
     if w.starts:
-        w.push(own, w.start(u).lane_by_lane("pow", p))
+        w.push(own, w.start(u).function("pow", p))
     else:
         above = multiply(p, w.product(w.scaled(u), own, first=False))
         below = w.product(u, w.scaled(own, newest=False), first=False, last=False)
-        w.push(own, multiply(w.inverse(u), w.per_order(subtract(above, below))))
+        w.push(own, w.over(w.per_order(subtract(above, below)), u))
     w.scaled(own)
 
 
-RULES: dict[str, Callable[..., None]] = {
-    "add": lambda w, own, a, b: w.push(own, add(w.now(a), w.now(b))),
-    "sub": lambda w, own, a, b: w.push(own, subtract(w.now(a), w.now(b))),
-    "mul": _product,
-    "div": _quotient,
-    "sin": _sine,
-    "cos": _sine,
-    "sinh": _hyperbolic("sinh", "cosh"),
-    "cosh": _hyperbolic("cosh", "sinh"),
-    "tanh": _hyperbolic_tangent,
-    "exp": _exponential,
-    "log": _logarithm,
-    "sqrt": _square_root,
-    "pow": _power,
+def _sum_of(combined: Callable[[Coefficient, Coefficient], Coefficient]) -> Rule:
+    return lambda w, own, a, b: w.push(own, combined(w.now(a), w.now(b)))
+
+
+ARITHMETIC: dict[str, Rule] = {"add": _sum_of(add), "sub": _sum_of(subtract), "mul": _product, "div": _quotient, "pow": _power}
+FUNCTIONS: dict[str, Function] = {
+    "sqrt": Function(np.sqrt, lambda u, y: 1.0 / (2.0 * y), increasing=True, recurrence=_square_root),
+    "exp": Function(np.exp, lambda u, y: y, increasing=True, steep=True),
+    "log": Function(np.log, lambda u, y: 1.0 / u, increasing=True, recurrence=_logarithm),
+    "sin": Function(np.sin, lambda u, y: np.cos(u)),
+    "cos": Function(np.cos, lambda u, y: -np.sin(u)),
+    "sinh": Function(np.sinh, lambda u, y: np.cosh(u), increasing=True, steep=True),
+    "cosh": Function(np.cosh, lambda u, y: np.sinh(u), steep=True),
+    "tanh": Function(np.tanh, lambda u, y: 1.0 - y * y, increasing=True, steep=True),
+    "atan": Function(np.arctan, lambda u, y: 1.0 / (1.0 + u * u), increasing=True),
 }

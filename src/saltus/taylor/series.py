@@ -1,38 +1,59 @@
-"""The Taylor coefficients of all nodes of a tape in LLVM's code, two orders at a time (see `emit.py`).
+"""The Taylor coefficients of all nodes of a tape in LLVM's code, for one motion or for all lanes, two orders at a time.
 
-The first orders are written out, every coefficient a vector register. The others are a loop over pairs of orders k, k + 1, in
-which a product of two series takes for both orders a sum over coefficients that lie in memory,
+The first orders are written out, every coefficient in a register. The others are a loop over pairs of orders k, k + 1, in which
+a product of two series takes for both orders a sum over coefficients that lie in memory,
 
     sum_{j=1}^{k-1} a_j b_{k-j}    and    sum_{j=1}^{k-1} a_j b_{k+1-j}.
 
-An inner loop makes both for up to MOST_SUMS products: what it loads serves both orders, and its code is so short that the
+An inner loop makes both for up to `most_sums` products: what it loads serves both orders, and its code is so short that the
 processor keeps it decoded; written out order by order a call took 5 to 30 % longer at orders 12 to 20. What the newest
 coefficients add comes after that loop. A series that ends, as the time's does, needs no loop: its few terms are written out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from llvmlite import ir
-from numba.core import cgutils
-
-from saltus.taylor.memory_layout import SERIES_LENGTH, LaneSlot
-from saltus.taylor.tracing import RECORD_WIDTH
-from saltus.taylor.vector_code import Tape, Writer, add, dot, multiply, subtract
-from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, VECTOR, WIDTH, Vec, everywhere
-
-if TYPE_CHECKING:
-    from saltus.taylor.vector_functions import Slots
-
-MOST_SUMS = 3  # products of an inner loop: their sums and what they load fit into the registers of AVX-512 and of AVX2
-MOST_ENDING = 7  # the highest degree of a series whose end is made use of; the orders written out for it must be < LOWEST_ORDER
-LEAVES = {"number": 0, "parameter": 0, "constant": 0, "side": 0, "origin": 0, "time": 1, "record": RECORD_WIDTH - 1}  # degrees
+from saltus.taylor.graph import LEAVES, RECORD_WIDTH, degree
+from saltus.taylor.memory import Memory, Place
+from saltus.taylor.private_numba import constant_table
+from saltus.taylor.rules import ARITHMETIC, FUNCTIONS, by_slope
+from saltus.taylor.tapes import Node, Tape
+from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Vec, add, dot, multiply, subtract
 
 Coefficient = Vec | float | None  # None: zero
+
+
+@dataclass(frozen=True)
+class SeriesSettings:
+    """How the code of series is laid out."""
+
+    # Products of an inner loop: their sums and what they load fit into the registers of AVX-512 and of AVX2.
+    most_sums: int = 3
+    # The highest degree of a series whose end is made use of; the orders that are written out for it must be fewer than the
+    # lowest order of an ensemble's series.
+    most_ending: int = 7
+
+
+SETTINGS = SeriesSettings()
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Where the coefficients of a motion are put, and how many there may be.
+
+    The first roots of the tape are the accelerations, one for each position. With `any_order` the function's argument `order` is
+    the highest order of the roots, whichever it is; else it is how many orders they have, even and not below those written out.
+    """
+
+    positions: Sequence[Place]
+    velocities: Sequence[Place]
+    roots: Sequence[Place | None]  # None: not kept
+    capacity: int  # the most coefficients of a series
+    any_order: bool
 
 
 @dataclass(eq=False)
@@ -46,84 +67,94 @@ class Row:
     place: Any = None  # LLVM's pointer to coefficient 0, where the series lies in memory
 
 
-class Series(Writer):
-    """Writes the series of all nodes, order by order, by `rules`: a function for each operation, see `recurrences.py`."""
+class Series:
+    """Writes the series of all nodes, order by order."""
 
-    def __init__(self, slots: Slots, context: Any, builder: Any, array_type: Any, array: Any) -> None:
-        super().__init__(slots, context, builder, array_type, array)
-        self.positions, self.velocities = (
-            [Row(None, True, place=self.pointer(self.at[f"{name}_series"] + row * SERIES_LENGTH)) for row in range(slots.rows)]
-            for name in ("position", "velocity")
-        )
-        for name, rows in (("position", self.positions), ("velocity", self.velocities)):
-            for i, row in enumerate(rows):
-                row.first.append(self.load(self.at[name] + i))
-
-    def read(self, nodes: Tape, rules: dict[str, Callable[..., None]]) -> None:
-        """Take a tape: a series for each node."""
-        self.nodes, self.rules, self.rows = nodes, rules, list[Row]()
+    def __init__(self, memory: Memory, tape: Tape, layout: Rows) -> None:
+        self.memory, self.builder, self.nodes, self.layout = memory, memory.builder, tape.nodes, layout
         self.order: Any = 0  # a number among the first orders, then LLVM's number k of a pair
         self.ahead: int | None = None  # of a pair: 0 at order k, 1 at order k + 1; None among the first
-        self._nodes: dict[int, tuple[Any, ...]] = {}  # that the rows are for
-        self._beside: dict[tuple[int, str], Row] = {}
+        self.positions = [Row(None, True, place=memory.pointer(place)) for place in layout.positions]
+        self.velocities = [Row(None, True, place=memory.pointer(place)) for place in layout.velocities]
+        self._nodes: dict[int, Node] = {}  # that the rows are for
+        self._scaled: dict[int, Row] = {}
+        self._records: dict[int, Any] = {}
         self._inverses: dict[int, Any] = {}
         self._sums: dict[tuple[int, int], tuple[Vec, Vec]] = {}
         self._loops: list[_InnerLoop] = []
         self._kept: list[Row] = []
         self._lasts: dict[int, tuple[Row, Any]] = {}
-        for node in nodes:
+        self.rows = list[Row]()
+        for node in tape.nodes:
             self.rows.append(self._row(node))
+            self._nodes.setdefault(id(self.rows[-1]), node)
         highest = max((row.degree for row in self.rows if row.degree is not None), default=0)
         self.written_out = 2 * (highest // 2 + 1)  # how many orders are
-        self._tables = {sign: self._table([sign / max(k, 1) for k in range(SERIES_LENGTH + 2)]) for sign in (1.0, -1.0)}
+        if not memory.arithmetic.exact:
+            self._table = constant_table(self.builder, [1.0 / max(k, 1) for k in range(layout.capacity + 2)])
 
-    def _table(self, numbers: list[float]) -> Any:
-        constant = ir.Constant(ir.ArrayType(DOUBLE, len(numbers)), numbers)
-        return cgutils.global_constant(self.builder, "reciprocals", constant)
-
-    def _row(self, node: tuple[Any, ...]) -> Row:
-        row = self._new_row(node)
-        self._nodes.setdefault(id(row), node)
-        return row
-
-    def _new_row(self, node: tuple[Any, ...]) -> Row:
+    def _row(self, node: Node) -> Row:
         op = node[0]
         if op in ("coordinate", "velocity"):
             return (self.positions if op == "coordinate" else self.velocities)[node[1]]
-        if op in LEAVES:
-            return Row(LEAVES[op], True)
-        args = [self.rows[i] for i in node[1:]]
+        if op in (*LEAVES, "constant"):
+            return Row({"time": 1, "record": RECORD_WIDTH - 1}.get(op, 0), True)
+        args = [self.rows[i] for i in (node[1:] if op in ARITHMETIC else node[1:2])]
         degrees = [row.degree for row in args]
-        degree, early = _degree(op, degrees), all(row.early for row in args) and not _needs_sums(op, degrees)
-        if op in ("sin", "cos"):  # whichever comes first on the tape makes both
-            both = [self.beside(args[0], name, degree, early) for name in ("sin", "cos")]
-            return both[op == "cos"]
-        return Row(degree, early)
+        ends = degree(op, degrees)
+        early = all(row.early for row in args) and not _needs_sums(op, degrees)
+        return Row(ends if ends is None or ends <= SETTINGS.most_ending else None, early)
+
+    def write_motion(self, roots: list[int]) -> None:
+        """Write all orders of a motion, whose accelerations are the first roots, and put them into memory."""
+        for rows, kind in ((self.positions, "coordinate"), (self.velocities, "velocity")):
+            for i, row in enumerate(rows):
+                given = kind in self.memory.leaves
+                row.first.append(self.memory.leaf((kind, i)) if given else self._at(row, LONG(0)))
+                if given:
+                    self._put(row.place, LONG(0), row.first[0])
+        pulls = [self.rows[root] for root in roots[: len(self.positions)]]
+        kept = [
+            (self.memory.pointer(place), self.rows[root]) for place, root in zip(self.layout.roots, roots, strict=True) if place
+        ]
+        for _ in self._each_order():
+            self._advance()
+            for position, velocity, pull in zip(self.positions, self.velocities, pulls, strict=True):
+                self._integrate(position, self.now(velocity))
+                self._integrate(velocity, self.now(pull))
+            for pointer, row in kept:
+                self._write(pointer, self.now(row))
 
     # --- the orders ------------------------------------------------------------------------------------------------------------
 
-    def each_order(self, order: Any) -> Iterator[None]:
-        """Go through all orders below LLVM's number `order`: what is written meanwhile is for one of the first, or of a pair."""
-        b = self.builder
+    def _each_order(self) -> Iterator[None]:
+        """Go through all orders: what is written meanwhile is for one of the first orders, or for one of a pair."""
+        b, any_order, order = self.builder, self.layout.any_order, self.memory.arguments["order"]
+        order = b.add(order, LONG(1)) if any_order else order
+        end = b.append_basic_block("end")
         for k in range(self.written_out):
             self.order = k
+            if any_order and k:
+                self._go_on_if(b.icmp_signed("<", LONG(k), order), end)
             yield
-        first, self._head, newest, end = b.block, *(b.append_basic_block(name) for name in ("pair", "newest", "end"))
+        first, self._head, newest = b.block, *(b.append_basic_block(name) for name in ("pair", "newest"))
         b.cbranch(b.icmp_signed("<", LONG(self.written_out), order), self._head, end)
         b.position_at_end(self._head)
         self.order = b.phi(LONG)
-        self._number = everywhere(b, b.sitofp(self.order, DOUBLE))
+        self._number = self.memory.arithmetic.everywhere(b, b.sitofp(self.order, DOUBLE))
         for row in (*self.positions, *self.velocities):
             row.pair.append(self._at(row, self.order))
         b.position_at_end(newest)
         for ahead in (0, 1):
             self.ahead = ahead
+            if any_order and ahead:
+                self._go_on_if(b.icmp_signed("<", b.add(self.order, LONG(1)), order), end)
             yield
         for row in self._kept:
             self._keep(row, first)
         for row, last in self._lasts.values():
-            last.add_incoming(self._value(row.first[self.written_out - 1]), first)
-            last.add_incoming(self._value(row.pair[1]), b.block)
+            last.add_incoming(self.memory.value(row.first[self.written_out - 1]), first)
+            last.add_incoming(self.memory.value(row.pair[1]), b.block)
         following = b.add(self.order, LONG(2))
         self.order.add_incoming(LONG(self.written_out), first)
         self.order.add_incoming(following, b.block)
@@ -135,34 +166,51 @@ class Series(Writer):
             b.branch(blocks[1])
         b.position_at_end(end)
 
-    def advance(self) -> None:
+    def _go_on_if(self, condition: Any, end: Any) -> None:
+        following = self.builder.append_basic_block("order")
+        self.builder.cbranch(condition, following, end)
+        self.builder.position_at_end(following)
+
+    def _advance(self) -> None:
         """Append the coefficient of this order to every node's series."""
         for row, node in zip(self.rows, self.nodes, strict=True):
-            ended = self.ahead is not None and row.degree is not None
-            if ended or node[0] in ("coordinate", "velocity") or self._is_known(row):
+            op, ended = node[0], self.ahead is not None and row.degree is not None
+            if ended or op in ("coordinate", "velocity"):
                 continue
-            if node[0] in LEAVES:
+            if op in (*LEAVES, "constant"):
                 self.push(row, self._leaf(node))
-            else:
-                with self._before_sums(row):
-                    self.rules[node[0]](self, row, *(self.rows[i] for i in node[1:]))
+                continue
+            with self._before_sums(row):
+                self._apply(op, row, node[1:])
 
-    def _leaf(self, node: tuple[Any, ...]) -> Coefficient:
-        k = self.order
-        if node[0] == "time":
-            return self.load(LaneSlot.NOW) if k == 0 else 1.0 if k == 1 else None
+    def _apply(self, op: str, row: Row, operands: Node) -> None:
+        """Append a coefficient by the operation's rule."""
+        if op in ARITHMETIC:
+            ARITHMETIC[op](self, row, *(self.rows[i] for i in operands))
+        elif (recurrence := FUNCTIONS[op].recurrence) is not None:
+            recurrence(self, row, self.rows[operands[0]])
+        elif row.degree == 0:
+            self.push(row, self.start(self.rows[operands[0]]).function(op) if self.starts else None)
+        else:
+            by_slope(self, row, self.rows[operands[0]], self.rows[operands[1]], operands[2], op)
+
+    def _leaf(self, node: Node) -> Coefficient:
         if node[0] == "record":
-            return self.load(self.at["records"] + node[1] * RECORD_WIDTH + k) if k < RECORD_WIDTH else None
-        return self.known(node) if k == 0 else None
+            if self.starts:
+                self._records[node[1]] = self.memory.record_series(node[1])
+            return self._records[node[1]][self.order] if self.order < RECORD_WIDTH else None
+        if self.order == 0:
+            return self.memory.leaf(node)
+        return 1.0 if node[0] == "time" and self.order == 1 else None
 
-    def integrate(self, row: Row, slope: Coefficient) -> None:
+    def _integrate(self, row: Row, slope: Coefficient) -> None:
         """Append to a position or velocity the coefficient of the next order, from that of its derivative at this one."""
-        value = multiply(self._reciprocal(1), slope)
+        value = self._divided(slope, 1)
         if self.ahead != 1:
             self.push(row, value)
-        self.write(row.place, value, 1)
+        self._write(row.place, value, 1)
 
-    def write(self, place: Any, value: Coefficient, more: int = 0) -> None:
+    def _write(self, place: Any, value: Coefficient, more: int = 0) -> None:
         """Put a coefficient of this order, or of a following one, into a series in memory."""
         index = LONG(self.order + more) if self.ahead is None else self.builder.add(self.order, LONG(self.ahead + more))
         self._put(place, index, value)
@@ -176,8 +224,7 @@ class Series(Writer):
 
     def start(self, row: Row) -> Vec:
         """Coefficient 0, as a vector."""
-        value = row.first[0]
-        return value if isinstance(value, Vec) else self.number(value or 0.0)
+        return Vec(self.builder, self.memory.value(row.first[0]), self.memory.arithmetic)
 
     def push(self, row: Row, value: Coefficient) -> None:
         """Append the coefficient of this order to a series."""
@@ -189,13 +236,9 @@ class Series(Writer):
             return row.first[self.order]
         return row.pair[self.ahead] if row.degree is None else None
 
-    def beside(self, row: Row, name: str, degree: int | None, early: bool) -> Row:
-        """A series that is needed besides one that has a node; empty at first."""
-        return self._beside.setdefault((id(row), name), Row(degree, early))
-
     def scaled(self, u: Row, newest: bool = True) -> Row:
         """j u_j, up to this order, or up to the one before where u has no more."""
-        row = self.beside(u, "scaled", u.degree, u.early)
+        row = self._scaled.setdefault(id(u), Row(u.degree, u.early))
         if not newest:
             return row
         if self.ahead is None:
@@ -221,15 +264,19 @@ class Series(Writer):
                 return multiply(constant.first[0], self.now(self.scaled(changing)))
         return multiply(self._number + float(self.ahead or 0), self.now(u))
 
-    def per_order(self, value: Coefficient, sign: float = 1.0) -> Coefficient:
-        """A coefficient, or with the other sign, divided by this order."""
-        return multiply(self._reciprocal(0, sign), value)
+    def per_order(self, value: Coefficient) -> Coefficient:
+        """A number divided by this order."""
+        return self._divided(value, 0)
 
-    def inverse(self, row: Row) -> Any:
-        """One over coefficient 0."""
+    def over(self, value: Coefficient, row: Row) -> Coefficient:
+        """A number divided by coefficient 0 of a series."""
+        if value is None:
+            return None
+        if self.memory.arithmetic.exact:
+            return value / self.start(row)
         if id(row) not in self._inverses:
             self._inverses[id(row)] = 1.0 / self.start(row)
-        return self._inverses[id(row)]
+        return multiply(value, self._inverses[id(row)])
 
     def product(self, a: Row, b: Row, first: bool = True, last: bool = True) -> Coefficient:
         """sum_{j=0}^{k} a_j b_{k-j} for this order k; without a_0 b_k if not `first`, without a_k b_0 if not `last`."""
@@ -253,12 +300,19 @@ class Series(Writer):
     def _is_known(self, row: Row) -> bool:
         return len(row.first) > self.order if self.ahead is None else len(row.pair) > self.ahead
 
-    def _reciprocal(self, more: int, sign: float = 1.0) -> Any:
-        """One, or minus one, over this order, or over a following one."""
+    def _divided(self, value: Coefficient, more: int) -> Coefficient:
+        """A number divided by this order, or by a following one."""
+        exact = self.memory.arithmetic.exact
+        if value is None or (self.ahead is None and self.order + more == 1):
+            return value
         if self.ahead is None:
-            return sign / (self.order + more)
+            k = self.order + more
+            return value / float(k) if exact else multiply(1.0 / k, value)
+        if exact:
+            return value / (self._number + float(self.ahead + more))
         index = self.builder.add(self.order, LONG(self.ahead + more))
-        return everywhere(self.builder, self.builder.load(self.builder.gep(self._tables[sign], [LONG(0), index])))
+        inverse = self.builder.load(self.builder.gep(self._table, [LONG(0), index]))
+        return multiply(self.memory.arithmetic.everywhere(self.builder, inverse), value)
 
     def _before_sums(self, row: Row) -> AbstractContextManager[Any]:
         """Where the code for a series' coefficient goes: before the sums if it can."""
@@ -280,8 +334,8 @@ class Series(Writer):
         if id(row) not in self._lasts:
             with self.builder.goto_block(self._head):
                 self.builder.position_at_start(self._head)
-                self._lasts[id(row)] = row, self.builder.phi(VECTOR)
-        return Vec(self.builder, self._lasts[id(row)][1])
+                self._lasts[id(row)] = row, self.builder.phi(self._kind)
+        return Vec(self.builder, self._lasts[id(row)][1], self.memory.arithmetic)
 
     def _earlier(self, forward: Row, backward: Row) -> tuple[Vec, Vec]:
         """The sums of a product for both orders of a pair, made in an inner loop."""
@@ -296,23 +350,21 @@ class Series(Writer):
         """A coefficient from memory, where the series is from now on."""
         if row.place is None:
             with self.builder.goto_entry_block():
-                row.place = self.builder.alloca(VECTOR, SERIES_LENGTH)
-            row.place.align = min(CACHE_LINE, 8 * WIDTH)
+                row.place = self.builder.alloca(self._kind, self.layout.capacity)
+            row.place.align = min(CACHE_LINE, 8 * self.memory.arithmetic.width)
             self._kept.append(row)
-        loaded = self.builder.load(self.builder.gep(row.place, [index]))
-        loaded.align = 8
-        return Vec(self.builder, loaded)
+        return Vec(self.builder, self.memory.at(self.builder.gep(row.place, [index])), self.memory.arithmetic)
 
     def _put(self, place: Any, index: Any, value: Coefficient) -> None:
-        self.builder.store(self._value(value), self.builder.gep(place, [index])).align = 8
+        self.builder.store(self.memory.value(value), self.builder.gep(place, [index])).align = 8
 
-    def _value(self, coefficient: Coefficient) -> Any:
-        """LLVM's vector."""
-        return self.number(0.0).as_value(0.0 if coefficient is None else coefficient)
+    @property
+    def _kind(self) -> Any:
+        return self.memory.arithmetic.of(DOUBLE)
 
     def _keep(self, row: Row, first: Any) -> None:
         """Have a series in memory: the first orders from the block `first` on, the orders of a pair from here on."""
-        ended = [None] * (SERIES_LENGTH - len(row.first)) if row.degree is not None else []
+        ended = [None] * (self.layout.capacity - len(row.first)) if row.degree is not None else []
         with self.builder.goto_block(first):
             for j, value in enumerate([*row.first, *ended]):
                 self._put(row.place, LONG(j), value)
@@ -335,7 +387,7 @@ class _InnerLoop:
     @property
     def full(self) -> bool:
         """Whether it should make no further sums."""
-        return self._made == MOST_SUMS
+        return self._made == SETTINGS.most_sums
 
     def sums(self, forward: Row, backward: Row) -> tuple[Vec, Vec]:
         """sum a_j b_{k-j} and sum a_j b_{k+1-j} of a `forward`, b `backward`; a_1 b_k only if b_k is known before the loop."""
@@ -360,15 +412,15 @@ class _InnerLoop:
     def _before(self, row: Row, loaded: Vec) -> Vec:
         """Coefficient k + 1 - j: what the turn before loaded."""
         if id(row) not in self._carried:
-            variable = self._variable(VECTOR)
-            start = self.series._value(row.pair[0] if row.early else None)
+            variable = self._variable(self.series._kind)
+            start = self.series.memory.value(row.pair[0] if row.early else None)
             self._changing.append((variable, start, loaded.value))
-            self._carried[id(row)] = Vec(self.builder, variable)
+            self._carried[id(row)] = Vec(self.builder, variable, self.series.memory.arithmetic)
         return self._carried[id(row)]
 
     def _sum(self, a: Vec, b: Vec) -> Vec:
-        variable = self._variable(VECTOR)
-        total = a.fma(b, Vec(self.builder, variable))
+        variable = self._variable(self.series._kind)
+        total = a.fma(b, Vec(self.builder, variable, self.series.memory.arithmetic))
         self._changing.append((variable, a.as_value(0.0), total.value))
         return total
 
@@ -382,19 +434,8 @@ class _InnerLoop:
             variable.add_incoming(value, self.block)
 
 
-def _degree(op: str, degrees: list[int | None]) -> int | None:
-    """Of what an operation makes of series of these degrees."""
-    if all(degree == 0 for degree in degrees):
-        return 0
-    a, b = degrees[0], degrees[-1]
-    if a is None or b is None or op not in ("add", "sub", "mul", "div") or (op == "div" and b > 0):
-        return None
-    degree = a + b if op == "mul" else max(a, b)
-    return degree if degree <= MOST_ENDING else None
-
-
 def _needs_sums(op: str, degrees: list[int | None]) -> bool:
     """Whether an operation multiplies two series neither of which ends."""
     if op == "mul":
         return degrees[0] is None and degrees[1] is None
-    return op in ("tanh", "sqrt") or (op not in ("add", "sub") and degrees[-1 if op == "div" else 0] is None)
+    return op == "sqrt" or (op not in ("add", "sub") and degrees[-1 if op == "div" else 0] is None)

@@ -11,9 +11,7 @@ from saltus.errors import ParameterError, SaltusError, TraceError, near
 from saltus.systems import Record, System
 from saltus.systems import substitute as substitute_numbers
 from saltus.taylor import derivatives as tangent
-from saltus.taylor.graph import POINTWISE, Expr, combine, differentiate, number, ordered, substitute
-
-RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
+from saltus.taylor.graph import POINTWISE, RECORD_WIDTH, Expr, combine, differentiate, number, ordered, substitute
 
 
 class LoadTime:

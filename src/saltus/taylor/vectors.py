@@ -1,26 +1,21 @@
-"""A vector of doubles, one for each lane, in one or two of this machine's registers: a type for numba, and its operations.
+"""What arithmetic is written on: one double, or a vector of doubles with one for each lane.
 
-Within compiled code `+ - * / < <= > >=` work on vectors, mixed with numbers. A comparison gives a mask; `bits` turns a mask into
-an integer with one bit for each lane, on which `& | ~` work, and `mask` turns it back. Memory is counted in slots of one
-vector. `Vec` is the same vector where LLVM's code is written directly (see `emit.py`).
+`Vec` stands for such a number while LLVM's code is written: Python's operators append instructions. None stands for a number
+that is known to be zero, and a float for one that is known.
 """
 
 from __future__ import annotations
 
-import operator
 import os
 import platform
-from collections.abc import Callable
-from itertools import product
+from dataclasses import dataclass, replace
 from typing import Any
 
 from llvmlite import binding, ir
-from numba import types
-from numba.core import cgutils
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, register_model
 
-DOUBLE, BIT, LONG = ir.DoubleType(), ir.IntType(1), ir.IntType(64)
+DOUBLE, BIT, LONG, INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(64), ir.IntType(32)
+CACHE_LINE = 64  # bytes
+FUSED = ("contract", "nsz")  # what arithmetic may do besides IEEE: fused multiply-adds
 
 
 def host_width() -> int:
@@ -41,59 +36,62 @@ def host_width() -> int:
 
 
 WIDTH = host_width()
-ALL = (1 << WIDTH) - 1  # every lane, as bits
-VECTOR, MASK = ir.VectorType(DOUBLE, WIDTH), ir.VectorType(BIT, WIDTH)
-LONGS = ir.VectorType(LONG, WIDTH)
-CACHE_LINE = 64  # bytes
-FUSED = ("contract", "nsz")  # what arithmetic may do besides IEEE: fused multiply-adds
 
 
-class VectorType(types.Type):
-    """numba's type of a vector of doubles."""
+@dataclass(frozen=True)
+class Arithmetic:
+    """How numbers are computed: on how many lanes at once, whether multiply-adds may be fused, and how exactly."""
 
-    def __init__(self) -> None:
-        super().__init__(name=f"doubles{WIDTH}")
+    width: int
+    fused: bool = True
+    exact: bool = False  # divides, and calls the C library's sine and cosine, where lanes use reciprocals and polynomials
+
+    def of(self, element: Any) -> Any:
+        """LLVM's type of a number, a truth or an integer for each lane."""
+        return element if self.width == 1 else ir.VectorType(element, self.width)
+
+    def constant(self, value: float, element: Any = DOUBLE) -> Any:
+        """LLVM's constant with the same value in all lanes."""
+        return ir.Constant(self.of(element), value if self.width == 1 else [value] * self.width)
+
+    def number(self, builder: Any, value: float) -> Vec:
+        """One number in all lanes."""
+        return Vec(builder, self.constant(value), self)
+
+    def everywhere(self, builder: Any, number: Any) -> Vec:
+        """LLVM's number in all lanes."""
+        if self.width == 1:
+            return Vec(builder, number, self)
+        undefined = ir.Constant(self.of(DOUBLE), ir.Undefined)
+        first = builder.insert_element(undefined, number, ir.Constant(INDEX, 0))
+        zeros = ir.Constant(self.of(INDEX), [0] * self.width)
+        return Vec(builder, builder.shuffle_vector(first, undefined, zeros), self)
+
+    def unfused(self) -> Arithmetic:
+        """The same without fused multiply-adds: a law that takes the difference of two equal products must get 0."""
+        return replace(self, fused=False)
 
 
-class MaskType(types.Type):
-    """numba's type of a vector of truths."""
-
-    def __init__(self) -> None:
-        super().__init__(name=f"truths{WIDTH}")
-
-
-vector_type, mask_type = VectorType(), MaskType()
-
-
-@register_model(VectorType)
-class _VectorModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, VECTOR)
-
-
-@register_model(MaskType)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, MASK)
+SCALAR, LANES = Arithmetic(1, exact=True), Arithmetic(WIDTH)
 
 
 class Vec:
-    """A vector while LLVM's code is written: Python's operators append instructions; numbers become constants."""
+    """A number, or a vector of them, while LLVM's code is written: Python's operators append instructions."""
 
-    __slots__ = ("builder", "fused", "value")
+    __slots__ = ("arithmetic", "builder", "value")
 
-    def __init__(self, builder: Any, value: Any, fused: bool = True) -> None:
-        self.builder, self.value, self.fused = builder, value, fused
+    def __init__(self, builder: Any, value: Any, arithmetic: Arithmetic) -> None:
+        self.builder, self.value, self.arithmetic = builder, value, arithmetic
 
     def _new(self, value: Any) -> Vec:
-        return Vec(self.builder, value, self.fused)
+        return Vec(self.builder, value, self.arithmetic)
 
     def as_value(self, other: Any) -> Any:
-        """LLVM's value of a vector or of a number."""
-        return other.value if isinstance(other, Vec) else ir.Constant(VECTOR, [float(other)] * WIDTH)
+        """LLVM's value of this kind of a vector or of a number."""
+        return other.value if isinstance(other, Vec) else self.arithmetic.constant(float(other))
 
     def _operation(self, name: str, left: Any, right: Any) -> Vec:
-        flags = FUSED if self.fused else ("nsz",)
+        flags = FUSED if self.arithmetic.fused else FUSED[1:]
         return self._new(getattr(self.builder, name)(self.as_value(left), self.as_value(right), flags=flags))
 
     def __add__(self, other: Any) -> Vec:
@@ -125,20 +123,26 @@ class Vec:
 
     def fma(self, factor: Any, addend: Any) -> Vec:
         """self * factor + addend, rounded once where the machine can."""
-        return self._call("llvm.fmuladd", self.value, self.as_value(factor), self.as_value(addend))
+        return self.intrinsic("llvm.fmuladd", factor, addend)
 
-    def sqrt(self) -> Vec:
-        """The square root."""
-        return self._call("llvm.sqrt", self.value)
+    def function(self, name: str, *others: Any) -> Vec:
+        """An elementary function by its name in the C library."""
+        if name == "sqrt":
+            return self.intrinsic("llvm.sqrt")
+        if name in ("sin", "cos"):
+            return self.intrinsic(f"llvm.{name}") if self.arithmetic.exact else self._sin_cos()[name == "cos"]
+        return self._library(name, [self.value, *(self.as_value(other) for other in others)])
 
-    def nearest(self) -> Vec:
-        """The nearest whole number."""
-        return self._call("llvm.rint", self.value)
+    def intrinsic(self, name: str, *others: Any) -> Vec:
+        """One of LLVM's own functions, of this and other numbers."""
+        width = "f64" if self.arithmetic.width == 1 else f"v{self.arithmetic.width}f64"
+        values = [self.value, *(self.as_value(other) for other in others)]
+        return self._new(self._call(f"{name}.{width}", self.arithmetic.of(DOUBLE), values))
 
-    def _call(self, name: str, *values: Any) -> Vec:
-        kind = ir.FunctionType(VECTOR, [VECTOR] * len(values))
-        function = cgutils.get_or_insert_function(self.builder.module, kind, f"{name}.v{WIDTH}f64")
-        return self._new(self.builder.call(function, values))
+    def _call(self, name: str, kind: Any, values: list[Any]) -> Any:
+        module = self.builder.module
+        function = module.globals.get(name) or ir.Function(module, ir.FunctionType(kind, [kind] * len(values)), name)
+        return self.builder.call(function, values)
 
     def compare(self, sign: str, other: Any) -> Any:
         """LLVM's value of the mask of a comparison; False where one is NaN."""
@@ -148,25 +152,24 @@ class Vec:
         """This vector where the mask is set, and the other one elsewhere."""
         return self._new(self.builder.select(mask, self.value, self.as_value(other)))
 
-    def lane_by_lane(self, name: str, *others: Any) -> Vec:
+    def _library(self, name: str, values: list[Any]) -> Vec:
         """A function of the C library, called for each lane."""
-        vectors = [self.value, *(self.as_value(other) for other in others)]
-        kind = ir.FunctionType(DOUBLE, [DOUBLE] * len(vectors))
-        function = cgutils.get_or_insert_function(self.builder.module, kind, name)
-        result = ir.Constant(VECTOR, ir.Undefined)
-        for lane in range(WIDTH):
-            index = ir.Constant(ir.IntType(32), lane)
-            arguments = [self.builder.extract_element(v, index) for v in vectors]
-            result = self.builder.insert_element(result, self.builder.call(function, arguments), index)
+        if self.arithmetic.width == 1:
+            return self._new(self._call(name, DOUBLE, values))
+        result = ir.Constant(self.arithmetic.of(DOUBLE), ir.Undefined)
+        for lane in range(self.arithmetic.width):
+            index = ir.Constant(INDEX, lane)
+            arguments = [self.builder.extract_element(v, index) for v in values]
+            result = self.builder.insert_element(result, self._call(name, DOUBLE, arguments), index)
         return self._new(result)
 
-    def sin_cos(self) -> tuple[Vec, Vec]:
+    def _sin_cos(self) -> tuple[Vec, Vec]:
         """Sine and cosine to about one unit in the last place, for arguments up to 1e6.
 
         The argument is reduced by pi/2 in three parts, of which the first two have 33 bits so that their products with a
         whole number are exact, and the polynomials for [-pi/4, pi/4] are those of fdlibm (Sun Microsystems, 1993).
         """
-        n = (self * (2.0 / 3.141592653589793)).nearest()
+        n = (self * (2.0 / 3.141592653589793)).intrinsic("llvm.rint")
         r = self - n * 1.57079632673412561417e00
         r = r - n * 6.07710050630396597660e-11
         r = r - n * 2.02226624879595063154e-21
@@ -174,23 +177,15 @@ class Vec:
         s = _polynomial(z, SINE).fma(z * r, r)
         half = z * 0.5
         c = _polynomial(z, COSINE) * (z * z) - half + 1.0
-        quadrant = self.builder.fptosi(n.value, LONGS)
+        quadrant = self.builder.fptosi(n.value, self.arithmetic.of(LONG))
         odd = self._bit(quadrant, 0)
         sine, cosine = c.select(odd, s), s.select(odd, c)
         high = self._bit(quadrant, 1)
         return (-sine).select(high, sine), (-cosine).select(self.builder.xor(high, odd), cosine)
 
     def _bit(self, numbers: Any, place: int) -> Any:
-        one = ir.Constant(LONGS, [1 << place] * WIDTH)
-        return self.builder.icmp_unsigned("!=", self.builder.and_(numbers, one), ir.Constant(LONGS, [0] * WIDTH))
-
-
-def everywhere(builder: Any, number: Any) -> Vec:
-    """LLVM's number in all lanes."""
-    undefined = ir.Constant(VECTOR, ir.Undefined)
-    first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
-    zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-    return Vec(builder, builder.shuffle_vector(first, undefined, zeros))
+        one, zero = (self.arithmetic.constant(value, LONG) for value in (1 << place, 0))
+        return self.builder.icmp_unsigned("!=", self.builder.and_(numbers, one), zero)
 
 
 SINE = (
@@ -218,215 +213,34 @@ def _polynomial(z: Vec, coefficients: tuple[float, ...]) -> Vec:
     return value
 
 
-# --- memory ----------------------------------------------------------------------------------------------------------------
+def add(a: Any, b: Any) -> Any:
+    """a + b, where None is zero."""
+    return b if a is None else a if b is None else a + b
 
 
-def slot_pointer(context: Any, builder: Any, array_type: Any, array: Any, slot: Any) -> Any:
-    """LLVM's pointer to a slot of a one-dimensional array."""
-    data = context.make_array(array_type)(context, builder, array).data
-    place = builder.gep(data, [builder.mul(slot, ir.Constant(LONG, WIDTH))])
-    return builder.bitcast(place, VECTOR.as_pointer())
+def subtract(a: Any, b: Any) -> Any:
+    """a - b, where None is zero."""
+    return a if b is None else negative(b) if a is None else a - b
 
 
-@intrinsic
-def load(typing: Any, array: Any, slot: Any) -> Any:
-    """The vector in a slot of an array."""
+def negative(a: Any) -> Any:
+    """-a, where None is zero."""
+    return None if a is None else -a
 
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        loaded = builder.load(slot_pointer(context, builder, signature.args[0], *args))
-        loaded.align = 8
-        return loaded
 
-    return vector_type(array, types.int64), code
+def multiply(a: Any, b: Any) -> Any:
+    """a b, where None is zero and a factor of one costs nothing."""
+    if a is None or b is None:
+        return None
+    for x, y in ((a, b), (b, a)):
+        if not isinstance(x, Vec) and x in (1.0, -1.0):
+            return y if x == 1.0 else -y
+    return a * b
 
 
-@intrinsic
-def store(typing: Any, array: Any, slot: Any, value: Any) -> Any:
-    """Put a vector into a slot of an array."""
-
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        stored = builder.store(args[2], slot_pointer(context, builder, signature.args[0], *args[:2]))
-        stored.align = 8
-        return context.get_dummy_value()
-
-    return types.void(array, types.int64, vector_type), code
-
-
-# --- operations in compiled code --------------------------------------------------------------------------------------------
-
-
-def _lift(builder: Any, kind: Any, value: Any) -> Vec:
-    """A vector, or a number in all lanes."""
-    if isinstance(kind, VectorType):
-        return Vec(builder, value)
-    if isinstance(kind, types.Integer):
-        value = builder.sitofp(value, DOUBLE)
-    return everywhere(builder, value)
-
-
-def _function(result: Any, write: Callable[..., Any], count: int) -> Any:
-    """A function of compiled code that takes `count` vectors or numbers; `write` gets them as `Vec`."""
-
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        written = write(*(_lift(builder, kind, value) for kind, value in zip(signature.args, args, strict=True)))
-        return written.value if isinstance(written, Vec) else written
-
-    if count == 1:
-        return intrinsic(lambda typing, a: (result(a), code))
-    if count == 2:
-        return intrinsic(lambda typing, a, b: (result(a, b), code))
-    return intrinsic(lambda typing, a, b, c: (result(a, b, c), code))
-
-
-def _operator(symbol: Any, result: Any, write: Callable[..., Any], count: int = 2) -> None:
-    """Let Python's operator mean `write` where a vector is among its operands; the others may be numbers.
-
-    numba's `overload` would compile a function for every pair of types.
-    """
-
-    class Meaning(AbstractTemplate):
-        key = symbol
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            vectors = [isinstance(kind, VectorType) for kind in args]
-            if (
-                len(args) == count
-                and any(vectors)
-                and all(v or isinstance(k, types.Number) for v, k in zip(vectors, args, strict=True))
-            ):
-                return signature(result, *args)
-            return None
-
-    infer_global(symbol)(Meaning)
-
-    def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        written = write(*(_lift(builder, kind, value) for kind, value in zip(sig.args, args, strict=True)))
-        return written.value if isinstance(written, Vec) else written
-
-    for kinds in product((VectorType, types.Number), repeat=count):
-        if VectorType in kinds:
-            lower_builtin(symbol, *kinds)(code)
-
-
-for _symbol in (operator.add, operator.sub, operator.mul, operator.truediv):
-    _operator(_symbol, vector_type, _symbol)
-for _symbol, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")):
-    _operator(_symbol, mask_type, lambda a, b, sign=_sign: a.compare(sign, b))
-_operator(operator.neg, vector_type, operator.neg, 1)
-
-absolute = _function(vector_type, lambda a: a._call("llvm.fabs", a.value), 1)
-minimum = _function(vector_type, lambda a, b: a.select(a.compare("<", b), b), 2)
-maximum = _function(vector_type, lambda a, b: a.select(a.compare(">", b), b), 2)
-fma = _function(vector_type, lambda a, b, c: a.fma(b, c), 3)
-splat = _function(vector_type, lambda a: a, 1)
-
-
-def _log2(a: Vec) -> Vec:
-    """log2 to 0.05, for a > 0: a line in every octave, as a number's bits are those of an integer that grows like that."""
-    bits = a.builder.bitcast(a.value, LONGS)
-    return Vec(a.builder, a.builder.sitofp(bits, VECTOR)) * 2.0**-52 - (1023.0 - 0.043)
-
-
-def _exp2(a: Vec) -> Vec:
-    """2**a to 0.4 %, for -1000 < a < 1000: the exponent, and a parabola for the rest."""
-    b, whole = a.builder, a._call("llvm.floor", a.value)
-    rest = a - whole
-    exponent = b.add(b.fptosi(whole.value, LONGS), ir.Constant(LONGS, [1023] * WIDTH))
-    power = Vec(b, b.bitcast(b.shl(exponent, ir.Constant(LONGS, [52] * WIDTH)), VECTOR))
-    return power * (1.0 + rest * (0.6565 + 0.3435 * rest))
-
-
-def _inverse(a: Vec) -> Vec:
-    """1/a to 1e-5: a line in every octave, and two of Newton's steps."""
-    b, bits = a.builder, a.builder.bitcast(a.value, LONGS)
-    y = Vec(b, b.bitcast(b.sub(ir.Constant(LONGS, [0x7FDE623822FC16E6] * WIDTH), bits), VECTOR))
-    for _ in range(2):
-        y = y * (2.0 - a * y)
-    return y
-
-
-def _root(a: Vec) -> Vec:
-    """The square root to 0.2 %, for a >= 0, by that of 1/a: a line in every second octave, and one of Newton's steps."""
-    b, bits = a.builder, a.builder.bitcast(a.value, LONGS)
-    halved = b.lshr(bits, ir.Constant(LONGS, [1] * WIDTH))
-    y = Vec(b, b.bitcast(b.sub(ir.Constant(LONGS, [0x5FE6EB50C7B537A9] * WIDTH), halved), VECTOR))
-    z = a * y
-    return z * (1.5 - (0.5 * y) * z)
-
-
-rough_inverse = _function(vector_type, _inverse, 1)
-rough_root = _function(vector_type, _root, 1)
-rough_log2 = _function(vector_type, _log2, 1)
-rough_exp2 = _function(vector_type, _exp2, 1)
-
-
-@intrinsic
-def select(typing: Any, chosen: Any, yes: Any, no: Any) -> Any:
-    """`yes` where the mask is set, `no` elsewhere."""
-
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        yes, no = (_lift(builder, kind, value) for kind, value in zip(signature.args[1:], args[1:], strict=True))
-        return yes.select(args[0], no).value
-
-    return vector_type(chosen, yes, no), code
-
-
-@intrinsic
-def bits(typing: Any, chosen: Any) -> Any:
-    """A mask as an integer: lane i is bit i."""
-
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        narrow = builder.bitcast(args[0], ir.IntType(WIDTH))
-        return builder.zext(narrow, LONG) if WIDTH < 64 else narrow
-
-    return types.int64(chosen), code
-
-
-@intrinsic
-def mask(typing: Any, integer: Any) -> Any:
-    """The mask of an integer's bits."""
-
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.bitcast(builder.trunc(args[0], ir.IntType(WIDTH)), MASK)
-
-    return mask_type(types.int64), code
-
-
-@intrinsic
-def first_lane(typing: Any, integer: Any) -> Any:
-    """The lowest lane whose bit is set, of an integer that is not zero."""
-
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.cttz(args[0], ir.Constant(BIT, 1))
-
-    return types.int64(types.int64), code
-
-
-@intrinsic
-def lane_count(typing: Any, integer: Any) -> Any:
-    """How many lanes have their bit set."""
-
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.ctpop(args[0])
-
-    return types.int64(types.int64), code
-
-
-@intrinsic
-def vector_lane(typing: Any, vector: Any, lane: Any) -> Any:
-    """The number in one lane."""
-
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.extract_element(args[0], builder.trunc(args[1], ir.IntType(32)))
-
-    return types.float64(vector, types.int64), code
-
-
-@intrinsic
-def with_lane(typing: Any, vector: Any, lane: Any, number: Any) -> Any:
-    """The vector with another number in one lane."""
-
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.insert_element(args[0], args[2], builder.trunc(args[1], ir.IntType(32)))
-
-    return vector_type(vector, types.int64, types.float64), code
+def dot(pairs: list[tuple[Any, Any]], start: Any = None) -> Any:
+    """start + the sum of the products; None stands for zero."""
+    for a, b in pairs:
+        if a is not None and b is not None:
+            start = multiply(a, b) if start is None else (a.fma(b, start) if isinstance(a, Vec) else b.fma(a, start))
+    return start

@@ -2,7 +2,7 @@
 
 The texts of `layout.py`, `steps.py`, `observe.py`, `legs.py` and this file are compiled as one, with two of `flow`,
 once for every model, for the width of this machine's registers. What a structure adds, `code`, comes through
-pointers: `lane_series`, `lane_impact`, `lane_field` (see `emit.py`), and the scalar `constants` and `geometry`.
+pointers: `lane_series`, `lane_impact`, `lane_field` (see `lane_functions.py`), and the scalar `constants` and `geometry`.
 
 A step of all lanes: Taylor series; a step for each lane; a sweep of Horner's rule that gives the end of the step and bounds the
 gap; the root in the lanes whose gap has one for certain; impacts. A lane whose step shows anything else -- rest, slow impacts,

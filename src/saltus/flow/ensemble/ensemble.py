@@ -18,7 +18,6 @@ from saltus.flow.forcing_time import Clock, clock
 from saltus.flow.simulation import Program, check_gap, limits_of, program
 from saltus.progress import Progress, silent
 from saltus.systems import System, check_system, numbers
-from saltus.taylor import Emitter
 
 if TYPE_CHECKING:
     import xarray
@@ -183,9 +182,7 @@ def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> L
     """The compiled lanes of a system and what they are to keep."""
     key = run.structure.module.__name__
     if key not in _functions:
-        emitter = Emitter(run.trace)
-        emitter.source()
-        _functions[key] = load_lane_functions(run.trace, emitter)
+        _functions[key] = load_lane_functions(run.trace)
     slots, functions = _functions[key]
     own = len(system.model.coordinates)
     return Lanes(

@@ -1,10 +1,11 @@
-"""The types of the lanes' functions, which are called through pointers (see `jit.py`)."""
+"""The types of the lanes' functions, which are called through pointers (see `flow/function_types.py`)."""
 
 from __future__ import annotations
 
 from numba import types
 
-from saltus.taylor import private_numba as jit
+from saltus.flow.function_types import ADVANCE, CONSTANTS, GEOMETRY, MODEL
+from saltus.taylor import pointers
 
 _f, _i = types.float64, types.int64
 _f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
@@ -18,10 +19,10 @@ JOBS = types.Tuple((_f2, _f2, _i2, _f2))  # states; numbers; labels; parameters
 TABLES = types.Tuple((_f1, _f3))  # record breakpoints, record table
 LANES = types.Tuple((_i2, _f2, _f2, _f2, _f3, _i2))  # what goes with each lane besides the memory: see `driver.py`
 RESULTS = types.Tuple((_f2, _f2, _i2, _f3))  # states; numbers; labels; samples
-with jit.pointers():
-    _functions = (LANE_SERIES, LANE_IMPACT, LANE_FIELD, jit.CONSTANTS, jit.GEOMETRY)
+with pointers():
+    _functions = (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS, GEOMETRY)
     CODE = types.Tuple([types.FunctionType(signature) for signature in _functions])
-    SCALAR = types.Tuple((types.FunctionType(jit.ADVANCE), types.Tuple(tuple(jit.MODEL.types[i] for i in (0, 1, 2, 3, 5)))))
+    SCALAR = types.Tuple((types.FunctionType(ADVANCE), types.Tuple(tuple(MODEL.types[i] for i in (0, 1, 2, 3, 5)))))
     VISIT_LANE = types.UniTuple(_i, 2)(_i, SCALAR, _i1, _i1, _f1, _i1, _f1, LANES, _f2, TABLES, _f1, _i1)
     HELPERS = types.Tuple([types.FunctionType(signature) for signature in (LANE_ROOT, TURNING_RANGE, VISIT_LANE)])
 RUN_LANES = types.void(CODE, SCALAR, HELPERS, _i1, _i1, _f1, _f1, JOBS, TABLES, RESULTS, _i1)

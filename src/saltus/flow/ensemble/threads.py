@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from saltus.flow import kernel_layout as k
-from saltus.flow.compiled import Pointer
 from saltus.flow.ensemble import lane_layout as at
 from saltus.flow.ensemble.compiled_lanes import load_advance, load_driver, load_helpers
+from saltus.flow.ensemble.lane_functions import Slots
 from saltus.flow.simulation import Program, taylor_order
 from saltus.progress import Progress, silent
-from saltus.taylor import CACHE_LINE, WIDTH, Slots
+from saltus.taylor import CACHE_LINE, WIDTH, pointer
 
 CHUNK = 1024  # trajectories that one call of the driver runs: some milliseconds a forcing period
 WHAT = "following the motions"  # for the progress
@@ -61,7 +61,7 @@ class Lanes:
 
     program: Program
     slots: Slots
-    functions: tuple[Pointer, ...]  # lane_series, lane_impact, lane_field
+    functions: tuple[Any, ...]  # lane_series, lane_impact, lane_field
     parameters: np.ndarray  # of the system; `Jobs.columns` replaces some
     records: tuple[np.ndarray, np.ndarray]
     tol: float
@@ -135,7 +135,7 @@ class Lanes:
         """What every call of the driver is given: functions, sizes, places and settings."""
         structure, order = self.program.structure, lane_order(self.tol)
         module, scalar = structure.module, structure.functions
-        code = (*self.functions, Pointer(module.constants), Pointer(module.geometry))
+        code = (*self.functions, pointer(module.constants), pointer(module.geometry))
         sizes = np.zeros(at.SIZES, dtype=np.int64)
         sizes[[at.MODEL_ROWS, at.COLUMN_COUNT, at.STOP_ROWS]] = module.OWN, module.COLUMNS, module.STOPS
         sizes[[at.SIDED, at.BENDS, at.RECORD_ROWS]] = module.SIDES, module.STEEP, self.slots.records
@@ -151,7 +151,7 @@ class Lanes:
 
     def _memory(self) -> np.ndarray:
         """The lanes' memory; vectors lie within one line of the cache each, or every load would touch two."""
-        size, line = self.slots.places["end"] * WIDTH, CACHE_LINE // 8
+        size, line = self.slots.end * WIDTH, CACHE_LINE // 8
         buffer = np.zeros(size + line)
         start = -(buffer.ctypes.data // 8) % line
         return buffer[start : start + size]

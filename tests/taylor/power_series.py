@@ -1,14 +1,17 @@
 """Truncated power series in 40 digits, composed by brute force: what the generated recurrences are held against.
 
 f(u) is the sum of f^(j)(u_0) / j! (u - u_0)^j, with the derivatives from mpmath and the powers multiplied out. No recurrence of
-`saltus.taylor.scalar_source` is used.
+`saltus.taylor.rules` is used.
 """
 
 import mpmath as mp
 import numpy as np
 
+from saltus.taylor import rules
+
 DIGITS = 40
-FUNCTIONS = {name: getattr(mp, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")}
+# By NumPy's names: every function of the rules, which mpmath has under the same name.
+FUNCTIONS = {rule.numpy.__name__: getattr(mp, name) for name, rule in rules.FUNCTIONS.items()} | {"tan": mp.tan}
 
 
 class Series:

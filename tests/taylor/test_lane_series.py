@@ -1,4 +1,4 @@
-"""The series of the lanes: every allowed operation but abs, in all lanes at once, against power series composed in 40 digits."""
+"""The series of the lanes: every operation and function, in all lanes at once, against power series composed in 40 digits."""
 
 import itertools
 from dataclasses import dataclass
@@ -7,17 +7,17 @@ from typing import ClassVar
 import numpy as np
 from numba import njit, types
 from power_series import solution
-from test_emit import OPERATIONS, agrees, force
+from test_series import OPERATIONS, agrees, force
 
 from saltus.flow.ensemble.compiled_lanes import load_lane_functions
 from saltus.flow.ensemble.function_types import LANE_SERIES
-from saltus.flow.ensemble.lane_layout import HIGHEST_ORDER, LOWEST_ORDER, NOW, STRIDE
 from saltus.flow.ensemble.threads import lane_order
+from saltus.flow.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, LanePart, LaneSlot
+from saltus.flow.memory_layout import SERIES_LENGTH as STRIDE
 from saltus.flow.simulation import program
 from saltus.systems import Harmonic, Load, Model, Record, System, WallOscillator
 from saltus.taylor import private_numba as jit
-from saltus.taylor.scalar_source import Emitter
-from saltus.taylor.tracing import RECORD_WIDTH
+from saltus.taylor.graph import RECORD_WIDTH
 from saltus.taylor.vectors import WIDTH
 
 # Operations on a record, whose series ends: what they make ends soon, or late, or never
@@ -28,7 +28,7 @@ OF_RECORD = {
     "powers of a record": lambda r, q, v: (2 + r) ** 1.5 + np.sinh(0.3 * r) * q / np.cosh(r * v) + 1 / (2 + r) + (q + 2) ** r,
 }
 PIECE = (0.3, -0.2, 0.15, 0.4, -0.1)  # of the record, from the time of the step
-NAMES = [name for name in OPERATIONS if name != "abs"]  # a side has the first coordinate only
+NAMES = list(OPERATIONS)
 STATES = [(0.35, 0.55, 0.0), (-0.45, -0.3, 2.1)]
 ORDER = 12
 
@@ -56,9 +56,7 @@ class LaneSeries:
 
     def __init__(self, system):
         self.run = program(system)
-        emitter = Emitter(self.run.trace)
-        emitter.source()
-        self.slots, (self.function, *_) = load_lane_functions(self.run.trace, emitter)
+        self.slots, (self.function, *_) = load_lane_functions(self.run.trace)
         with jit.pointers():
             kind = types.FunctionType(LANE_SERIES)
             self.call = njit(types.void(kind, types.float64[::1], types.int64))(_call)
@@ -66,21 +64,21 @@ class LaneSeries:
     def coefficients(self, states, order):
         """Of positions, velocities, accelerations, shape (lanes, coordinates, STRIDE); `states` = (t, positions, velocities)."""
         places, rows = self.slots.places, self.slots.rows
-        m = np.full(places["end"] * WIDTH, np.nan)
+        m = np.full(self.slots.end * WIDTH, np.nan)
         memory = m.reshape(-1, WIDTH)
+        memory[LaneSlot.ORIGIN], memory[LaneSlot.SIDE] = 0.0, 1.0
         for lane in range(WIDTH):
-            memory[NOW, lane], q, v = states[lane % len(states)]
-            memory[NOW + 1, lane], memory[NOW + 2, lane] = 0.0, 1.0
-            memory[places["position"] : places["position"] + rows, lane] = q
-            memory[places["velocity"] : places["velocity"] + rows, lane] = v
-        for name, values in (("parameters", self.run.env[0]), ("constants", self.run.env[1])):
-            memory[places[name] : places[name] + len(values)] = values[:, None]
+            memory[LaneSlot.NOW, lane], q, v = states[lane % len(states)]
+            memory[places[LanePart.POSITION] : places[LanePart.POSITION] + rows, lane] = q
+            memory[places[LanePart.VELOCITY] : places[LanePart.VELOCITY] + rows, lane] = v
+        for part, values in ((LanePart.PARAMETERS, self.run.env[0]), (LanePart.CONSTANTS, self.run.env[1])):
+            memory[places[part] : places[part] + len(values)] = values[:, None]
         for k in range(self.slots.records * RECORD_WIDTH):
-            memory[places["records"] + k] = PIECE[k]
+            memory[places[LanePart.RECORDS] + k] = PIECE[k]
         self.call(self.function, m, order)
         series = [
-            memory[places[f"{name}_series"] : places[f"{name}_series"] + rows * STRIDE].reshape(rows, STRIDE, WIDTH)
-            for name in ("position", "velocity", "acceleration")
+            memory[places[part] : places[part] + rows * STRIDE].reshape(rows, STRIDE, WIDTH)
+            for part in (LanePart.POSITIONS, LanePart.VELOCITIES, LanePart.ACCELERATIONS)
         ]
         return [part.transpose(2, 0, 1) for part in series]
 

@@ -1,0 +1,104 @@
+"""A structure's functions for lanes, and where they find everything in the memory of a group of lanes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from saltus.flow.compiled import constants, motion_roots
+from saltus.flow.event_derivatives import saltation
+from saltus.flow.memory_layout import FIRST_PART, SERIES_LENGTH, LanePart, LaneSlot
+from saltus.taylor import RECORD_WIDTH, Case, Expr, Places, Rows, Trace, function_text, tape
+
+
+@dataclass(frozen=True)
+class Slots:
+    """Where everything lies in the memory of a group of lanes, in slots of one vector (see `memory_layout.py`)."""
+
+    rows: int  # coordinates, those of the sensitivities included
+    own: int  # the model's
+    parameters: int
+    constants: int
+    records: int
+    stops: int
+
+    @cached_property
+    def places(self) -> dict[LanePart, int]:
+        """The first slot of each part."""
+        sizes = [self.rows] * 8 + [self.parameters, self.constants, self.records * RECORD_WIDTH]
+        sizes += [rows * SERIES_LENGTH for rows in (self.rows, self.rows, self.own, self.stops)]
+        return {part: FIRST_PART + sum(sizes[:part]) for part in LanePart}
+
+    @property
+    def end(self) -> int:
+        """How many slots there are."""
+        return self.places[LanePart.MARGINS] + self.stops * SERIES_LENGTH
+
+
+def slots_of(trace: Trace) -> Slots:
+    """The memory that a structure needs."""
+    return Slots(
+        rows=len(trace.acceleration),
+        own=trace.dof,
+        parameters=max(1, len(trace.parameters)),
+        constants=max(1, len(constants(trace))),
+        records=len(trace.records),
+        stops=len(trace.margins),
+    )
+
+
+def lane_functions_text(trace: Trace) -> str:
+    """The source of `lane_series`, `lane_impact` and `lane_field`."""
+    slots, known = slots_of(trace), constants(trace)
+    return _series(trace, slots, known) + _impact(trace, slots, known) + _field(trace, slots, known)
+
+
+def _leaves(slots: Slots, time: LaneSlot, position: LanePart, velocity: LanePart) -> dict[str, tuple[str, int]]:
+    """Where the lanes' memory has the leaves of a trace, of one of the times and states in it."""
+    parts = {"coordinate": position, "velocity": velocity, "parameter": LanePart.PARAMETERS, "constant": LanePart.CONSTANTS}
+    numbers = {"time": time, "record_time": LaneSlot.NOW, "origin": LaneSlot.ORIGIN, "side": LaneSlot.SIDE}
+    first = {op: slots.places[part] for op, part in (parts | {"record": LanePart.RECORDS}).items()}
+    return {op: ("m", int(slot)) for op, slot in (first | numbers).items()}
+
+
+def _series(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
+    """`lane_series(m, order)`: the series of positions and velocities from the state, of the accelerations and of the margins.
+
+    Coefficients 0..order of positions and velocities, 0..order - 1 of the others; an even order from LOWEST_ORDER on.
+    """
+
+    def rows(part: LanePart, count: int) -> list[tuple[str, int]]:
+        return [("m", slots.places[part] + row * SERIES_LENGTH) for row in range(count)]
+
+    columns = [None] * (slots.rows - slots.own)
+    targets = [*rows(LanePart.ACCELERATIONS, slots.own), *columns, *rows(LanePart.MARGINS, slots.stops)]
+    positions, velocities = rows(LanePart.POSITIONS, slots.rows), rows(LanePart.VELOCITIES, slots.rows)
+    margins = motion_roots(trace)[trace.gap is not None :]
+    content = [Rows(positions, velocities, targets, SERIES_LENGTH, any_order=False)]
+    places = Places(("m", "order"), _leaves(slots, LaneSlot.NOW, LanePart.POSITION, LanePart.VELOCITY))
+    return function_text("lane_series", places, "LANES", [*content, tape([*trace.acceleration, *margins], known, series=True)])
+
+
+def _impact(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
+    """`lane_impact(m)`: the side, positions and velocities after an impact at the new state, the tangent's columns included."""
+    if trace.contact is None or trace.next_side is None or trace.velocity_after is None:
+        return _at_new_state("lane_impact", slots, {}, known)
+    positions, velocities = [trace.contact], [trace.velocity_after]
+    if trace.columns:
+        jump = saltation(trace)
+        positions, velocities = positions + jump.coordinate, velocities + jump.velocity
+    results = {("m", int(LaneSlot.NEW_SIDE)): trace.next_side}
+    for part, roots in ((LanePart.AFTER_POSITION, positions), (LanePart.AFTER_VELOCITY, velocities)):
+        results |= {("m", slots.places[part] + row): root for row, root in enumerate(roots)}
+    return _at_new_state("lane_impact", slots, results, known)
+
+
+def _field(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
+    """`lane_field(m)`: the accelerations at the new state, put where velocities after an impact would be."""
+    first = slots.places[LanePart.AFTER_VELOCITY]
+    return _at_new_state("lane_field", slots, {("m", first + row): a for row, a in enumerate(trace.acceleration)}, known)
+
+
+def _at_new_state(name: str, slots: Slots, results: dict[tuple[str, int], Expr], known: dict[Expr, int]) -> str:
+    places = Places(("m",), _leaves(slots, LaneSlot.NEW_TIME, LanePart.NEW_POSITION, LanePart.NEW_VELOCITY))
+    return function_text(name, places, "LANES", [Case(tape(list(results.values()), known), list(results))])

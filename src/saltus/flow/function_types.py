@@ -1,0 +1,28 @@
+"""The types of the functions that the flow of one motion compiles: the kernel's, and those of a structure that it calls."""
+
+from __future__ import annotations
+
+from numba import types
+
+from saltus.taylor import pointers
+
+_f, _i = types.float64, types.int64
+_f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
+_i1, _i2 = (types.Array(_i, n, "C") for n in (1, 2))
+ENV = types.Tuple((_f1, _f1, _f1, _f3))  # parameters, constants, record breakpoints, record table
+
+CONSTANTS = types.void(_f1, _f1)
+GEOMETRY = types.void(ENV, _f1)
+SERIES = types.void(_f, _f, _f, ENV, _i, _f2, _f2, _f2, _f1, _f2, _f2, _i)
+CONTACT_SERIES = types.void(_f, _f, _f, ENV, _i, _f1, _f2, _i)
+RESET = types.UniTuple(_f, 2)(_f, _f, _f, _f, ENV, _i)
+CONTACT_DAMPING = _f(_f, _f, _f, ENV, _i)
+TANGENT = types.void(_i, _i, _f, _f, _f, ENV, _i, _f1)
+
+with pointers():
+    _functions = [types.FunctionType(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING, TANGENT)]
+    MODEL = types.Tuple((*_functions[:4], _f1, _functions[4]))
+STEP_BUFFERS, EVENT_BUFFERS = types.Tuple((_i2, _f2, _f3)), types.Tuple((_i2, _f2))
+ADVANCE = _i(_i1, _f1, _f1, ENV, MODEL, STEP_BUFFERS, EVENT_BUFFERS)
+SEGMENTS = _i(_i1, _f1, ENV, MODEL, _f2, _i2, _f2, _f2, _f3, _f2)
+IMPACT_EQUATIONS = types.void(_f2, _f1, _f1, _f, _i, _f2, _f3, _f2, _f3, _f3, _f3)

@@ -1,0 +1,117 @@
+"""Where generated code finds what it reads, and puts what it makes: in the arguments of its function."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.taylor.graph import RECORD_WIDTH
+from saltus.taylor.records import expand_record
+from saltus.taylor.tapes import Node
+from saltus.taylor.vectors import DOUBLE, LONG, Arithmetic, Vec
+
+ENVIRONMENT = ("parameters", "constants", "breaks", "table")  # the arrays that the argument `env` is made of
+Place = tuple[str, int]  # an argument and, where it is an array, the element, row of a matrix or slot of one vector
+
+
+@dataclass(frozen=True)
+class Places:
+    """The arguments of a function, and which of them holds the leaves of each kind, from which element on.
+
+    Leaves: `time`, `origin`, `side`; `coordinate`, `velocity`, `parameter`, `constant`, each as many as there are; and `record`.
+    Records lie in `table` and are expanded about the time; if another argument is given for them, they lie there as they are,
+    expanded about the time `record_time`.
+    """
+
+    arguments: tuple[str, ...]
+    leaves: dict[str, Place]
+
+
+class Memory:
+    """The arguments of a function while its code is written."""
+
+    def __init__(self, builder: Any, arithmetic: Arithmetic, places: Places, arguments: tuple[Any, ...]) -> None:
+        self.builder, self.arithmetic, self.leaves = builder, arithmetic, places.leaves
+        self.arguments: dict[str, Any] = dict(zip(places.arguments, arguments, strict=True))
+        if "env" in self.arguments:
+            self.arguments |= zip(ENVIRONMENT, self.arguments["env"], strict=True)
+
+    def pointer(self, place: Place) -> Any:
+        """LLVM's pointer to an element of an array, to the first one of a row of a matrix, or to a slot of one vector."""
+        name, index = place
+        array, wide = self.arguments[name], self.arithmetic.width
+        offset = LONG(index * wide) if len(array.shape) == 1 else self.builder.mul(LONG(index), array.shape[1])
+        return self.builder.bitcast(self.builder.gep(array.data, [offset]), self.arithmetic.of(DOUBLE).as_pointer())
+
+    def load(self, place: Place) -> Vec:
+        """A number."""
+        argument = self.arguments[place[0]]
+        return Vec(self.builder, self.at(self.pointer(place)) if hasattr(argument, "shape") else argument, self.arithmetic)
+
+    def at(self, pointer: Any) -> Any:
+        """LLVM's value behind a pointer."""
+        loaded = self.builder.load(pointer)
+        loaded.align = 8
+        return loaded
+
+    def store(self, place: Place, value: Vec | float | None) -> None:
+        """Put a number into an array."""
+        self.builder.store(self.value(value), self.pointer(place)).align = 8
+
+    def value(self, number: Vec | float | None) -> Any:
+        """LLVM's value of a number."""
+        return number.value if isinstance(number, Vec) else self.arithmetic.constant(number or 0.0)
+
+    def leaf(self, node: Node) -> Vec | float:
+        """A leaf's number, at the time for which they are given."""
+        op, *index = node
+        if op == "number":
+            return float(index[0])
+        if op == "record":
+            coefficients, since = self._piece(index[0]), self._since()
+            value = coefficients[-1]
+            for coefficient in coefficients[-2::-1]:
+                value = value * since + coefficient
+            return value
+        name, first = self.leaves[op]
+        return self.load((name, first + (index[0] if index else 0)))
+
+    def record_series(self, row: int) -> Any:
+        """The Taylor coefficients of a record about the time."""
+        coefficients = self._piece(row)
+        if not self._in_table:
+            return coefficients
+        result = np.empty(RECORD_WIDTH, dtype=object)
+        expand_record.py_func(coefficients, 0.0, self._since(), result)
+        return result
+
+    @property
+    def _in_table(self) -> bool:
+        return self.leaves["record"][0] == "table"
+
+    def _piece(self, row: int) -> Any:
+        """The coefficients of a record's current piece, as they lie in memory."""
+        name, first = self.leaves["record"]
+        result = np.empty(RECORD_WIDTH, dtype=object)
+        for k in range(RECORD_WIDTH):
+            place = self._element(row, k) if self._in_table else self.pointer((name, first + row * RECORD_WIDTH + k))
+            result[k] = Vec(self.builder, self.at(place), self.arithmetic)
+        return result
+
+    def _element(self, row: int, k: int) -> Any:
+        """LLVM's pointer to a coefficient of the current piece in the table of records."""
+        table, b = self.arguments["table"], self.builder
+        piece = b.add(b.mul(LONG(row), table.shape[1]), self.arguments["piece"])
+        return b.gep(table.data, [b.add(b.mul(piece, table.shape[2]), LONG(k))])
+
+    def _since(self) -> Any:
+        """The time since that which a record's coefficients count from."""
+        time: Any = self.leaf(("time",))
+        if not self._in_table:
+            return time - self.load(self.leaves["record_time"])
+        before = self.builder.sub(self.arguments["piece"], LONG(1))
+        index = self.builder.select(self.builder.icmp_signed("<", before, LONG(0)), LONG(0), before)
+        anchor = self.at(self.builder.gep(self.arguments["breaks"].data, [index]))  # as `records.anchor` has it
+        return time + self.leaf(("origin",)) - Vec(self.builder, anchor, self.arithmetic)
