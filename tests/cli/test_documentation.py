@@ -39,7 +39,7 @@ def test_every_way_to_write_a_channel(tmp_path):
 
 def test_the_models_table_is_that_of_the_classes():
     rows = {row[0]: row for row in re.findall(r"^\| `(\w+)` \| ([^|]*)\| ([^|]*)\| ([^|]*)\| ([^|]*)\|$", TEXT, re.MULTILINE)}
-    assert set(rows) == set(MODELS)
+    assert set(rows) == {name for name, cls in MODELS.items() if cls.__module__.startswith("saltus.")}
     for name, (_, needs, optional, channels, coordinates) in rows.items():
         model = MODELS[name]
         assert re.findall(r"`(\w+)`", needs + optional) == [f.name for f in dataclasses.fields(model)]

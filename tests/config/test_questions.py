@@ -1,6 +1,5 @@
 """The questions of a study file: every key is an argument of its function, and every argument a file can give is a key."""
 
-import importlib
 import inspect
 import re
 from pathlib import Path
@@ -12,7 +11,7 @@ from hypothesis import strategies as st
 
 from saltus.cli.run_command import check
 from saltus.config import load_study
-from saltus.config.questions import QUESTIONS, keys_of
+from saltus.config.questions import QUESTIONS, Ask, functions_of, keys_of
 from saltus.config.readers import read_pairs, read_values
 from saltus.errors import ParameterError
 
@@ -20,16 +19,9 @@ KEYS = {kind: set(keys_of(kind)) for kind in QUESTIONS}
 FOR_PYTHON_ALONE = {"system", "progress", "store", "workers", "scheduler", "compute", "found", "known", "also"}
 
 
-def functions(kind):
-    """The functions that answer a question."""
-    for place in QUESTIONS[kind]:
-        room, name = place.split(":")
-        yield getattr(importlib.import_module(f"saltus.{room}"), name)
-
-
 @pytest.mark.parametrize("kind", QUESTIONS)
-def test_the_keys_of_a_question_are_the_arguments_of_its_functions(kind):
-    arguments = [argument for function in functions(kind) for argument in inspect.signature(function).parameters.values()]
+def test_the_keys_of_a_question_are_the_arguments_of_its_functions_of(kind):
+    arguments = [argument for function in functions_of(kind) for argument in inspect.signature(function).parameters.values()]
     named = {argument.name for argument in arguments if argument.kind is not argument.VAR_KEYWORD}
     assert KEYS[kind] == named - FOR_PYTHON_ALONE
     assert set(keys_of(kind, ("theta",))) - KEYS[kind] == ({"theta"} if kind == "basins" else set())
@@ -37,7 +29,14 @@ def test_the_keys_of_a_question_are_the_arguments_of_its_functions(kind):
 
 @pytest.mark.parametrize("kind", QUESTIONS)
 def test_every_function_that_answers_can_be_checked_alone(kind):
-    assert all(callable(function.check) for function in functions(kind))
+    assert all(callable(function.check) for function in functions_of(kind))
+
+
+def test_the_first_function_that_takes_all_keys_answers():
+    for kind in QUESTIONS:
+        assert Ask(kind=kind, options={}).function is functions_of(kind)[0]
+    assert Ask(kind="stability_chart", options={"curves": 2, "rows": 3}).function.__name__ == "bordered_chart"
+    assert Ask(kind="response_spectrum", options={"bands": 2}).function.__name__ == "response_spectrum"
 
 
 def test_a_grid_is_evenly_spaced_or_a_list():
@@ -129,7 +128,7 @@ def test_the_page_names_every_key_of_every_question():
 def test_the_numbers_on_the_page_are_the_defaults():
     compared = 0
     for kind, rows in tables():
-        signature = {k: v for function in functions(kind) for k, v in inspect.signature(function).parameters.items()}
+        signature = {k: v for function in functions_of(kind) for k, v in inspect.signature(function).parameters.items()}
         for keys, default in rows:
             if len(keys) == 1 and keys[0] in signature and re.fullmatch(r"[\d.e-]+", default):
                 assert signature[keys[0]].default == pytest.approx(float(default))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,7 +50,7 @@ def check(study: Study, ask: Ask, output: Path) -> None:
     Raises:
         ParameterError: an argument without meaning, or in `output` the store of something else.
     """
-    function: Any = function_of(ask)
+    function: Any = ask.function
     study.answer(ask, function.check, **({"store": output / f"{ask.kind}.zarr"} if ask.kind in SWEPT else {}))
 
 
@@ -84,23 +83,10 @@ def answer(study: Study, ask: Ask, output: Path, plot: bool, scheduler: str | No
     console.print(f"Results are in {output}: {', '.join(file.name for file in files)}", markup=False, soft_wrap=True)
 
 
-def function_of(ask: Ask) -> Callable[..., Any]:
-    """The function that answers a question."""
-    from saltus import attractors, studies
-
-    special: dict[str, Callable[..., Any]] = {
-        "attractors": attractors.find_attractors,
-        "basins": attractors.basins_of_attraction,
-    }
-    if ask.kind == "stability_chart" and "curves" in ask.options:
-        return studies.bordered_chart
-    return special.get(ask.kind) or getattr(studies, ask.kind)
-
-
 def computed(study: Study, ask: Ask, output: Path, progress: Progress, scheduler: str | None) -> Any:
     """The Dataset or DataTree that answers a question."""
     more = {"store": output / f"{ask.kind}.zarr", "scheduler": scheduler} if ask.kind in SWEPT else {}
-    data = study.answer(ask, function_of(ask), progress=progress, **more)
+    data = study.answer(ask, ask.function, progress=progress, **more)
     return data.to_xarray() if ask.kind == "attractors" else data
 
 

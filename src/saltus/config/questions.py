@@ -12,6 +12,7 @@ from typing import Any, get_type_hints
 
 from saltus.config.readers import Reader, read_table, reader_of
 from saltus.config.source import Source
+from saltus.errors import ParameterError
 from saltus.systems import System
 
 QUESTIONS: dict[str, tuple[str, ...]] = {
@@ -20,8 +21,8 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
     "bifurcation_diagram": ("studies:bifurcation_diagram", "studies:orbit_diagram"),
     "attractors": ("attractors:find_attractors",),
     "basins": ("attractors:basins_of_attraction",),
-    "stability_chart": ("studies:bordered_chart", "studies:stability_chart"),
-}  # the function that answers each question, then the one to which it hands its further options
+    "stability_chart": ("studies:stability_chart", "studies:bordered_chart"),
+}  # The first function that takes all the given keys answers; one with open-ended options hands them to the other.
 NOT_IN_FILES = ("system", "store", "workers", "scheduler")  # they are given by the rest of the file or on the command line
 
 
@@ -32,6 +33,21 @@ class Ask:
     kind: str
     options: dict[str, Any]
 
+    @property
+    def function(self) -> Any:
+        """The function that answers it."""
+        for function in functions_of(self.kind):
+            arguments = inspect.signature(function).parameters
+            if any(a.kind is a.VAR_KEYWORD for a in arguments.values()) or set(self.options) <= set(arguments):
+                return function
+        raise ParameterError(f"no function answers {self.kind} with {', '.join(self.options)}")
+
+
+def functions_of(kind: str) -> list[Callable[..., Any]]:
+    """The functions in the table of questions."""
+    places = [place.split(":") for place in QUESTIONS[kind]]
+    return [getattr(import_module(f"saltus.{room}"), name) for room, name in places]
+
 
 def keys_of(kind: str, coordinates: tuple[str, ...] = ()) -> dict[str, Reader]:
     """The keys that the table of a question may have, with their readers: the arguments of types that a file can give.
@@ -40,9 +56,7 @@ def keys_of(kind: str, coordinates: tuple[str, ...] = ()) -> dict[str, Reader]:
         coordinates: the names of the coordinates, which stand for an open-ended argument that holds one array for each.
     """
     keys: dict[str, Reader] = {}
-    for place in QUESTIONS[kind]:
-        room, name = place.split(":")
-        function = getattr(import_module(f"saltus.{room}"), name)
+    for function in functions_of(kind):
         hints = _hints(function)
         for argument in inspect.signature(function).parameters.values():
             reader = reader_of(hints[argument.name])
