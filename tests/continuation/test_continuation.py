@@ -22,7 +22,6 @@ from saltus.continuation import (
     both_ways,
     located,
     newton,
-    solved_at,
 )
 from saltus.continuation import TestFunction as Function  # whose name pytest would take for that of a test
 
@@ -65,7 +64,7 @@ class Explicit(EquationCurve[Point]):
         return self.along_kernel(Corrected(place, self.evaluate(place, True), 0))
 
 
-class Folds(Events[Point]):
+class Folds(Events):
     """Folds, and nothing else."""
 
     keeps_special = True
@@ -113,9 +112,9 @@ def test_folds_do_not_depend_on_the_step(longest):
 def test_all_solutions_at_a_value():
     found = both_ways(cubic().start(0.0, 0.0), Folds, {"p": (-1.0, 1.0)})
     roots = np.sort(np.roots([1.0, 0.0, -1.0, 0.2]).real)
-    assert sorted(point.place[0] for point in solved_at(found.points, 0.2)) == pytest.approx(roots, abs=1e-13)
-    assert [point.parameter for point in solved_at(found.points, found.points[-1].parameter)] == [found.points[-1].parameter]
-    assert solved_at(found.points, 1.5) == []
+    assert sorted(point.place[0] for point in found.solved_at(0.2)) == pytest.approx(roots, abs=1e-13)
+    assert [point.parameter for point in found.solved_at(found.points[-1].parameter)] == [found.points[-1].parameter]
+    assert found.solved_at(1.5) == []
 
 
 def test_two_parameters_and_which_bound_is_met():
@@ -147,7 +146,7 @@ def test_progress_is_the_share_of_the_range_that_was_seen():
     assert {"p = 0", "p = 1"} <= {what for _, what in heard}
 
 
-class Corner(Events[Point]):
+class Corner(Events):
     """y = p for p < 0, y = 2 p beyond: the equations change at 0."""
 
     def __init__(self):
@@ -160,7 +159,6 @@ class Corner(Events[Point]):
         return Cut(corner.point, corner)
 
     def across(self, run, cut):
-        run.special.append(cut.special)
         start = self.beyond.start(*cut.point.place)
         return start if start.tangent[-1] > 0.0 else start.turned()
 
@@ -171,7 +169,7 @@ def test_a_step_is_cut_where_the_equations_change_and_goes_on_with_others():
     (corner,) = found.special
     assert (corner.kind, corner.point.parameter) == ("corner", pytest.approx(0.0, abs=1e-14))
     assert max(point.place[0] for point in found.points) == pytest.approx(2.0, abs=1e-13)
-    assert solved_at(found.points, 0.5)[0].place[0] == pytest.approx(1.0, abs=1e-13)
+    assert found.solved_at(0.5)[0].place[0] == pytest.approx(1.0, abs=1e-13)
 
 
 def test_where_no_step_is_short_enough_the_end_says_so():
@@ -197,7 +195,7 @@ class Root(NaturalCurve[Point]):
         return abs((0.3 - a.parameter) ** 0.5 - (0.3 - b.parameter) ** 0.5)
 
 
-class EndOfRoot(Events[Point]):
+class EndOfRoot(Events):
     """The end where there is no solution left."""
 
     def stalled(self, run, point, step):

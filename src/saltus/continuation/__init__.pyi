@@ -1,13 +1,14 @@
-from .continuation_loop import Continuation
+from .continuation_loop import Continuation, both_ways
 from .corrector import Corrected, Evaluation, newton
-from .course import Course, both_ways, solved_at
+from .course import Course
 from .curve import Curve, Point
 from .end import CurveEnd, End, EndReason
 from .events import Cut, Events
 from .natural_parameter import NaturalCurve, bisected
 from .pseudo_arclength import EquationCurve
 from .step_length import STEPS, StepSettings
-from .test_functions import Evidence, TestFunction, Zero, located
+from .test_functions import TestFunction, located
+from .zero import Evidence, Zero
 
 __all__ = [
     "STEPS",
@@ -32,5 +33,4 @@ __all__ = [
     "both_ways",
     "located",
     "newton",
-    "solved_at",
 ]

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Generic
+from typing import Any
 
 import numpy as np
 
-from saltus.continuation.curve import P
+from saltus.continuation.course import Course
 from saltus.continuation.end import CurveEnd, End
 from saltus.continuation.events import Cut, Events
 from saltus.continuation.step_length import STEPS, StepSettings
-from saltus.continuation.test_functions import Zero, located
+from saltus.continuation.test_functions import located
+from saltus.continuation.zero import Zero
 from saltus.progress import Progress, silent
 
 AHEAD = 1e-6  # of a point along its tangent, to know its direction in other numbers
@@ -22,14 +23,14 @@ WIDE = 0.2  # share of a step by which the first point of a curve may lie beside
 Bounds = Mapping[str, tuple[float, float]]  # the least and the largest value of each parameter, by its name
 
 
-class Watch(Generic[P]):
+class Watch:
     """Tells how much of a curve has been seen: of the range of its first parameter, or of the points it may have."""
 
     def __init__(self, progress: Progress, bounds: Bounds, most_points: int) -> None:
         self.progress, self.names, self.most_points = progress, tuple(bounds), most_points
         self.bounds, self.seen, self.points = next(iter(bounds.values())), (np.inf, -np.inf), 0
 
-    def __call__(self, point: P) -> None:
+    def __call__(self, point: Any) -> None:
         """Tell of a new point."""
         if self.progress is silent:
             return
@@ -41,19 +42,19 @@ class Watch(Generic[P]):
 
 
 @dataclass
-class Continuation(Generic[P]):
+class Continuation:
     """One direction of a curve while it is being followed."""
 
     bounds: Bounds
-    events: Events[P]
+    events: Events
     steps: StepSettings = STEPS
-    watch: Callable[[P], object] = lambda point: None
-    points: list[P] = field(default_factory=list)
-    special: list[Zero[P]] = field(default_factory=list)
+    watch: Callable[[Any], object] = lambda point: None
+    points: list[Any] = field(default_factory=list)
+    special: list[Zero] = field(default_factory=list)
     missed: list[str] = field(default_factory=list)
     end: End | None = None
 
-    def follow(self, first: P, born: bool = False) -> None:
+    def follow(self, first: Any, born: bool = False) -> None:
         """Follow the curve from a point until it ends; `born` at a special point, whose own events are not to be found again."""
         self.points.append(first)
         self.end = self._on_a_bound(first)
@@ -69,7 +70,12 @@ class Continuation(Generic[P]):
             if self.end is None and len(self.points) > self.steps.most_points:
                 self.end = End(CurveEnd.MOST_POINTS, ahead.parameter, detail=str(self.steps.most_points))
 
-    def _step(self, before: P | None, point: P, step: float) -> tuple[P | None, float]:
+    def course(self, start: End) -> Course:
+        """The curve as it was followed, which began with an end for a reason of its own."""
+        assert self.end is not None
+        return Course(tuple(self.points), tuple(self.special), (start, self.end), tuple(self.missed))
+
+    def _step(self, before: Any, point: Any, step: float) -> tuple[Any, float]:
         """The next point, and the length of the step after it."""
         curve, length = point.curve, step
         while step > self.steps.least:
@@ -83,7 +89,7 @@ class Continuation(Generic[P]):
         self.end = self.events.stalled(self, point, length)
         return None, step
 
-    def _accept(self, point: P, ahead: P, born: bool) -> bool:
+    def _accept(self, point: Any, ahead: Any, born: bool) -> bool:
         """Take a step up to the first of its events; returns whether the curve goes on with other equations."""
         cut = self.events.cut(point, ahead)
         if isinstance(cut, End):
@@ -107,8 +113,9 @@ class Continuation(Generic[P]):
         self.end = self.end or end or self.events.ended(self, ahead, cut)
         return self.end is None and cut is not None and self._cross(cut)
 
-    def _cross(self, cut: Cut[P]) -> bool:
+    def _cross(self, cut: Cut) -> bool:
         """Go on beyond a cut; returns whether that is with other equations."""
+        self.special += [] if cut.special is None else [cut.special]
         following = self.events.across(self, cut)
         if isinstance(following, End):
             self.end = following
@@ -117,7 +124,7 @@ class Continuation(Generic[P]):
             return True
         return False
 
-    def _note(self, a: P, b: P) -> None:
+    def _note(self, a: Any, b: Any) -> None:
         """Locate the special points of a step, in order."""
         found = []
         for test in self.events.tests(a):
@@ -134,7 +141,7 @@ class Continuation(Generic[P]):
                 self.points.append(zero.point)
             self.end = self.end or self.events.last(zero)
 
-    def _on_a_bound(self, point: P) -> End | None:
+    def _on_a_bound(self, point: Any) -> End | None:
         """The end of a curve that starts on a bound and leads beyond it."""
         tangent = point.tangent[-len(self.bounds) :]
         for (name, (low, high)), value, rate in zip(self.bounds.items(), point.parameters, tangent, strict=True):
@@ -145,7 +152,7 @@ class Continuation(Generic[P]):
     def _bound(self, name: str, value: float) -> End:
         return End(CurveEnd.BOUND, float(value), detail=f"{name} = " if len(self.bounds) > 1 else "")
 
-    def _beyond(self, a: P, b: P) -> tuple[P, End] | None:
+    def _beyond(self, a: Any, b: Any) -> tuple[Any, End] | None:
         """The point on the first bound that a step goes over or ends on, and the end there."""
         start, chord = a.parameters, b.parameters - a.parameters
         shares = []
@@ -161,7 +168,7 @@ class Continuation(Generic[P]):
         guess[place] = bound
         return a.curve.solve_at(guess, b.place - a.place, place) or b, self._bound(list(self.bounds)[index], bound)
 
-    def _closes(self, a: P, b: P) -> bool:
+    def _closes(self, a: Any, b: Any) -> bool:
         """Whether a step goes by the first point of the curve, in the direction in which the curve was followed there."""
         if len(self.points) <= 3:
             return False
@@ -179,3 +186,21 @@ class Continuation(Generic[P]):
         moved = self.events.nearest(first, first.place + AHEAD * first.tangent, b)
         assert moved is not None
         return float((moved - place) @ (b.curve.weights**2 * b.tangent)) > 0.0  # else it comes back along itself
+
+
+def both_ways(
+    first: Any, events: Callable[[], Events], bounds: Bounds, steps: StepSettings = STEPS, progress: Progress = silent
+) -> Course:
+    """The curve through a point, followed against its tangent and then along it, or once if it closes."""
+    watch: Watch = Watch(progress, bounds, steps.most_points)
+    halves = []
+    for point in (first.turned(), first):
+        run: Continuation = Continuation(bounds, events(), steps, watch)
+        run.follow(point)
+        halves.append(run.course(End(CurveEnd.CLOSED)))
+        if run.end == End(CurveEnd.CLOSED):
+            return halves[-1]
+    back, ahead = halves
+    points = (*(point.turned() for point in reversed(back.points[1:])), *ahead.points)
+    special = (*reversed(back.special), *ahead.special)
+    return Course(points, special, (back.ends[1], ahead.ends[1]), (*back.missed, *ahead.missed))

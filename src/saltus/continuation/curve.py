@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
+
+from saltus.continuation.zero import Zero
 
 P = TypeVar("P", bound="Point")
 
@@ -20,6 +22,8 @@ class Point:
     place: np.ndarray  # unknowns y, then parameters p
     tangent: np.ndarray  # of length 1 in the norm of the curve
     iterations: int  # of the corrector that found it
+
+    zero_type: ClassVar[type[Zero]] = Zero  # of its special points
 
     @property
     def parameters(self) -> np.ndarray:

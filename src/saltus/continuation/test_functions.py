@@ -4,49 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Generic
+from typing import Any
 
 import numpy as np
 
-from saltus.continuation.curve import P
 from saltus.continuation.predictor import between
+from saltus.continuation.zero import Evidence, Zero
 
 
 @dataclass(frozen=True)
-class TestFunction(Generic[P]):
+class TestFunction:
     """A function of the points of a curve whose zeros are special points of one kind."""
 
     kind: str
-    value: Callable[[P], float]
+    value: Callable[[Any], float]
     width: float = 1e-11  # of the bracket in the step that contains the zero; the point nearest to zero is nearer still
 
 
-@dataclass(frozen=True)
-class Evidence:
-    """What a special point is known by."""
-
-    residual: float  # of the equations
-    brackets: tuple[float, ...]  # the width in each parameter within which the test function changes its sign
-    before: float  # the test function at the ends of the step that contains the point
-    after: float
-    value: float  # and at the point itself
-
-    @property
-    def bracket(self) -> float:
-        """The largest of these widths."""
-        return max(self.brackets)
-
-
-@dataclass(frozen=True, eq=False)
-class Zero(Generic[P]):
-    """A special point of a curve: the kind of its test function, the point, and the evidence."""
-
-    kind: str
-    point: P
-    evidence: Evidence
-
-
-def located(test: TestFunction[P], a: P, b: P) -> Zero[P] | None:
+def located(test: TestFunction, a: Any, b: Any) -> Zero | None:
     """The point between a and b at which a test function goes through zero; None if the curve cannot be followed between."""
     from scipy.optimize import brentq
 
@@ -70,10 +45,12 @@ def located(test: TestFunction[P], a: P, b: P) -> Zero[P] | None:
     except (ArithmeticError, RuntimeError):
         return None
     point, value = min(known.values(), key=lambda pair: abs(pair[1]))
-    return Zero(test.kind, point, Evidence(point.residual, _brackets(point, before, known.values()), before, after, value))
+    return point.zero_type(
+        test.kind, point, Evidence(point.residual, _brackets(point, before, known.values()), before, after, value)
+    )
 
 
-def _brackets(point: P, before: float, known: Iterable[tuple[P, float]]) -> tuple[float, ...]:
+def _brackets(point: Any, before: float, known: Iterable[tuple[Any, float]]) -> tuple[float, ...]:
     """How near to a zero the test function is known to have either sign, in each parameter."""
     sides: dict[bool, list[np.ndarray]] = {True: [], False: []}
     for other, value in known:

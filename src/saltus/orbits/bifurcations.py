@@ -13,7 +13,7 @@ from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import SpecialKind, UserFunction
 
-Test = TestFunction[OrbitPoint]
+Test = TestFunction
 
 
 def fold(point: OrbitPoint) -> float:

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from saltus.continuation import Course, CurveEnd, End, solved_at
+from saltus.continuation import Course, End
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.orbit_curve import OrbitPoint
-from saltus.orbits.resting_family import RestingPoint
-from saltus.orbits.special_point import OrbitEnd, SpecialPoint, special_points
+from saltus.orbits.special_point import OrbitEnd
 
 if TYPE_CHECKING:
     import xarray
@@ -21,7 +19,7 @@ START = End(OrbitEnd.START)
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(Course):
     """A branch: its points in order, the special ones among them, and why it ends on both sides.
 
     A family of resting orbits is a branch as well: `special` then holds grazings (GR), the zeros of margins and functions, and
@@ -29,26 +27,12 @@ class Branch:
     """
 
     path: str
-    points: tuple[OrbitPoint | RestingPoint, ...]
-    special: tuple[SpecialPoint, ...]
-    ends: tuple[End, End]
     origin: End = START  # what it was begun from: a start, or the special point of another branch
-    missed: tuple[str, ...] = ()  # special points whose test function changed its sign where no zero was found
-
-    @classmethod
-    def of(cls, path: str, course: Course) -> Branch:
-        """A curve of orbits as a branch."""
-        return cls(path, course.points, special_points(course.special), course.ends, missed=course.missed)
 
     @property
     def orbits(self) -> list[PeriodicOrbit]:
         """The orbits, in order."""
         return [point.orbit for point in self.points]
-
-    @cached_property
-    def parameters(self) -> np.ndarray:
-        """The parameter along it, (n,)."""
-        return np.array([point.parameter for point in self.points])
 
     @cached_property
     def amplitudes(self) -> np.ndarray:
@@ -60,14 +44,9 @@ class Branch:
         """Whether each orbit is stable, (n,)."""
         return np.array([point.orbit.stable for point in self.points])
 
-    @property
-    def closed(self) -> bool:
-        """Whether it is a loop."""
-        return self.ends[0].reason is CurveEnd.CLOSED
-
     def at(self, value: float) -> list[PeriodicOrbit]:
         """All orbits of the branch at a value of the parameter, solved there."""
-        return [point.orbit for point in solved_at(self.points, value)]
+        return [point.orbit for point in self.solved_at(value)]
 
     def to_xarray(self) -> xarray.Dataset:
         """The branch as a dataset, see `branch_dataset.py`."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from saltus.checks import check_along, check_bounds, check_path
-from saltus.continuation import STEPS, Continuation, Course, End, StepSettings, both_ways
+from saltus.continuation import STEPS, Continuation, End, both_ways
 from saltus.errors import ParameterError
 from saltus.orbits.branch import START, Branch
 from saltus.orbits.branch_events import BranchEvents
@@ -15,7 +15,7 @@ from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitPoint, start
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import RestingOrbit
-from saltus.orbits.resting_family import RESTING_STEPS, RestingEvents, first_point
+from saltus.orbits.resting_family import RestingEvents, first_point, resting_steps
 from saltus.orbits.special_point import SpecialKind, UserFunction
 from saltus.orbits.symmetry import full_period, half, keeps_symmetry
 from saltus.progress import Progress, silent
@@ -49,12 +49,14 @@ def continue_orbit(
         ParameterError: an unknown parameter, bounds that exclude the orbit.
     """
     low, high = _checked(orbit, path, bounds)
-    limits: dict[str, Any] = {"bounds": {path: (low, high)}, "progress": progress}
+    first: Any
+    events: Any
     if isinstance(orbit, RestingOrbit):
-        family, steps = first_point(orbit, path, (low, high)), replace(RESTING_STEPS, longest=step, first=0.1 * step)
-        return Branch.of(path, both_ways(family, lambda: RestingEvents(functions or {}), steps=steps, **limits))
-    first = start(*along(orbit, path), scale=(high - low) / 3.0)
-    return Branch.of(path, both_ways(first, lambda: BranchEvents(functions or {}), steps=_steps(step), **limits))
+        first, events, steps = first_point(orbit, path, (low, high)), RestingEvents, resting_steps(step)
+    else:
+        first, events, steps = start(*along(orbit, path), scale=(high - low) / 3.0), BranchEvents, replace(STEPS, longest=step)
+    course = both_ways(first, lambda: events(functions or {}), {path: (low, high)}, steps, progress)
+    return Branch(**vars(course), path=path)
 
 
 def follow_stable(orbit: PeriodicOrbit, path: str, target: float) -> Branch:
@@ -66,12 +68,13 @@ def follow_stable(orbit: PeriodicOrbit, path: str, target: float) -> Branch:
     events: Any
     if isinstance(orbit, RestingOrbit):
         first, events = first_point(orbit, path, (low, high)), RestingEvents({})
-        steps = replace(RESTING_STEPS, longest=NEARBY_STEPS.longest, first=NEARBY_STEPS.first)
+        steps = resting_steps(NEARBY_STEPS.longest)
     else:
         first, events = start(*along(orbit, path), scale=high - low), BranchEvents(while_stable=True)
         steps = NEARBY_STEPS
     run = Continuation({path: (low, high)}, events, steps)
-    return _followed(run, first if target > value else first.turned(), START)
+    run.follow(first if target > value else first.turned())
+    return Branch(**vars(run.course(START)), path=path)
 
 
 def follow_from(
@@ -84,21 +87,9 @@ def follow_from(
 ) -> Branch:
     """The branch that begins at a special point of another one, in the direction of its tangent."""
     path = first.orbit.problem.paths[0]
-    run = Continuation({path: bounds}, BranchEvents(functions or {}, until), _steps(step))
-    return _followed(run, first, origin, born=True)
-
-
-def _followed(run: Continuation, first: Any, origin: End, born: bool = False) -> Branch:
-    """The branch of one direction, from where it begins."""
-    run.follow(first, born)
-    assert run.end is not None
-    (path,) = run.bounds
-    course = Course(tuple(run.points), tuple(run.special), (origin, run.end), tuple(run.missed))
-    return replace(Branch.of(path, course), origin=origin)
-
-
-def _steps(longest: float) -> StepSettings:
-    return replace(STEPS, longest=longest)
+    run = Continuation({path: bounds}, BranchEvents(functions or {}, until), replace(STEPS, longest=step))
+    run.follow(first, born=True)
+    return Branch(**vars(run.course(origin)), path=path, origin=origin)
 
 
 def _checked(orbit: PeriodicOrbit, path: str, bounds: Any) -> tuple[float, float]:

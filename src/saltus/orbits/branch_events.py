@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.continuation import Continuation, CurveEnd, Cut, End, Events, Zero, located
+from saltus.continuation import Continuation, Cut, End, Events, Zero, located
 from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, grazing
 from saltus.orbits.grazing import other_side
 from saltus.orbits.images import asymmetry, falls_onto_image, halves_of, nearest, passes_image, repetition
@@ -17,8 +17,7 @@ from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.signature import Signature
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, UserFunction
 
-Run = Continuation[OrbitPoint]
-Special = Zero[OrbitPoint]
+Run = Continuation
 
 
 @dataclass(frozen=True)
@@ -40,8 +39,20 @@ class BranchSettings:
 SETTINGS = BranchSettings()
 
 
+class OrbitEvents(Events):
+    """The events along any curve of orbits."""
+
+    def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
+        """The end of an orbit that has shrunk to rest."""
+        return End(OrbitEnd.SHRINKS, ahead.parameter) if ahead.orbit.amplitude < SETTINGS.smallest else None
+
+    def nearest(self, point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+        """A place counted from the impact from which it lies nearest to another point."""
+        return nearest(point, place, other)
+
+
 @dataclass
-class BranchEvents(Events[OrbitPoint]):
+class BranchEvents(OrbitEvents):
     """The events along a branch."""
 
     functions: dict[str, UserFunction] = field(default_factory=dict)
@@ -56,12 +67,9 @@ class BranchEvents(Events[OrbitPoint]):
         skipped = grazing(point) <= TOUCH and grazing(ahead) < 0.0
         return not skipped and not falls_onto_image(point, ahead)
 
-    def cut(self, point: OrbitPoint, ahead: OrbitPoint) -> Cut[OrbitPoint] | End | None:
-        """The grazing in a step, if there is one."""
-        if grazing(ahead) >= 0.0:
-            return None
-        graze = located(GRAZING, point, ahead)
-        return End(CurveEnd.NOT_LOCATED, ahead.parameter, detail="grazing") if graze is None else Cut(graze.point, graze)
+    def barrier(self) -> Test:
+        """A grazing, which is gone through."""
+        return GRAZING
 
     def interrupted(self, run: Run, point: OrbitPoint, ahead: OrbitPoint) -> End | None:
         """The end at the orbit's own image, on the branch from which its family is born, at its BPC or PD."""
@@ -72,41 +80,39 @@ class BranchEvents(Events[OrbitPoint]):
         if parent is not None:
             run.points.append(parent.point)
             run.special.append(parent)
-        return End(OrbitEnd.IMAGE, ahead.parameter if parent is None else parent.point.parameter, kind)
+        return End(OrbitEnd.IMAGE, ahead.parameter if parent is None else parent.parameter, kind)
 
     def tests(self, point: OrbitPoint) -> Iterator[Test]:
         """All test functions but that of grazings."""
         return branch_tests(point, self.functions)
 
-    def distinct(self, found: list[Special]) -> list[Special]:
+    def distinct(self, found: list[Zero]) -> list[Zero]:
         """Special points without the crossings of branches that are folds."""
-        folds = [zero.point.parameter for zero in found if zero.kind == SpecialKind.LP]
+        folds = [zero.parameter for zero in found if zero.kind == SpecialKind.LP]
 
-        def is_fold(zero: Special) -> bool:
+        def is_fold(zero: Zero) -> bool:
             crossing = zero.kind == SpecialKind.BPC and not zero.point.orbit.symmetric
-            return crossing and any(abs(zero.point.parameter - p) < SETTINGS.same_fold for p in folds)
+            return crossing and any(abs(zero.parameter - p) < SETTINGS.same_fold for p in folds)
 
         return [zero for zero in found if not is_fold(zero)]
 
-    def last(self, special: Special) -> End | None:
+    def last(self, special: Zero) -> End | None:
         """The end at the first special point of the kind that is looked for."""
-        return End(OrbitEnd.FIRST, special.point.parameter, special.kind) if special.kind == self.until else None
+        return End(OrbitEnd.FIRST, special.parameter, special.kind) if special.kind == self.until else None
 
-    def ended(self, run: Run, ahead: OrbitPoint, cut: Cut[OrbitPoint] | None) -> End | None:
+    def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
         """The end of an orbit that has shrunk to rest, or has lost its stability."""
-        if ahead.orbit.amplitude < SETTINGS.smallest:
-            return End(OrbitEnd.SHRINKS, ahead.parameter)
         if self.while_stable and cut is None and not ahead.orbit.stable:
-            return End(OrbitEnd.UNSTABLE, ahead.parameter)
-        return None
+            return super().ended(run, ahead, cut) or End(OrbitEnd.UNSTABLE, ahead.parameter)
+        return super().ended(run, ahead, cut)
 
-    def across(self, run: Run, cut: Cut[OrbitPoint]) -> OrbitPoint | End:
+    def across(self, run: Run, cut: Cut) -> OrbitPoint | End:
         """The point with the signature on the other side of a grazing, or why the branch does not go on."""
         graze = cut.special
         assert graze is not None
-        if any(_same_place(graze, earlier) for earlier in run.special):
-            return End(OrbitEnd.COMES_BACK, graze.point.parameter)
-        run.special.append(graze)
+        if any(_same_place(graze, earlier) for earlier in run.special[:-1]):
+            run.special.pop()
+            return End(OrbitEnd.COMES_BACK, graze.parameter)
         following = other_side(graze.point)
         if isinstance(following, End):
             return following
@@ -124,10 +130,6 @@ class BranchEvents(Events[OrbitPoint]):
             return End(OrbitEnd.REPELS, point.parameter, detail=f"{largest:.1g}")
         return super().stalled(run, point, step)
 
-    def nearest(self, point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
-        """A place counted from the impact from which it lies nearest to another point."""
-        return nearest(point, place, other)
-
 
 def _accumulate(run: Run, following: OrbitPoint) -> bool:
     """Whether the last grazings have all added impacts, ever closer to one parameter or on the way to rest."""
@@ -140,7 +142,7 @@ def _accumulate(run: Run, following: OrbitPoint) -> bool:
     return span < SETTINGS.gathered * following.curve.scales[0] or (small and counts[-1] > SETTINGS.many)
 
 
-def _same_place(a: Special, b: Special) -> bool:
+def _same_place(a: Zero, b: Zero) -> bool:
     """Whether two grazings are one and the same, met from the same side."""
     one, other = a.point, b.point
     same = (a.kind, one.orbit.signature) == (b.kind, other.orbit.signature)
@@ -148,7 +150,7 @@ def _same_place(a: Special, b: Special) -> bool:
     return same and near and math.isclose(one.orbit.amplitude, other.orbit.amplitude, rel_tol=1e-9)
 
 
-def parent_point(a: OrbitPoint, b: OrbitPoint) -> Special | None:
+def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
     """The special point at which a family was born that passes through an orbit that is its own image, on the parent's branch.
 
     There the family's own equations are singular; those of the parent, over half of the period, are not.

@@ -18,12 +18,12 @@ NARROW = 1e-15  # width of the bracket, in the step that contains the point
 CAP = 1.0  # of the room that a motion has before another grazing, which may be infinite
 
 
-def curve_test(kind: SpecialKind, value: Callable[[SpecialCurvePoint], float]) -> TestFunction[SpecialCurvePoint]:
+def curve_test(kind: SpecialKind, value: Callable[[SpecialCurvePoint], float]) -> TestFunction:
     """A test function along a curve of special points."""
     return TestFunction(kind, value, NARROW)
 
 
-def curve_tests(kind: str, symmetric: bool) -> list[TestFunction[SpecialCurvePoint]]:
+def curve_tests(kind: str, symmetric: bool) -> list[TestFunction]:
     """The test functions along a curve of a kind, by the codimension-two point at which each vanishes.
 
     Beside a grazing the trace of the multipliers' matrix of the orbits with more impacts is (a number) / v. Where that number

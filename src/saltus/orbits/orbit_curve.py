@@ -12,6 +12,7 @@ from saltus.continuation import Corrected, EquationCurve, Point
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Equations, Problem
+from saltus.orbits.special_point import SpecialPoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,6 +20,8 @@ class OrbitPoint(Point):
     """An orbit as a point of a curve: `place` is its unknowns and the parameters."""
 
     equations: Equations
+
+    zero_type = SpecialPoint
 
     @cached_property
     def solution(self) -> Solution:

@@ -15,18 +15,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from saltus.continuation import STEPS, Continuation, Cut, End, Events, Evidence, NaturalCurve, Point, TestFunction, Zero, bisected
+from saltus.continuation import (
+    Continuation,
+    Cut,
+    End,
+    Events,
+    Evidence,
+    NaturalCurve,
+    Point,
+    StepSettings,
+    TestFunction,
+    bisected,
+)
 from saltus.errors import SaltusError
 from saltus.flow import Release, load_releases, peak_near
 from saltus.orbits.bifurcations import orbit_tests
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import RestingOrbit, resting_orbit
 from saltus.orbits.signature import Signature
-from saltus.orbits.special_point import OrbitEnd, SpecialKind, UserFunction
-
-# The steps are chosen by how much extrema (rad) and the phases of releases and rests change in them; shorter ones than the least,
-# a part of 1e-6 of the range, are cut short by an end.
-RESTING_STEPS = replace(STEPS, aim=0.06, most=0.2, first=0.1 * STEPS.longest, least=3e-6)
+from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
 
 
 @dataclass(frozen=True)
@@ -39,6 +46,10 @@ class RestingSettings:
     behind: float = 0.05  # rad before a release, from where its peak is looked for as the parameter changes
     brief: float = 1e-3  # rad of phase: a rest so short is the one that vanishes
     faint: float = 1e-3  # speed and clearance by which a touch is told from other changes of the impacts
+    change: float = 0.06  # of extrema (rad) and of the phases of releases and rests in a step, that is aimed at,
+    most_change: float = 0.2  # and the most that is accepted
+    first_step: float = 0.1  # the first step as a share of the longest
+    short: float = 3e-6  # a step shorter than a millionth of the range is cut short by an end of the family
 
 
 SETTINGS = RestingSettings()
@@ -49,6 +60,8 @@ class RestingPoint(Point):
     """A resting orbit as a point of its family."""
 
     orbit: RestingOrbit
+
+    zero_type = SpecialPoint
 
     @property
     def residual(self) -> float:
@@ -90,6 +103,12 @@ class RestingCurve(NaturalCurve[RestingPoint]):
         return max(float(turned), abs(other.highest - one.highest), abs(other.lowest - one.lowest))
 
 
+def resting_steps(longest: float) -> StepSettings:
+    """The control of the steps along a family."""
+    first = SETTINGS.first_step * longest
+    return StepSettings(SETTINGS.change, SETTINGS.most_change, longest, first, least=SETTINGS.short)
+
+
 def first_point(orbit: RestingOrbit, path: str, bounds: tuple[float, float]) -> RestingPoint:
     """An orbit as the first point of its family, to be followed towards larger parameters."""
     begin = _followed(orbit, path, float(orbit.system.get(path)))
@@ -108,7 +127,7 @@ def _followed(orbit: RestingOrbit, path: str, value: float, index: int = 0) -> R
         return abs((release.time * frequency - phase + math.pi) % (2.0 * math.pi) - math.pi)
 
     nearest = min((release for release in load_releases(system) if release.side == side), key=apart, default=None)
-    if nearest is None or apart(nearest) > RESTING_STEPS.most:
+    if nearest is None or apart(nearest) > SETTINGS.most_change:
         return None
     found = resting_orbit(Problem(system, Signature((), 1), (path,)), nearest, orbit.period)
     return found if found is not None and found.excursions[0, 0] == nearest.time else None
@@ -124,14 +143,14 @@ def _shortest_rest(orbit: RestingOrbit) -> float:
 
 
 @dataclass
-class RestingEvents(Events[RestingPoint]):
+class RestingEvents(Events):
     """The events along a family of resting orbits."""
 
     functions: dict[str, UserFunction]
 
     name = "family"
 
-    def cut(self, point: RestingPoint, ahead: RestingPoint) -> Cut[RestingPoint] | None:
+    def cut(self, point: RestingPoint, ahead: RestingPoint) -> Cut | None:
         """The orbit just beyond a change of the impacts that touch, which is a grazing if the touch has no speed."""
         count = len(point.orbit.touching)
         if count == len(ahead.orbit.touching):
@@ -144,18 +163,14 @@ class RestingEvents(Events[RestingPoint]):
         graze = None
         if clearance < SETTINGS.faint and speed < SETTINGS.faint:
             evidence = Evidence(few.residual, (abs(beyond - near.parameter),), clearance, -speed, 0.0)
-            graze = Zero(SpecialKind.GR, few, evidence)
+            graze = SpecialPoint(SpecialKind.GR, few, evidence)
         return Cut(after if point.tangent[-1] > 0.0 else after.turned(), graze)
-
-    def across(self, run: Continuation[RestingPoint], cut: Cut[RestingPoint]) -> None:
-        """Beyond a grazing the family goes on as it is."""
-        run.special += [cut.special] if cut.special is not None else []
 
     def tests(self, point: RestingPoint) -> Iterator[TestFunction]:
         """The margins of the model and the functions of the user."""
         return orbit_tests(point.orbit, self.functions)
 
-    def ended(self, run: Continuation[RestingPoint], ahead: RestingPoint, cut: Cut[RestingPoint] | None) -> End | None:
+    def ended(self, run: Continuation, ahead: RestingPoint, cut: Cut | None) -> End | None:
         """The end where the release is lost, ahead of an orbit that has all but shrunk to rest; None if the bound is before."""
         if ahead.orbit.amplitude >= SETTINGS.smallest:
             return None
@@ -176,17 +191,17 @@ class RestingEvents(Events[RestingPoint]):
                 narrow = SETTINGS.narrow * abs(beyond)
                 lost = float(brentq(peak, value, beyond, xtol=narrow, rtol=1e-15))
                 evidence = Evidence(orbit.residual, (SETTINGS.narrow * abs(lost),), before, after, peak(lost))
-                run.special.append(Zero(SpecialKind.RL, curve.point(orbit, lost), evidence))
+                run.special.append(SpecialPoint(SpecialKind.RL, curve.point(orbit, lost), evidence))
                 side = int(orbit.release_sides[int(np.argmin(orbit.pulls))])
                 what = "rest lasts" if len(orbit.releases) <= 2 else "the rests on both sides of that release are one"
                 return End(OrbitEnd.NO_PULL, lost, SpecialKind.RL, f"{side:+d}, and {what}")
             reach *= 2.0
         return None
 
-    def stalled(self, run: Continuation[RestingPoint], point: RestingPoint, step: float) -> End:
+    def stalled(self, run: Continuation, point: RestingPoint, step: float) -> End:
         """The end between an orbit and a value at which it is no more, by what lies beyond."""
         curve = point.curve
-        last, beyond = bisected(point, curve.ahead(point, step), lambda other: curve.turn(point, other) <= RESTING_STEPS.most)
+        last, beyond = bisected(point, curve.ahead(point, step), lambda other: curve.turn(point, other) <= SETTINGS.most_change)
         run.points.append(last if point.tangent[-1] > 0.0 else last.turned())
         orbit, value = last.orbit, last.parameter
         try:
@@ -196,7 +211,7 @@ class RestingEvents(Events[RestingPoint]):
             return End(OrbitEnd.NO_ORBIT, value, detail=str(error))
         end, tests = _what_ends(last, other)
         if end.kind:
-            run.special.append(Zero(end.kind, last, Evidence(last.residual, (abs(beyond - value),), *tests)))
+            run.special.append(SpecialPoint(end.kind, last, Evidence(last.residual, (abs(beyond - value),), *tests)))
         return end
 
 

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.continuation import Corrected, CurveEnd, End, solved_at
+from saltus.continuation import Corrected, Course
 from saltus.errors import ParameterError
 from saltus.orbits.conditions import Condition, ConditionValue, Slow
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitCurve, OrbitPoint
 from saltus.orbits.problem import Equations
-from saltus.orbits.special_point import SpecialPoint
 from saltus.provenance import provenance
 
 if TYPE_CHECKING:
@@ -93,30 +91,16 @@ class ConditionedCurve(OrbitCurve):
 
 
 @dataclass(frozen=True, eq=False)
-class SpecialCurve:
+class SpecialCurve(Course):
     """A curve of special points in two parameters: its points in order, its codimension-two points, and why it ends."""
 
     kind: str  # LP, PD, BPC or GR
     paths: tuple[str, str]
-    points: tuple[SpecialCurvePoint, ...]
-    special: tuple[SpecialPoint, ...]
-    ends: tuple[End, End]
-    missed: tuple[str, ...] = ()  # special points whose test function changed its sign where no zero was found
 
     @property
     def orbits(self) -> list[PeriodicOrbit]:
         """The orbits, in order."""
         return [point.orbit for point in self.points]
-
-    @cached_property
-    def parameters(self) -> np.ndarray:
-        """Both parameters along the curve, (n, 2)."""
-        return np.array([point.parameters for point in self.points])
-
-    @property
-    def closed(self) -> bool:
-        """Whether it is a loop."""
-        return self.ends[0].reason is CurveEnd.CLOSED
 
     def at(self, path: str, value: float) -> list[PeriodicOrbit]:
         """All orbits of the curve at a value of one of its parameters, solved there.
@@ -126,7 +110,7 @@ class SpecialCurve:
         """
         if path not in self.paths:
             raise ParameterError(f"{path!r} is not a parameter of this curve; it has {self.paths[0]!r} and {self.paths[1]!r}")
-        return [point.orbit for point in solved_at(self.points, value, self.paths.index(path) - 2)]
+        return [point.orbit for point in self.solved_at(value, self.paths.index(path) - 2)]
 
     def to_xarray(self) -> xarray.Dataset:
         """The curve along `point`, its codimension-two points along `special`.

@@ -9,22 +9,21 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import check_bounds, check_path
-from saltus.continuation import STEPS, Continuation, CurveEnd, Cut, End, Events, TestFunction, both_ways, located
+from saltus.continuation import STEPS, Continuation, Cut, End, TestFunction, both_ways
 from saltus.errors import ParameterError
 from saltus.orbits.branch_continuation import STEP
-from saltus.orbits.branch_events import SETTINGS
+from saltus.orbits.branch_events import OrbitEvents
 from saltus.orbits.codimension import curve_test, curve_tests, room
 from saltus.orbits.conditions import Condition, Singular, Slow
 from saltus.orbits.find import divide
 from saltus.orbits.grazing import TOGETHER, inserted
-from saltus.orbits.images import nearest
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import TOUCH
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.special_curve import ConditionedCurve, SpecialCurve, SpecialCurvePoint
-from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, special_points
+from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.symmetry import half, keeps_symmetry, over_full_period
 from saltus.progress import Progress, silent
 
@@ -33,7 +32,7 @@ TENFOLD = 10.0  # a parameter without bounds is followed to so many times its va
 
 
 @dataclass
-class CurveEvents(Events[SpecialCurvePoint]):
+class CurveEvents(OrbitEvents):
     """The events along a curve of special points of a kind."""
 
     kind: str
@@ -46,32 +45,18 @@ class CurveEvents(Events[SpecialCurvePoint]):
             return End(OrbitEnd.REFUSED, point.parameter, detail=str(refusal))
         return None
 
-    def cut(self, point: SpecialCurvePoint, ahead: SpecialCurvePoint) -> Cut[SpecialCurvePoint] | End | None:
-        """Another grazing in a step."""
-        if room(ahead) >= 0.0:
-            return None
-        meeting = located(curve_test(SpecialKind[f"{self.kind}_GR"], room), point, ahead)
-        if meeting is None:
-            return End(CurveEnd.NOT_LOCATED, ahead.parameter, detail="grazing")
-        return Cut(meeting.point, meeting)
+    def barrier(self) -> TestFunction:
+        """Another grazing."""
+        return curve_test(SpecialKind[f"{self.kind}_GR"], room)
 
-    def across(self, run: Continuation, cut: Cut[SpecialCurvePoint]) -> End:
+    def across(self, run: Continuation, cut: Cut) -> End:
         """The end at another grazing."""
         assert cut.special is not None
-        run.special.append(cut.special)
         return End(OrbitEnd.MEETS_GRAZING, cut.point.parameter, cut.special.kind)
 
-    def tests(self, point: SpecialCurvePoint) -> Iterable[TestFunction[SpecialCurvePoint]]:
+    def tests(self, point: SpecialCurvePoint) -> Iterable[TestFunction]:
         """The test functions of codimension-two points."""
         return curve_tests(self.kind, point.orbit.symmetric)
-
-    def ended(self, run: Continuation, ahead: SpecialCurvePoint, cut: Cut[SpecialCurvePoint] | None) -> End | None:
-        """The end of an orbit that has shrunk to rest."""
-        return End(OrbitEnd.SHRINKS, ahead.parameter) if ahead.orbit.amplitude < SETTINGS.smallest else None
-
-    def nearest(self, point: SpecialCurvePoint, place: np.ndarray, other: SpecialCurvePoint) -> np.ndarray | None:
-        """A place counted from the impact from which it lies nearest to another point."""
-        return nearest(point, place, other)
 
 
 def continue_special(
@@ -112,15 +97,9 @@ def continue_special(
     check_path(system, path)
     limits = _limits(special, system.parameters[path], bounds, first_bounds)
     start = _start(special, (first_path, path), limits)
-    course = both_ways(
-        start,
-        lambda: CurveEvents(special.kind),
-        {first_path: limits[0], path: limits[1]},
-        steps=replace(STEPS, longest=step),
-        progress=progress,
-    )
-    found = special_points(course.special)
-    return SpecialCurve(special.kind, (first_path, path), course.points, found, course.ends, course.missed)
+    bounds_of = {first_path: limits[0], path: limits[1]}
+    course = both_ways(start, lambda: CurveEvents(special.kind), bounds_of, replace(STEPS, longest=step), progress)
+    return SpecialCurve(**vars(course), kind=special.kind, paths=(first_path, path))
 
 
 def _limits(special: SpecialPoint, value: float, bounds: Any, first_bounds: Any) -> list[tuple[float, float]]:

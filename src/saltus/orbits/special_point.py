@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable
 from enum import StrEnum
 
 from saltus.continuation import EndReason, Zero
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.orbit_curve import OrbitPoint
 
 UserFunction = Callable[[PeriodicOrbit], float]
 
@@ -84,24 +82,14 @@ class OrbitEnd(EndReason):
     NO_ORBIT = "beyond {parameter:.10g} there is no such motion: {detail}"
 
 
-@dataclass(frozen=True, eq=False)
-class SpecialPoint(Zero[OrbitPoint]):
+class SpecialPoint(Zero):
     """A special point of a branch or of a curve, with its orbit and its evidence; its kind is one of `SpecialKind`, or a name."""
 
     @property
     def orbit(self) -> PeriodicOrbit:
         """The orbit."""
-        return self.point.orbit
-
-    @property
-    def parameter(self) -> float:
-        """The parameter of the branch, the first one of a curve."""
-        return self.point.parameter
-
-    @property
-    def parameters(self) -> tuple[float, ...]:
-        """The parameter of a branch, or both of a curve."""
-        return tuple(map(float, self.point.parameters))
+        orbit: PeriodicOrbit = self.point.orbit
+        return orbit
 
     @property
     def amplitude(self) -> float:
@@ -120,8 +108,3 @@ class SpecialPoint(Zero[OrbitPoint]):
             f"amplitude={self.amplitude:.9g}, period {self.orbit.period}, {self.orbit.signature.impact_count} impacts, "
             f"bracket {self.evidence.bracket:.1g})"
         )
-
-
-def special_points(found: Iterable[Zero]) -> tuple[SpecialPoint, ...]:
-    """The special points that a continuation has located."""
-    return tuple(SpecialPoint(zero.kind, zero.point, zero.evidence) for zero in found)
