@@ -1,4 +1,4 @@
-"""Files that are whole or not there: every output is written beside its place and moved there once complete."""
+"""Files that are complete or not there: every output is written beside its place and moved there once complete."""
 
 from __future__ import annotations
 

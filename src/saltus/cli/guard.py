@@ -1,4 +1,4 @@
-"""What goes wrong is told in one sentence, with an exit status, and without a traceback."""
+"""Errors and interruptions end a command with one sentence and an exit status, without a traceback."""
 
 from __future__ import annotations
 

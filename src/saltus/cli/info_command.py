@@ -17,7 +17,7 @@ def print_info(path: Path) -> None:
     """Print what is known of the system in the study at `path`."""
     from saltus.config import load_study
 
-    study = load_study(path)
+    study = load_study(path, questions=False)
     console = Console(highlight=False)
     console.print(f"[bold]{type(study.system.model).__name__}[/] ", end="")
     console.print(f"from {path}", markup=False, soft_wrap=True)

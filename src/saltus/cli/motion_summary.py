@@ -1,4 +1,4 @@
-"""What a motion comes to, on the terminal."""
+"""The summary of a motion that `saltus simulate` prints."""
 
 from __future__ import annotations
 
@@ -57,6 +57,6 @@ def _validity(motion: Motion) -> list[tuple[str, str]]:
     rows = []
     for name, first in motion.validity.first.items():
         share = 100 * motion.validity.share[name]
-        said = "respected" if first is None else f"passed first at {first:.9g}, beyond it {share:.3g} % of the time"
-        rows.append((name.replace("_", " "), said))
+        verdict = "respected" if first is None else f"passed first at {first:.9g}, beyond it {share:.3g} % of the time"
+        rows.append((name.replace("_", " "), verdict))
     return rows

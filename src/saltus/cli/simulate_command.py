@@ -40,7 +40,7 @@ def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
 
 
 def write_motion(motion: Motion, study: Study, output: Path, plot: bool) -> list[Path]:
-    """Write motion.nc and, with `plot`, motion.png and motion.pdf, each whole or not at all; their paths."""
+    """Write motion.nc and, with `plot`, motion.png and motion.pdf, each complete or not at all; their paths."""
     from saltus.files import write_dataset, write_figure
 
     dataset = motion.to_xarray(sample_times(motion, study.settings().samples))
@@ -56,7 +56,7 @@ def write_motion(motion: Motion, study: Study, output: Path, plot: bool) -> list
 
 
 def long_samples(study: Study) -> Any:
-    """The times at which to keep the states of a motion too long to be kept whole, or None for one that is not."""
+    """The times at which to keep the states of a motion that is too long for its dense output, or None for a shorter one."""
     import numpy as np
 
     given, period = study.settings().arguments, study.system.load.period

@@ -43,7 +43,7 @@ def print_status(path: Path) -> None:
 
 
 def rows(found: Status) -> Iterator[tuple[str, str]]:
-    """What there is to say, line by line."""
+    """The lines of the table: heads and values."""
     yield "chunks", f"{found.done} of {found.total} done ({100 * found.done // found.total} %)"
     yield "grid", ", ".join(f"{size} along {name}" for name, size in found.sizes.items())
     yield "size", size(found.bytes)
@@ -58,7 +58,7 @@ def rows(found: Status) -> Iterator[tuple[str, str]]:
 
 
 def ending(found: Status) -> str:
-    """What follows from it."""
+    """Whether the sweep goes on, and how it can be gone on with."""
     if found.complete:
         return "The sweep is complete."
     if found.running:

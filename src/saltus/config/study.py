@@ -57,7 +57,7 @@ class Study:
         """`function(system, ...)` with the arguments of a question, and `more`.
 
         Raises:
-            ParameterError: the function refuses an argument, told at its place in the file.
+            ParameterError: the function refuses an argument, with its place in the file.
             MotionError, TraceError, SweepError: as the function raises them, with the file's name.
         """
         try:
@@ -69,8 +69,12 @@ class Study:
             raise type(error)(f"{self.source.path}, {ask.kind}: {error}") from error
 
 
-def load_study(path: Path | str) -> Study:
+def load_study(path: Path | str, *, questions: bool = True) -> Study:
     """The study in the TOML file at `path`, checked in full.
+
+    Args:
+        path: of the file.
+        questions: whether the other questions are read, which loads the functions that answer them.
 
     Raises:
         ParameterError: whatever is wrong, in one sentence with the file, the line and the dotted key.
@@ -89,5 +93,5 @@ def load_study(path: Path | str) -> Study:
     except ParameterError as error:
         source.refuse_error(error)
     settings = read_settings(source, system, tables["simulate"]) if "simulate" in tables else None
-    asks = tuple(read_ask(source, system, name, tables[name]) for name in tables if name in QUESTIONS)
+    asks = tuple(read_ask(source, system, name, tables[name]) for name in tables if questions and name in QUESTIONS)
     return Study(name=source.path.stem, system=system, simulate=settings, asks=asks, source=source)

@@ -1,4 +1,4 @@
-"""Impact scenarios: what happened at an impact, told from the states before and after (paper, Table 1, erratum 16)."""
+"""Impact scenarios: what happens at an impact, by the states before and after it (paper, Table 1, erratum 16)."""
 
 from __future__ import annotations
 

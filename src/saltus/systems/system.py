@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -105,11 +105,7 @@ class System:
         Raises:
             ParameterError: text that is no JSON, or no system.
         """
-        try:
-            data = json.loads(text)
-        except ValueError as error:
-            raise ParameterError(f"this is not the JSON of a system: {error}") from None
-        return cls.from_dict(data)
+        return cls.from_dict(_parsed(text, json.loads, "JSON"))
 
     def to_toml(self) -> str:
         """The system as TOML."""
@@ -124,11 +120,14 @@ class System:
         Raises:
             ParameterError: text that is no TOML, or no system.
         """
-        try:
-            data = tomllib.loads(text)
-        except ValueError as error:
-            raise ParameterError(f"this is not the TOML of a system: {error}") from None
-        return cls.from_dict(data)
+        return cls.from_dict(_parsed(text, tomllib.loads, "TOML"))
+
+
+def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:
+    try:
+        return parse(text)
+    except ValueError as error:
+        raise ParameterError(f"this is not the {language} of a system: {error}") from None
 
 
 def check_system(system: Any, asking: str, *, coordinates: int | None = None) -> None:
