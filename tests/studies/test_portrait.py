@@ -217,7 +217,7 @@ def test_where_impacts_cannot_be_undone_there_are_no_separatrices_and_it_is_said
     system = System(model=Metainterface(beta0=1.4), load=Load(vertical=-1.5), impact=EnergyRestitution(0.8))
     data = phase_portrait(system, window=WINDOW, starts=[(0.3, 0.0)], duration=1.0, samples=5)
     assert data.sizes["separatrix"] == 0
-    assert data.attrs["separatrices"] == "none: EnergyRestitution cannot be followed backward"
+    assert data.attrs["no_separatrices"] == "EnergyRestitution cannot be followed backward"
 
 
 # --- refusals ----------------------------------------------------------------------------------------------------------------

@@ -16,10 +16,9 @@ def summarise(kind: str, data: Any) -> Iterator[str]:
 def _portrait(data: Any) -> Iterator[str]:
     stable = int(data["stable"].sum())
     unstable = data.sizes["equilibrium"] - stable
-    why = data.attrs["separatrices"].removeprefix("none: ")
-    yield f"{data.sizes['motion']} motions, {stable} stable and {unstable} unstable equilibria, " + (
-        f"{data.sizes['separatrix']} separatrices." if why == "computed" else f"no separatrices ({why})."
-    )
+    why = data.attrs.get("no_separatrices")
+    count = f"no separatrices ({why})" if why else f"{data.sizes['separatrix']} separatrices"
+    yield f"{data.sizes['motion']} motions, {stable} stable and {unstable} unstable equilibria, {count}."
 
 
 def _chart(data: Any) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from saltus.checks import check_count, check_number, checked_by
 from saltus.errors import ParameterError
 from saltus.flow import simulate
 from saltus.orbits import EVEN
+from saltus.progress import Progress, silent
 from saltus.systems import System, VelocityReduction
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def phase_portrait(
     duration: float = 30.0,
     samples: int = 1500,
     seed: int = 0,
-    progress: Callable[[float], object] | None = None,
+    progress: Progress = silent,
 ) -> xarray.Dataset:
     """The phase plane of a system with one coordinate under a constant load (the paper's Figs. 4 and 5).
 
@@ -56,14 +57,14 @@ def phase_portrait(
         duration: how long, in dimensionless time.
         samples: instants at which each motion is given, besides its impacts.
         seed: of the spread.
-        progress: called with the fraction done, first when all arguments have been checked.
+        progress: called with the fraction done and what is being done, first when all arguments have been checked.
 
     Returns:
         A Dataset: `time`, the coordinate and `velocity` over (motion, sample), with the velocities before and after each impact,
         and nan between them where they differ; `equilibrium`, the coordinates of all equilibria in the window, with `stable`
         and, over (equilibrium, root), the real and imaginary part of the `eigenvalue`s, nan at the contact;
         `separatrix_<coordinate>` and `separatrix_velocity` over (separatrix, point): the stable manifolds of the saddles, none
-        where the impact law has no inverse (the attribute `separatrices` says why).
+        where the impact law has no inverse (the attribute `no_separatrices` says why).
 
     Raises:
         ParameterError: a load that varies, several coordinates, numbers, a window or starts without meaning.
@@ -71,17 +72,16 @@ def phase_portrait(
     """
     points = equilibria(system, window)
     states = _spread(system, window, points, seed) if starts is None else _states(system, starts)
-    say = progress or (lambda _: None)
-    say(0.0)
     rows = []
     for i, state in enumerate(states):
+        progress(0.8 * i / len(states), "following motions")
         rows.append(_sampled(system, state, duration, samples))
-        say(0.8 * (i + 1) / len(states))
+    progress(0.8, "separatrices")
     why = _no_inverse(system)
     parting = () if why else separatrices(system, window)
     said: dict[str, Any] = {"window": [float(x) for pair in window for x in pair], "duration": float(duration)}
-    said |= {"starts": "spread" if starts is None else "given", "separatrices": why or "computed"}
-    say(1.0)
+    said |= {"starts": "spread" if starts is None else "given", **({"no_separatrices": why} if why else {})}
+    progress(1.0, "done")
     return _dataset(system, rows, points, parting, said)
 
 
@@ -132,7 +132,7 @@ def _no_inverse(system: System) -> str:
     """Why motions cannot be followed back through impacts, or nothing."""
     if not system.model.sides or (isinstance(system.impact, VelocityReduction) and system.impact.e > 0.0):
         return ""
-    return f"none: {type(system.impact).__name__} cannot be followed backward"
+    return f"{type(system.impact).__name__} cannot be followed backward"
 
 
 def _sampled(system: System, state: np.ndarray, duration: float, samples: int) -> np.ndarray:

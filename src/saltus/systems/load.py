@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 from saltus.checks import check_number
@@ -40,6 +41,7 @@ class Channel:
         return self._derivative(t, 2)
 
 
+@dataclass(frozen=True, init=False, repr=False)
 class Load:
     """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H), vertical=-0.5)`.
 
@@ -56,8 +58,6 @@ class Load:
     Raises:
         ParameterError: a harmonic without a frequency, a record of the wrong quantity.
     """
-
-    __slots__ = ("channels", "frequency")
 
     frequency: float | None
     channels: dict[str, Signal]
@@ -76,22 +76,10 @@ class Load:
         object.__setattr__(self, "frequency", frequency)
         object.__setattr__(self, "channels", signals)
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        raise AttributeError("a Load is frozen; system.with_({'load.frequency': ...}) makes a changed copy")
-
     def __getattr__(self, name: str) -> Channel:
         if name.startswith("_"):  # IPython, pickle and copy probe for names like these
             raise AttributeError(name)
         return Channel(self.channels.get(name), self.frequency)
-
-    def __reduce__(self) -> Any:
-        return _rebuild, (self.frequency, self.channels)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Load) and (self.frequency, self.channels) == (
-            other.frequency,
-            other.channels,
-        )
 
     def __hash__(self) -> int:
         return hash((self.frequency, tuple(sorted(self.channels.items(), key=lambda item: item[0]))))
@@ -107,10 +95,6 @@ class Load:
     def period(self) -> float | None:
         """The forcing period 2 pi / Omega, or None for a load without a base frequency."""
         return None if self.frequency is None else 2.0 * math.pi / self.frequency
-
-
-def _rebuild(frequency: float | None, channels: dict[str, Signal]) -> Load:
-    return Load(frequency=frequency, **channels)
 
 
 def _check_records(name: str, signal: Signal) -> None:
