@@ -1,4 +1,4 @@
-"""Branches of a diagram's DataTree as lines over the parameter, which pictures draw and measurements read.
+"""Branches of a diagram's DataTree as lines over the parameter, and borders of a chart's: what pictures draw and measures read.
 
 A diagram has children `branch_000`, `branch_001`, ... (see `saltus.orbits`), each with `parameter`, `stable`, `impact_count` and
 quantities such as `amplitude` over its points, and the `kind` of its special points with their places.
@@ -29,6 +29,12 @@ def branches_of(diagram: Any) -> Iterator[tuple[str, Any]]:
     for name in sorted(diagram.children):
         if name.startswith("branch_"):
             yield name, diagram[name].to_dataset()
+
+
+def border_curves(tree: Any) -> list[Any]:
+    """The exact borders of a chart's DataTree, its children `borders/curve_...`, as Datasets in order."""
+    borders = tree["borders"]
+    return [borders[name].to_dataset() for name in sorted(borders.children) if name.startswith("curve_")]
 
 
 def branch_lines(branch: Any, quantity: str = "amplitude") -> Iterator[BranchLine]:

@@ -7,7 +7,7 @@ from claim_verdicts import verdicts
 from spectrum_cases import branch, diagram
 
 from saltus.paper import Verdict
-from saltus.paper.figures.spectra import under_force
+from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.measures import chaos_measures
 
 

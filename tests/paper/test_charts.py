@@ -10,7 +10,7 @@ from picture_checks import check_provenance, clipped
 
 from saltus.files import write_dataset
 from saltus.paper import FIGURES, Verdict
-from saltus.paper.figures import charts
+from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.measures import chart_areas, chart_measures
 from saltus.plots.chart import draw_stability_chart
 from saltus.theory import high_frequency_onset, is_monostable, quasi_static_border, unloaded_fold
@@ -58,7 +58,7 @@ def test_claims_fail_where_the_data_do_not_bear_them():
 
 def test_the_static_border_is_that_of_the_equilibria():
     for beta0 in (80.0, 60.0):
-        system = charts.system(beta0)
+        system = under_force(beta0=beta0)
         border = quasi_static_border(system, ("load.horizontal.amplitude", "load.vertical"), -2.0).to_xarray()
         vertical, true = border["vertical"].values, border["true"].values
         assert (true[vertical <= unloaded_fold(np.deg2rad(beta0))[0]] == 0.0).all()

@@ -35,9 +35,9 @@ def _chart(data: Any) -> Iterator[str]:
 
 def _borders(tree: Any) -> Iterator[str]:
     """What is known of the changes between neighbouring cells."""
-    from saltus.plots import curves_of
+    from saltus.branch_lines import border_curves
 
-    left, kinds = tree["disagreements"].to_dataset(), [str(curve.attrs["kind"]) for curve in curves_of(tree)]
+    left, kinds = tree["disagreements"].to_dataset(), [str(curve.attrs["kind"]) for curve in border_curves(tree)]
     curves = ", ".join(f"{kinds.count(kind)} {kind}" for kind in sorted(set(kinds))) or "none"
     total, looked = int(left.attrs["changes"]), int(left["looked_into"].sum())
     on, harmless, unexplained = int(left.attrs["on_curves"]), int(left.attrs["harmless"]), left.sizes["change"]

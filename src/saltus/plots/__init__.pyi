@@ -1,6 +1,6 @@
 from .attractors import draw_attractors
 from .basins import draw_basins
-from .chart import chart_legend, curves_of, data_is_tree, draw_chart, draw_closed_form, draw_lines, draw_stability_chart
+from .chart import chart_legend, data_is_tree, draw_chart, draw_closed_form, draw_lines, draw_stability_chart
 from .conventions import DOUBLE_COLUMN, FAINT, SINGLE_COLUMN, STABLE, UNSTABLE, new_figure, panel_label, style, styled
 from .diagram import POINTS, draw_diagram
 from .energy_space import draw_space
@@ -32,7 +32,6 @@ __all__ = [
     "STABLE",
     "UNSTABLE",
     "chart_legend",
-    "curves_of",
     "data_is_tree",
     "draw_attractors",
     "draw_bands",

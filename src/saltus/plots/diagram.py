@@ -10,17 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from saltus.branch_lines import branches_of
+from saltus.plots.axis_names import parameter_name, symbol, unit_in_brackets
 from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure, styled
 from saltus.plots.response import draw_bands, draw_limits, draw_response, response_legend
 
-NAMES = {
-    "load.frequency": r"frequency $\Omega$",
-    "load.horizontal.amplitude": r"load amplitude $\widehat{\mathcal{H}}$",
-    "load.vertical": r"vertical load $\overline{\mathcal{V}}$",
-    "load.vertical.mean": r"mean vertical load $\overline{\mathcal{V}}$",
-    "model.damping": r"damping $\mathcal{C}$",
-    "model.beta0": r"$\beta_0$ (rad)",
-}
 POINTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
 FINEST, COARSEST = 1.3, 3.5  # sizes of these points: as large as the step between values lets them be
 AT_REST = 1e-9  # of the largest: a motion that is smaller in every period is left out
@@ -30,24 +23,29 @@ AT_REST = 1e-9  # of the largest: a motion that is smaller in every period is le
 def draw_diagram(tree: Any) -> Figure:
     """A Figure from the DataTree of `response_spectrum` or `bifurcation_diagram`."""
     low, high = (float(x) for x in tree.attrs["bounds"])
-    symbol, unit = axis_name(tree.attrs["coordinate"])
-    brute = "strobes" in tree.children
-    figure = new_figure(DOUBLE_COLUMN, 150.0 if brute else 95.0)
-    axes = figure.subplots(1 + brute, 1, sharex=True, squeeze=False, height_ratios=[3, 2][: 1 + brute])[:, 0]
+    name, unit = symbol(tree.attrs["coordinate"]), _unit(tree)
+    simulated = "strobes" in tree.children
+    figure = new_figure(DOUBLE_COLUMN, 150.0 if simulated else 95.0)
+    axes = figure.subplots(1 + simulated, 1, sharex=True, squeeze=False, height_ratios=[3, 2][: 1 + simulated])[:, 0]
     axes[0].set_xlim(low, high)
     top = _top(tree, low, high)
     axes[0].set_ylim(-0.02 * top, 1.08 * top)  # so that marks on the axis are seen whole
-    axes[0].set_ylabel(rf"$\max_\tau|{symbol}|${unit}")
+    axes[0].set_ylabel(rf"$\max_\tau|{name}|${unit}")
     limits = _limits(tree)
     draw_response(axes[0], tree)
     draw_limits(axes[0], *limits)
-    if brute:
-        draw_strobes(axes[1], tree)
-        axes[1].set_ylabel(rf"${symbol}$ at phase 0{unit}")
+    if simulated:
+        draw_stroboscopic_states(axes[1], tree)
+        axes[1].set_ylabel(rf"${name}$ at phase 0{unit}")
         axes[1].set_title("stroboscopic points of direct simulation", loc="left", pad=3)
     axes[-1].set_xlabel(parameter_name(tree.attrs["path"]))
     response_legend(figure, [tree], limits=limits[0] < 1.08 * top)
     return figure
+
+
+def _unit(tree: Any) -> str:
+    """The unit of the amplitudes, as the branches carry it."""
+    return next((unit_in_brackets(branch["amplitude"]) for _, branch in branches_of(tree)), "")
 
 
 def _top(tree: Any, low: float, high: float) -> float:
@@ -71,8 +69,8 @@ def _limits(tree: Any) -> tuple[float, float]:
     return straight, 2.0 * straight
 
 
-def draw_strobes(ax: Any, tree: Any) -> None:
-    """The brute-force diagram: where motions are at phase 0 of the load, period after period, from every start."""
+def draw_stroboscopic_states(ax: Any, tree: Any) -> None:
+    """Direct simulation: where motions are at phase 0 of the load, period after period, from every start."""
     strobes = tree["strobes"]
     draw_bands(ax, tree)
     places = strobes["position"].values
@@ -83,13 +81,3 @@ def draw_strobes(ax: Any, tree: Any) -> None:
     size = np.clip(0.5 * width / max(len(strobes["value"]), 1), FINEST, COARSEST)
     ax.plot(values[moving].ravel(), places[moving].ravel(), markersize=size, **POINTS)
     ax.set_xlim(low, high)
-
-
-def parameter_name(path: str) -> str:
-    """What a parameter is called on an axis; its dotted path where it has no name."""
-    return NAMES.get(path, path)
-
-
-def axis_name(coordinate: str) -> tuple[str, str]:
-    """The symbol of a coordinate, and its unit in brackets."""
-    return (r"\theta" + coordinate.removeprefix("theta"), " (rad)") if coordinate.startswith("theta") else (coordinate, "")

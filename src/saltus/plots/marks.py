@@ -1,4 +1,4 @@
-"""Marks shared by the pictures: fixed points, arrows of direction, limit lines, axes in degrees."""
+"""Marks shared by the pictures: fixed points, arrows of direction, limit lines, dimensions, the edges of cells."""
 
 from __future__ import annotations
 
@@ -77,3 +77,11 @@ def arc(
     ax.text(
         centre[0] + reach * radius * np.cos(middle), centre[1] + reach * radius * np.sin(middle), label, ha="center", va="center"
     )
+
+
+def cell_edges(middles: np.ndarray) -> np.ndarray:
+    """The edges of cells about their middles, (n + 1,), halfway between them."""
+    if len(middles) == 1:
+        return middles[0] + np.array([-0.5, 0.5])
+    inner = (middles[1:] + middles[:-1]) / 2
+    return np.concatenate([[2 * middles[0] - inner[0]], inner, [2 * middles[-1] - inner[-1]]])

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from saltus.plots.axis_names import symbol, unit_in_brackets
 from saltus.plots.conventions import DOUBLE_COLUMN, FAINT, INK, STABLE, UNSTABLE, new_figure, styled
 from saltus.plots.marks import limit_lines
 
 if TYPE_CHECKING:
     import xarray
 
-SYMBOLS = {"theta": r"\theta", "theta_1": r"\theta_1", "theta_2": r"\theta_2"}
 LINES: tuple[dict[str, Any], ...] = ({"color": STABLE, "ls": "-"}, {"color": UNSTABLE, "ls": (0, (4, 1.5))})
 
 
@@ -55,11 +55,6 @@ def rate_of(dataset: xarray.Dataset, name: str) -> str:
     return several if several in dataset or name == "velocity" or dataset[name].dims != ("time",) else "velocity"
 
 
-def symbol(name: str) -> str:
-    """The coordinate's symbol in mathematical text."""
-    return SYMBOLS.get(name, name if len(name) == 1 else rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}")
-
-
 def arcs(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time, position and velocity with the impacts put in between the samples, parted by NaN where the velocity jumps."""
     time, position, velocity = (dataset[n].values for n in ("time", name, rate_of(dataset, name)))
@@ -96,12 +91,11 @@ def _portrait(ax: Any, arc: tuple[np.ndarray, np.ndarray, np.ndarray], period: f
 
 
 def _labels(history: Any, portrait: Any, dataset: xarray.Dataset, names: list[str]) -> None:
-    unit = dataset[names[0]].attrs.get("units", "1")
-    tail = "" if unit == "1" else f" ({unit})"
+    unit = unit_in_brackets(dataset[names[0]])
     places = ", ".join(f"${symbol(name)}$" for name in names)
     speeds = ", ".join(rf"$\dot{{{symbol(name)}}}$" for name in names)
-    history.set(xlabel=r"$\tau$", ylabel=f"{places}{tail}", xlim=(float(dataset.time[0]), _end(dataset)))
-    portrait.set(xlabel=f"{places}{tail}", ylabel=f"{speeds}{tail}")
+    history.set(xlabel=r"$\tau$", ylabel=f"{places}{unit}", xlim=(float(dataset.time[0]), _end(dataset)))
+    portrait.set(xlabel=f"{places}{unit}", ylabel=f"{speeds}{unit}")
     for ax in (history, portrait):
         ax.axhline(0.0, color=FAINT, lw=0.5, zorder=0)
     portrait.axvline(0.0, color=FAINT, lw=0.5, zorder=0)

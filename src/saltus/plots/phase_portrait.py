@@ -1,4 +1,4 @@
-"""Phase portraits: trajectories with arrows, separatrices, fixed points and the limits of the mechanism."""
+"""Phase portraits of the paper: trajectories with arrows, separatrices, fixed points and the limits of the mechanism."""
 
 from __future__ import annotations
 
@@ -8,31 +8,29 @@ from typing import Any
 import numpy as np
 
 from saltus.plots.conventions import FAINT, SEPARATRIX_LINE, STABLE
-from saltus.plots.marks import arrow_along, fixed_points, limit_lines
+from saltus.plots.marks import fixed_points, limit_lines
+from saltus.plots.phase_lines import draw_arrows
 
 CORE = 0.032  # motions this close in energy to theta = 0 are left out: their impacts would fill it with ink
 EYE = 0.0012  # the same at a deformed equilibrium, where they spiral
+AWAY, BACK = 0.03, 0.004  # window widths at which a trajectory has left its start, and has come back to it
 
 
 def draw_portrait(ax: Any, data: Any, xlim: tuple[float, float], ylim: tuple[float, float], spacing: float = 0.8) -> None:
-    """One panel from a dataset of `portrait`; arrows come about every `spacing` panel widths along a trajectory."""
+    """One panel from a portrait of the paper; arrows come about every `spacing` panel widths along a trajectory."""
     ax.set_xlim(*xlim)
     ax.set_ylim(*ylim)
     ax.axvline(0.0, color=FAINT, lw=1.2, zorder=0)
     ax.axhline(0.0, color=FAINT, lw=0.4, zorder=0)
     for name in ("line_limit", "kinematic_limit"):
         limit_lines(ax, float(data[name]), rf"${np.rad2deg(float(data[name])):.0f}^\circ$")
-    for theta, velocity, bounds in zip(
-        data["separatrix_theta"].values, data["separatrix_velocity"].values, data["separates"].values, strict=True
-    ):
-        if bounds:
-            ax.plot(theta, velocity, zorder=3, **SEPARATRIX_LINE)
-    hidden = _hidden(data)
-    for theta, velocity, hide in zip(data["theta"].values, data["velocity"].values, hidden, strict=True):
+    borders = data.isel(separatrix=data["separates"].values.astype(bool))
+    for theta, velocity in zip(borders["separatrix_theta"].values, borders["separatrix_velocity"].values, strict=True):
+        ax.plot(theta, velocity, zorder=3, **SEPARATRIX_LINE)
+    for theta, velocity, hide in zip(data["theta"].values, data["velocity"].values, _hidden(data), strict=True):
         shown = np.where(hide, np.nan, velocity)
         ax.plot(theta, shown, color=STABLE, lw=0.7, zorder=2)
-        for at in _arrow_places(theta, shown, np.ptp(xlim), np.ptp(ylim), spacing):
-            arrow_along(ax, theta, shown, at, STABLE)
+        draw_arrows(ax, theta, shown, spacing, _first_return(theta / np.ptp(xlim), shown / np.ptp(ylim)))
     fixed_points(ax, data["equilibrium"].values, data["stable"].values)
     ax.set_xlabel(r"$\theta$ (rad)")
 
@@ -40,32 +38,22 @@ def draw_portrait(ax: Any, data: Any, xlim: tuple[float, float], ylim: tuple[flo
 def _hidden(data: Any) -> np.ndarray:
     """The samples of decaying motions that have come closer to their attractor than CORE or EYE."""
     points, stable = data["equilibrium"].values, data["stable"].values.astype(bool)
-    edges = np.concatenate([[-np.inf], points[~stable], [np.inf]])
-    hidden = np.zeros(data["theta"].shape, dtype=bool)
-    for low, high in pairwise(edges):
+    theta, energy = data["theta"].values, data["energy"].values
+    hidden = np.zeros(theta.shape, dtype=bool)
+    for low, high in pairwise([-np.inf, *points[~stable], np.inf]):
         for i in np.flatnonzero(stable & (points > low) & (points < high)):
             floor = float(data["equilibrium_energy"][i]) + (EYE if points[i] else CORE)
-            theta = data["theta"].values
-            hidden |= (theta > low) & (theta < high) & (data["energy"].values < floor)
-    decays = np.nanmax(data["energy"].values, axis=1) - np.nanmin(data["energy"].values, axis=1) > 1e-9
+            hidden |= (theta > low) & (theta < high) & (energy < floor)
+    decays = np.nanmax(energy, axis=1) - np.nanmin(energy, axis=1) > 1e-9
     return hidden & decays[:, None]
 
 
-def _arrow_places(theta: np.ndarray, velocity: np.ndarray, width: float, height: float, spacing: float) -> list[int]:
-    """Samples about `spacing` apart in units of the panel, the first after a fraction of it; none on what is drawn over again."""
-    steps = np.hypot(np.diff(theta) / width, np.diff(velocity) / height)
-    travelled = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
-    drawn = _first_lap(theta, velocity, width, height)
-    places = np.arange(0.12, travelled[drawn], spacing)
-    return sorted({int(np.searchsorted(travelled, place)) for place in places})
-
-
-def _first_lap(theta: np.ndarray, velocity: np.ndarray, width: float, height: float) -> int:
-    """The sample at which a closed trajectory is back at its start, or the last one."""
-    known = np.flatnonzero(np.isfinite(theta) & np.isfinite(velocity))
-    distance = np.hypot((theta[known] - theta[0]) / width, (velocity[known] - velocity[0]) / height)
-    away = np.flatnonzero(distance > 0.03)
+def _first_return(x: np.ndarray, y: np.ndarray) -> int:
+    """The sample at which a closed trajectory, in units of the panel, is back at its start, or the last one."""
+    known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    distance = np.hypot(x[known] - x[0], y[known] - y[0])
+    away = np.flatnonzero(distance > AWAY)
     if away.size == 0:
         return 0
-    back = np.flatnonzero(distance[away[0] :] < 0.004)
+    back = np.flatnonzero(distance[away[0] :] < BACK)
     return int(known[away[0] + back[0]]) if back.size else int(known[-1])

@@ -6,10 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow import simulate
 from saltus.paper.figure_data import TOLERANCE, dataset, scalar_dataset, tree
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.sections.rocking_block import block, measure, residuals
 from saltus.plots import DOUBLE_COLUMN, draw_errors, draw_jump, draw_periods, new_figure, panel_label, styled
+from saltus.systems import Harmonic, Load, RockingBlock
+from saltus.theory import (
+    rocking_energy_decreases,
+    rocking_energy_jump,
+    rocking_period,
+    short_rocking_period,
+    slender_rocking_period,
+)
 
 ANGLES = (5.0, 20.0, 45.0)  # alpha, degrees
 DOTS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.85, 0.95)  # theta0 / alpha of the simulated motions
@@ -23,9 +32,6 @@ def compute(samples: int = 160) -> Any:
 
 
 def _periods(samples: int) -> Any:
-    from saltus.flow import simulate
-    from saltus.theory import rocking_period, short_rocking_period, slender_rocking_period
-
     share = np.concatenate([np.geomspace(1e-3, 0.05, samples // 4), np.linspace(0.05, 0.995, samples)[1:]])
     forms = (rocking_period, short_rocking_period, slender_rocking_period)
     curves = [np.array([form(share * a, alpha=a) for a in np.deg2rad(ANGLES)]) for form in forms]
@@ -53,8 +59,6 @@ def _periods(samples: int) -> Any:
 
 def _jump(alpha: float, e: float) -> Any:
     """[[T]] / (T of the rotation before) over zeta' / theta', from the formula and from the model's kinetic energy."""
-    from saltus.theory import rocking_energy_decreases, rocking_energy_jump
-
     ground = np.linspace(-2.0, 2.0, 201)
     dots = ground[10::20]
     return dataset(
@@ -88,8 +92,6 @@ def _jump(alpha: float, e: float) -> Any:
 
 def _model_jump(alpha: float, e: float, ground: float) -> float:
     """T after less T before an impact from theta' = 1 while the ground moves with velocity `ground`."""
-    from saltus.systems import Harmonic, Load, RockingBlock
-
     load = Load(frequency=1.0, ground_horizontal=Harmonic(amplitude=float(ground)))  # zeta'(0) = amplitude
     model = RockingBlock(alpha=alpha)
     return float(model.kinetic_energy(0.0, 0.0, e, -1, load) - model.kinetic_energy(0.0, 0.0, 1.0, 1, load))

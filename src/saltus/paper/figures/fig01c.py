@@ -11,6 +11,7 @@ from saltus.paper.figure_data import TOLERANCE, tree
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.phase_portraits import circled, constant_load, portrait
 from saltus.plots import SINGLE_COLUMN, draw_space, new_figure, styled
+from saltus.theory import potential_energy
 
 STARTS = [(2.3, 0.0), (-2.38, 0.0), (2.5, 0.0)]
 DURATION = 70.0
@@ -18,8 +19,6 @@ DURATION = 70.0
 
 def compute(samples: int = 1600) -> Any:
     """The data of Fig. 4c (k = 1, m = 0, C = 0.1, e = 1) from three starts, one for each attractor; energies; potential."""
-    from saltus.theory import potential_energy
-
     damped = constant_load(damping=0.1)
     data = portrait(damped, STARTS, DURATION, 2.6, samples)
     theta = np.linspace(-2.5, 2.5, 251)

@@ -19,14 +19,13 @@ from saltus.plots import (
     panel_label,
     styled,
 )
+from saltus.systems import UnitCell
 
 STATES = {"undeformed": (0.0, 0.0), "deformed": (12.0, -8.0)}  # theta_1, theta_2 in degrees
 
 
 def compute(alpha0: float = 38.0, beta0: float = 75.0) -> Any:
     """Positions of every point and the angles of both layers in both states; `alpha0` and `beta0` in degrees."""
-    from saltus.systems import UnitCell
-
     cell = UnitCell(alpha0=np.deg2rad(alpha0), beta0=np.deg2rad(beta0))
     groups = {name: _state(cell, *np.deg2rad(angles)) for name, angles in STATES.items()}
     return tree(groups, what="the two-layer unit cell undeformed and deformed", alpha0_degrees=alpha0, beta0_degrees=beta0)

@@ -6,19 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow import simulate
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import TOLERANCE, dataset, tree
 from saltus.paper.figures.figure import paper_figure
 from saltus.plots import DOUBLE_COLUMN, draw_history, draw_phase, new_figure, panel_label, styled
+from saltus.systems import Load, Metainterface, System, UnitCell
 
 SPAN = 1.5  # of time before the impact
 
 
 def compute(alpha0: float = 45.0, samples: int = 400) -> Any:
     """theta, phi and their rates until the first impact from theta = 0.4 at rest, beta0 = 80 deg; `alpha0` in degrees."""
-    from saltus.flow import simulate
-    from saltus.systems import Load, Metainterface, System, UnitCell
-
     beta0 = np.deg2rad(80.0)
     cell = UnitCell(alpha0=np.deg2rad(alpha0), beta0=beta0)
     system = System(model=Metainterface(beta0=beta0, damping=0.1), load=Load(vertical=-0.5))

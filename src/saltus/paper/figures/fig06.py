@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow import simulate
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import TOLERANCE, dataset, tree
 from saltus.paper.figures.figure import paper_figure
 from saltus.plots import DOUBLE_COLUMN, draw_histories, new_figure, panel_label, styled
+from saltus.systems import EnergyRestitution, Load, Metainterface, System, VelocityReduction
+from saltus.theory import total_energy, unloaded_peak_ratio, unloaded_period
 
 STIFFNESS = (1.0, 4.0, 16.0, 100.0)
 MASSES = (0.0, 1.0, 3.0, 8.0)
@@ -19,8 +22,6 @@ CYCLES = 2.0
 
 def compute(samples: int = 500) -> Any:
     """theta over tau / T0 from theta_min at rest, V = H = 0: (a) over k, m = 0; (b) over m, k = 1, with e = 1 and with r = 1."""
-    from saltus.systems import EnergyRestitution, VelocityReduction
-
     groups = {
         "a": _histories([(k, 0.0) for k in STIFFNESS], VelocityReduction(1.0), samples),
         "b_velocity": _histories([(1.0, m) for m in MASSES], VelocityReduction(1.0), samples),
@@ -30,10 +31,6 @@ def compute(samples: int = 500) -> Any:
 
 
 def _histories(cases: list[tuple[float, float]], impact: Any, samples: int) -> Any:
-    from saltus.flow import simulate
-    from saltus.systems import Load, Metainterface, System
-    from saltus.theory import total_energy, unloaded_peak_ratio, unloaded_period
-
     phase = np.linspace(0, CYCLES, samples)
     theta, peak, period, energy = [], [], [], []
     for k, m in cases:
@@ -89,8 +86,6 @@ def draw(data: Any) -> Any:
 
 def measure(data: Any) -> dict[str, Measured]:
     """Peaks and periods, and erratum 7."""
-    from saltus.theory import unloaded_period
-
     a, velocity, energy = data["a"], data["b_velocity"], data["b_energy"]
     ratios = {name: _ratio(data[name]) for name in ("a", "b_velocity", "b_energy")}
     shift = float(np.abs(ratios["b_velocity"] - ratios["b_velocity"][0]).max())

@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow import simulate
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import TOLERANCE, dataset, scalar_dataset, scalars, tree
 from saltus.paper.figures.figure import paper_figure
 from saltus.plots import DOUBLE_COLUMN, draw_family, new_figure, panel_label, styled
+from saltus.systems import Load, Metainterface, System
+from saltus.theory import peaks, reciprocal
 
 ANGLES = (2.0, 4.0, 6.0, 8.0, 10.0)  # degrees
 LOADS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -29,16 +32,11 @@ def compute(samples: int = 49) -> Any:
 
 def system(stiffness: float, vertical: float) -> Any:
     """The conservative system of Fig. 7."""
-    from saltus.systems import Load, Metainterface, System
-
     return System(model=Metainterface(beta0=np.deg2rad(80.0), stiffness_ratio=stiffness), load=Load(vertical=vertical))
 
 
 def simulated_peak(system: Any, theta0: float) -> float:
     """The other peak of the exact motion from theta0 at rest: without losses it comes midway between the first two impacts."""
-    from saltus.flow import simulate
-    from saltus.theory import peaks
-
     period = peaks(system, theta0).period
     motion = simulate(system, theta=theta0, velocity=0.0, duration=period, tol=TOLERANCE)
     first, second = motion.impacts.time[:2]
@@ -46,8 +44,6 @@ def simulated_peak(system: Any, theta0: float) -> float:
 
 
 def _panel(stiffness: np.ndarray, curves: list[tuple[float, float]]) -> Any:
-    from saltus.theory import peaks
-
     ratio = np.array([[peaks(system(k, v), start).ratio for k in stiffness] for v, start in curves])
     dots = np.array([1.0, 10.0, 100.0, LARGEST])
     simulated = np.empty((len(curves), dots.size))
@@ -73,8 +69,6 @@ def _panel(stiffness: np.ndarray, curves: list[tuple[float, float]]) -> Any:
 
 def _balance(stiffness: float = 5.0, vertical: float = -0.5, theta0: float = np.deg2rad(-10.0)) -> Any:
     """Both peaks of one simulated motion from either side, for the balance as printed and as corrected; the reciprocity."""
-    from saltus.theory import reciprocal
-
     reference = system(stiffness, vertical)
     twin, start = reciprocal(reference, theta0)
     values = {

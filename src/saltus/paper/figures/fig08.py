@@ -6,10 +6,21 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow import Stop, simulate
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import dataset, scalar_dataset, scalars, tree
 from saltus.paper.figures.figure import paper_figure
 from saltus.plots import DOUBLE_COLUMN, draw_domain, draw_path, new_figure, panel_label, styled
+from saltus.systems import Harmonic, Load, Metainterface, System
+from saltus.theory import (
+    critical_horizontal,
+    equilibria,
+    fold_horizontal,
+    is_monostable,
+    paper_monostable,
+    subcritical_vertical,
+    unloaded_fold,
+)
 
 SEGMENTS = ((0.05, -0.5, 0.0), (0.2, -0.7, 0.0), (0.16, -1.2, 0.0))  # Hhat, Vbar, Vhat of load (i)
 ELLIPSES = ((0.05, -0.5, 0.25), (0.2, -0.5, 0.25))  # of load (iii)
@@ -28,8 +39,6 @@ def compute(beta0: float = 80.0) -> Any:
 
 
 def _borders(beta0: float) -> Any:
-    from saltus.theory import critical_horizontal, fold_horizontal, subcritical_vertical, unloaded_fold
-
     vertical = np.linspace(LOWEST, 0.0, 321)
     start, lowest = subcritical_vertical(beta0), unloaded_fold(beta0)[0]
     folded = start + (lowest - start) * np.linspace(0, 1, 121) ** 2
@@ -54,9 +63,6 @@ def _borders(beta0: float) -> Any:
 
 
 def _paths(beta0: float, loads: tuple[tuple[float, float, float], ...], what: str) -> Any:
-    from saltus.systems import Harmonic, Load, Metainterface, System
-    from saltus.theory import is_monostable, paper_monostable
-
     phase = np.linspace(0, 2 * np.pi, 241)
     rows, systems = [], []
     for amplitude, mean, swing in loads:
@@ -80,10 +86,6 @@ def _paths(beta0: float, loads: tuple[tuple[float, float, float], ...], what: st
 
 def _numbers() -> Any:
     """Erratum 23 in numbers: the fold and Hcr at V = -1.2, and how many equilibria there are on each side of the fold."""
-    from saltus.flow import Stop, simulate
-    from saltus.systems import Load, Metainterface, System
-    from saltus.theory import critical_horizontal, equilibria, fold_horizontal, unloaded_fold
-
     beta0, vertical = np.deg2rad(80.0), -1.2
     fold = float(fold_horizontal(beta0, vertical))
 
@@ -115,9 +117,6 @@ def _numbers() -> Any:
 
 def count_unloaded(beta0: float, vertical: float) -> int:
     """How many equilibria there are under V alone."""
-    from saltus.systems import Load, Metainterface, System
-    from saltus.theory import equilibria
-
     return len(equilibria(System(model=Metainterface(beta0=beta0), load=Load(vertical=vertical))))
 
 

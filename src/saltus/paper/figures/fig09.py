@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from saltus.paper.claims.claim import Measured
-from saltus.paper.figures import spectra
+from saltus.paper.figure_data import joined
 from saltus.paper.figures.figure import paper_figure
-from saltus.paper.figures.panels import each
+from saltus.paper.figures.harmonic_loads import under_force
+from saltus.paper.figures.parallel_panels import each
+from saltus.paper.figures.response_panels import spectrum
 from saltus.paper.measures import chaos_measures, response_measures
 from saltus.plots import (
     DOUBLE_COLUMN,
@@ -29,11 +31,11 @@ ZOOMED = {"a": (0.1, 0.46), "b": (0.1, 0.34)}  # Omega of the superharmonic reso
 
 def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any:
     """One spectrum for each amplitude; options are those of `response_spectrum`."""
-    return spectra.together(each(_panel, amplitudes, **options), what="response spectrum under load (i)")
+    return joined(each(_panel, amplitudes, **options), what="response spectrum under load (i)")
 
 
 def _panel(amplitude: float, **options: Any) -> Any:
-    return spectra.spectrum(spectra.under_force(amplitude=amplitude), FREQUENCIES, **options)
+    return spectrum(under_force(amplitude=amplitude), FREQUENCIES, **options)
 
 
 @styled

@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from saltus.paper.claims.claim import Measured
-from saltus.paper.figures import spectra
+from saltus.paper.figure_data import joined
 from saltus.paper.figures.fig09 import draw_panel
 from saltus.paper.figures.figure import paper_figure
-from saltus.paper.figures.panels import each
+from saltus.paper.figures.harmonic_loads import on_ground
+from saltus.paper.figures.parallel_panels import each
+from saltus.paper.figures.response_panels import spectrum
 from saltus.paper.measures import chaos_measures, response_measures
 from saltus.paper.measures.spectrum_features import main_branch
 from saltus.plots import DOUBLE_COLUMN, draw_zoom, highest, new_figure, response_legend, styled
@@ -20,11 +22,11 @@ FREQUENCIES = (0.1, 4.0)  # Omega: up to chaos
 
 def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any:
     """One spectrum for each amplitude; options are those of `response_spectrum`."""
-    return spectra.together(each(_panel, amplitudes, **options), what="response spectrum under load (ii)")
+    return joined(each(_panel, amplitudes, **options), what="response spectrum under load (ii)")
 
 
 def _panel(amplitude: float, **options: Any) -> Any:
-    return spectra.spectrum(spectra.on_ground(amplitude=amplitude), FREQUENCIES, **options)
+    return spectrum(on_ground(amplitude=amplitude), FREQUENCIES, **options)
 
 
 @styled

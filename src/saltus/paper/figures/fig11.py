@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from saltus.paper.claims.claim import Measured
-from saltus.paper.figures import diagrams
+from saltus.paper.figures import load_diagrams
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.measures import chaos_measures, response_measures
 
@@ -16,12 +16,12 @@ LARGEST = dict.fromkeys(FREQUENCIES.values(), 4.0)  # Hhat: beyond the second re
 
 def compute(frequencies: Mapping[str, float] = FREQUENCIES, **options: Any) -> Any:
     """One diagram for each frequency; options are those of `bifurcation_diagram`."""
-    return diagrams.compute(frequencies, LARGEST, **options)
+    return load_diagrams.compute(frequencies, LARGEST, **options)
 
 
 def draw(data: Any) -> Any:
     """(a) and (b), a panel for each frequency."""
-    return diagrams.draw(data, FREQUENCIES, zoomed=0.2)
+    return load_diagrams.draw(data, FREQUENCIES, zoomed=0.2)
 
 
 def measure(data: Any) -> dict[str, Measured | None]:

@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow import simulate
 from saltus.paper.claims.claim import Measured
-from saltus.paper.figure_data import TOLERANCE, dataset
-from saltus.paper.figures import spectra
-from saltus.paper.figures.diagrams import LEAST, frame
+from saltus.paper.figure_data import TOLERANCE, dataset, joined, with_groups
 from saltus.paper.figures.figure import paper_figure
+from saltus.paper.figures.harmonic_loads import on_ground, under_both, under_force
+from saltus.paper.figures.load_diagrams import LEAST, frame
+from saltus.paper.figures.response_panels import diagram
 from saltus.paper.measures.response_measures import both_diagram
 from saltus.plots import DOUBLE_COLUMN, FAINT, draw_response, highest, lowest, new_figure, response_legend, styled
 
@@ -20,18 +22,16 @@ START, SHOWN = (0.4, 0.3), 5  # of the motions that are compared with their mirr
 
 def compute(**options: Any) -> Any:
     """The diagram, and how far each load is from symmetric; options are those of `bifurcation_diagram`."""
-    tree = spectra.diagram(spectra.under_both(), (LEAST, LARGEST), **options)
-    return spectra.with_groups(
-        spectra.together({"a": tree}, what="bifurcation diagram under load (iii)"), {"mirror": _mirror_images()}
-    )
+    tree = diagram(under_both(), (LEAST, LARGEST), **options)
+    return with_groups(joined({"a": tree}, what="bifurcation diagram under load (iii)"), {"mirror": _mirror_images()})
 
 
 def _mirror_images() -> Any:
     """The distance of a motion from the mirror image of the one that starts mirrored half a period later."""
     systems = {
-        "(i)": spectra.under_force(amplitude=0.3),
-        "(ii)": spectra.on_ground(amplitude=0.3),
-        "(iii)": spectra.under_both(amplitude=0.3),
+        "(i)": under_force(amplitude=0.3),
+        "(ii)": on_ground(amplitude=0.3),
+        "(iii)": under_both(amplitude=0.3),
     }
     gaps = np.array([_gap(system) for system in systems.values()])
     return dataset(
@@ -41,8 +41,6 @@ def _mirror_images() -> Any:
 
 
 def _gap(system: Any) -> float:
-    from saltus.flow import simulate
-
     theta, velocity = START
     one = simulate(system, theta=theta, velocity=velocity, periods=SHOWN, tol=TOLERANCE)
     two = simulate(system, theta=-theta, velocity=-velocity, time=0.5 * system.load.period, periods=SHOWN, tol=TOLERANCE)

@@ -6,15 +6,18 @@ from collections.abc import Mapping
 from typing import Any
 
 from saltus.paper.claims.claim import Measured
-from saltus.paper.figures import charts
+from saltus.paper.figures import chart_panels
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.measures.chart_measures import over_frequency
 
 PANELS: dict[str, dict[str, Any]] = {
     name: {"beta0": 80.0, "damping": 0.1, "frequency": frequency, "widest": widest, "curves": curves}
     for name, frequency, widest, curves in (
-        *(("a", 0.1, charts.WIDEST, 2), ("b", 0.5, charts.WIDEST, 8)),  # slow loads: chaos, and orbits of many impacts
-        *(("c", 0.75, charts.WIDEST, 12), ("d", 1.0, charts.WIDEST, 20), ("e", 1.5, charts.WIDEST, 16)),
+        *(
+            ("a", 0.1, chart_panels.WIDEST, 2),
+            ("b", 0.5, chart_panels.WIDEST, 8),
+        ),  # slow loads: chaos, and orbits of many impacts
+        *(("c", 0.75, chart_panels.WIDEST, 12), ("d", 1.0, chart_panels.WIDEST, 20), ("e", 1.5, chart_panels.WIDEST, 16)),
         ("f", 4.0, 0.2, 20),  # all borders are at small Hhat
     )
 }
@@ -22,12 +25,12 @@ PANELS: dict[str, dict[str, Any]] = {
 
 def compute(panels: Mapping[str, Mapping[str, Any]] = PANELS, size: int = 101, **options: Any) -> Any:
     """One chart for each frequency; options are those of `stability_chart`."""
-    return charts.compute(panels, size, **options)
+    return chart_panels.compute(panels, size, **options)
 
 
 def draw(data: Any) -> Any:
     """(a) to (f), a panel for each frequency."""
-    return charts.draw(data, columns=2, height=240.0)
+    return chart_panels.draw(data, columns=2, height=240.0)
 
 
 def measure(data: Any) -> dict[str, Measured]:

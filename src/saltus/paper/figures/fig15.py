@@ -6,25 +6,25 @@ from collections.abc import Mapping
 from typing import Any
 
 from saltus.paper.claims.claim import Measured
-from saltus.paper.figures import charts
+from saltus.paper.figures import chart_panels
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.measures.chart_measures import over_parameters
 
 REFERENCE = "reference"  # Fig. 14 (d) again, which all are compared with
 PANELS: dict[str, dict[str, Any]] = {
-    name: {"beta0": beta0, "damping": damping, "frequency": 1.0, "widest": charts.WIDEST, "curves": 12}
+    name: {"beta0": beta0, "damping": damping, "frequency": 1.0, "widest": chart_panels.WIDEST, "curves": 12}
     for name, beta0, damping in (("a", 60.0, 0.1), ("b", 80.0, 0.05), ("c", 80.0, 0.15), (REFERENCE, 80.0, 0.1))
 }
 
 
 def compute(panels: Mapping[str, Mapping[str, Any]] = PANELS, size: int = 101, **options: Any) -> Any:
     """One chart for each system; options are those of `stability_chart`."""
-    return charts.compute(panels, size, **options)
+    return chart_panels.compute(panels, size, **options)
 
 
 def draw(data: Any) -> Any:
     """(a) to (c), a panel for each system."""
-    return charts.draw(data.filter(lambda node: REFERENCE not in node.path.split("/")), columns=2, height=175.0)
+    return chart_panels.draw(data.filter(lambda node: REFERENCE not in node.path.split("/")), columns=2, height=175.0)
 
 
 def measure(data: Any) -> dict[str, Measured]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow import simulate
 from saltus.paper.figure_data import TOLERANCE, dataset
 from saltus.studies import phase_portrait
 from saltus.systems import Load, Metainterface, System, VelocityReduction
@@ -26,8 +27,6 @@ def constant_load(*, stiffness: float = 1.0, damping: float = 0.0, e: float = 1.
 
 def portrait(system: System, starts: Sequence[tuple[float, float]], duration: float, bound: float, samples: int = 900) -> Any:
     """Motions from `starts` (theta, theta') for `duration`, the separatrices up to abs(theta) = `bound`, and the equilibria."""
-    from saltus.flow import simulate
-
     motions = [simulate(system, theta=theta, velocity=velocity, duration=duration, tol=TOLERANCE) for theta, velocity in starts]
     window = ((-bound, bound), (-bound, bound))
     plane = phase_portrait(system, window=window, starts=starts, duration=duration, samples=samples)

@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from saltus.attractors import excludes_tori
 from saltus.paper.claims.claim import Measured, measured
-from saltus.paper.figures import spectra
+from saltus.paper.figure_data import joined
 from saltus.paper.figures.figure import paper_figure
+from saltus.paper.figures.harmonic_loads import FREQUENCY, on_ground, under_force
 from saltus.plots import DOUBLE_COLUMN, FAINT, POINTS, STABLE, UNSTABLE, draw_bands, new_figure, panel_label, styled
+from saltus.studies import chaotic_bands
 
 WINDOWS = {"a": (0.35, 0.42), "b": (0.405, 0.475)}  # Omega
 TITLES = {"a": r"load (i), $\widehat{\mathcal{H}}=0.2$", "b": r"load (ii), $\widehat{\zeta}=0.5$"}
@@ -21,19 +24,14 @@ def compute(windows: Mapping[str, tuple[float, float]] = WINDOWS, count: int = C
     """`chaotic_bands` over both windows; `torus` in the attributes says why there is none."""
     import xarray as xr
 
-    from saltus.attractors import excludes_tori
-    from saltus.studies import chaotic_bands
-
-    systems = {"a": spectra.under_force(amplitude=0.2), "b": spectra.on_ground(amplitude=0.5)}
+    systems = {"a": under_force(amplitude=0.2), "b": on_ground(amplitude=0.5)}
     panels = {}
     for name, window in windows.items():
-        found = chaotic_bands(
-            systems[name], spectra.FREQUENCY, window, count=count, starts=starts, window=((-1.0, 1.0), (-1.0, 1.0))
-        )
+        found = chaotic_bands(systems[name], FREQUENCY, window, count=count, starts=starts, window=((-1.0, 1.0), (-1.0, 1.0)))
         tree = xr.DataTree.from_dict(found.to_datasets())
         tree.attrs = {"system": systems[name].to_json(), "bounds": list(window), "torus": excludes_tori(systems[name]) or ""}
         panels[name] = tree
-    return spectra.together(panels, what="the bands called quasi-periodic")
+    return joined(panels, what="the bands called quasi-periodic")
 
 
 @styled

@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from saltus.errors import ParameterError
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import dataset, tree
 from saltus.paper.figures.figure import paper_figure
+from saltus.systems import LayerState, TwoLayer, name_impact, other_impulse, table_1
 
 OPEN = -0.3  # rad, theta_2 of the examples with both layers deformed
 EXAMPLES: tuple[tuple[float, tuple[float, float], float], ...] = (
@@ -22,8 +24,6 @@ EXAMPLES: tuple[tuple[float, tuple[float, float], float], ...] = (
 
 def compute(beta0: float = 80.0) -> Any:
     """The rows, an example state after each kind of impact on the lower layer, and its name; `beta0` in degrees."""
-    from saltus.systems import TwoLayer, table_1
-
     model = TwoLayer(beta0=np.deg2rad(beta0))
     rows = table_1()
     examples = [_example(model, *example, row=i) for i, example in enumerate(EXAMPLES)]
@@ -45,8 +45,6 @@ def compute(beta0: float = 80.0) -> Any:
 
 def _example(model: Any, theta_2: float, before: tuple[float, float], after_1: float, row: int) -> dict[str, Any]:
     """An impact on the lower layer whose velocity becomes `after_1`; the other velocity follows from its momentum balance."""
-    from saltus.systems import LayerState, name_impact, other_impulse
-
     theta = (0.0, theta_2)
     matrix = model.mass_matrix(theta)
     free = before[1] - matrix[1][0] / matrix[1][1] * (after_1 - before[0])
@@ -69,9 +67,6 @@ def _example(model: Any, theta_2: float, before: tuple[float, float], after_1: f
 
 def _refusal(model: Any) -> Any:
     """Whether an impact across which an angle jumps, as Table 1 prints it, is refused."""
-    from saltus.errors import ParameterError
-    from saltus.systems import LayerState, name_impact
-
     try:
         name_impact(LayerState((0.0, OPEN), (-0.5, 0.2)), LayerState((0.0, OPEN / 2), (0.0, 0.2)), model=model)
     except ParameterError as error:

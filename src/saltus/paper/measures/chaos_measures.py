@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from saltus.attractors import excludes_tori
 from saltus.branch_lines import branches_of
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.measures.response_measures import Panels
 from saltus.paper.measures.spectrum_features import count, stable_motions
+from saltus.systems import System
 
 INNER = 200  # values within a band at which stable motions are counted
 HIGH = 1.0  # Omega: frequencies beyond the primary resonance
@@ -33,9 +35,6 @@ def _width(spectrum: Any) -> float:
 
 def _quasi_periodic(spectrum: Any, below: float) -> Measured:
     """Erratum 22: no tori; what is there instead is chaos, at frequencies below a given one."""
-    from saltus.attractors import excludes_tori
-    from saltus.systems import System
-
     reason, bands = excludes_tori(System.from_json(str(spectrum.attrs["system"]))), bands_of(spectrum)
     chaos = any(band["high"] < below for band in bands)
     return measured(reason is None, reason is not None and chaos, reason=reason, bands=bands)

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from saltus.branch_lines import border_curves
+
 FIRST_MOTION = (1, 2)  # one forcing period, two impacts in it
 
 
@@ -57,12 +59,6 @@ def gained(panel: Any) -> float:
     """The cells outside of that domain in which nothing but rest is left, as a share of the domain."""
     cells = chart_cells(panel)
     return float((~cells.static & cells.only_rest).sum() / max(cells.static.sum(), 1))
-
-
-def border_curves(panel: Any) -> list[Any]:
-    """The exact curves of special points over the plane of the loads, as Datasets."""
-    borders = panel["borders"]
-    return [borders[name].to_dataset() for name in sorted(borders.children) if name.startswith("curve_")]
 
 
 def onset(panel: Any, vertical: np.ndarray) -> np.ndarray:

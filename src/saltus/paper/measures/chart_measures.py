@@ -14,6 +14,7 @@ import numpy as np
 
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.measures.chart_areas import chart_cells, gained, lost, lost_by_curves, onset
+from saltus.theory import high_frequency_onset
 
 Panels = Mapping[float, Any]
 
@@ -100,8 +101,6 @@ def _onset(panels: Panels) -> Measured:
 
 
 def _closed_form(panels: Panels) -> Measured:
-    from saltus.theory import high_frequency_onset
-
     fast = max(panels)
     attrs = panels[fast].attrs
     beta0, damping = math.radians(float(attrs["beta0_degrees"])), float(attrs["damping"])

@@ -8,6 +8,8 @@ import numpy as np
 
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import scalar_dataset, scalars
+from saltus.systems import Harmonic, Load, Metainterface, System, TwoLayer, UnitCell
+from saltus.theory import pendulum_acceleration
 
 
 def compute(states: int = 40) -> Any:
@@ -21,8 +23,6 @@ def compute(states: int = 40) -> Any:
 
 def random_case(rng: np.random.Generator, beta0: float | None = None) -> tuple[Any, Any, Any]:
     """A metainterface, the two-layer model with the same numbers, and a load on every channel."""
-    from saltus.systems import Harmonic, Load, Metainterface, TwoLayer
-
     numbers = {
         "beta0": float(rng.uniform(0.4, 2.4)) if beta0 is None else beta0,
         "damping": float(rng.uniform(0, 1)),
@@ -52,8 +52,6 @@ def _residuals(rng: np.random.Generator) -> dict[str, float]:
 
 def _kinetic_residual(model: Any, load: Any, t: float, theta: Any, velocity: Any) -> float:
     """`kin_eng` against the velocities of the masses of the drawn cell, by differences of their positions."""
-    from saltus.systems import UnitCell
-
     cell = UnitCell(alpha0=0.3, beta0=model.beta0)
 
     def places(s: float) -> np.ndarray:
@@ -114,8 +112,6 @@ def _reduction_residual(single: Any, double: Any, load: Any, theta: Any, velocit
 
 def _equivalence(rng: np.random.Generator) -> dict[str, float]:
     """Ground motion zetahat against a force +Omega^2 zetahat and -Omega^2 zetahat, symmetric, and with h = m."""
-    from saltus.systems import Harmonic, Load, Metainterface
-
     times, theta, omega, zeta = rng.uniform(0, 6, 40), float(rng.uniform(0.1, 1)), 1.3, 0.4
     worst = {"force_printed": 0.0, "force_corrected": 0.0, "force_unequal": 0.0}
     ground = Load(frequency=omega, ground_horizontal=Harmonic(amplitude=zeta), vertical=-0.5)
@@ -137,7 +133,6 @@ def _equivalence(rng: np.random.Generator) -> dict[str, float]:
 
 def _symmetry(rng: np.random.Generator) -> dict[str, Any]:
     """Whether reversing theta and the horizontal loads reverses the acceleration, symmetric and with k = c = 1+m = 1+h = 1+v."""
-    from saltus.systems import Harmonic, Load, Metainterface
 
     def gap(model: Any, ratio: float) -> float:
         def load(sign: int) -> Any:
@@ -164,9 +159,6 @@ def _symmetry(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _pendulum(model: Any, rng: np.random.Generator) -> float:
-    from saltus.systems import Harmonic, Load, System
-    from saltus.theory import pendulum_acceleration
-
     load = Load(frequency=1.3, horizontal=Harmonic(amplitude=0.4), vertical=-0.5, ground_horizontal=Harmonic(amplitude=0.1))
     system = System(model=model, load=load)
     return max(
@@ -179,8 +171,6 @@ def _pendulum(model: Any, rng: np.random.Generator) -> float:
 def _closed_layer() -> dict[str, float]:
     """The speed just after a crossing above which the closed layer's reaction has the wrong sign, beta0 = 80 deg, V = -0.5."""
     from scipy.optimize import brentq
-
-    from saltus.systems import Load, Metainterface
 
     model, load = Metainterface(beta0=np.deg2rad(80.0)), Load(vertical=-0.5)
 

@@ -10,6 +10,19 @@ import numpy as np
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import scalar_dataset, scalars
 from saltus.paper.sections.equations_of_motion import random_case
+from saltus.systems import (
+    EnergyRestitution,
+    Harmonic,
+    InelasticImpact,
+    LayerState,
+    Load,
+    Metainterface,
+    System,
+    TwoLayer,
+    VelocityReduction,
+    other_impulse,
+)
+from saltus.theory import energy_factor, energy_jump
 
 TIME = 0.2  # of the impacts, at which every load and ground velocity has some value
 
@@ -51,16 +64,12 @@ def _jump(rng: np.random.Generator, e: float) -> dict[str, float]:
 
 def _symmetric(single: Any, load: Any) -> tuple[Any, Any]:
     """The symmetric model with the same angle and damping, and the loads on the upper mass only."""
-    from saltus.systems import Load, Metainterface
-
     channels = {name: signal for name, signal in load.channels.items() if not name.startswith("lower_")}
     return Metainterface(beta0=single.beta0, damping=single.damping), Load(frequency=load.frequency, **channels)
 
 
 def _no_jump() -> dict[str, float]:
     """[[theta'']] with e = 1 and V = nu''; and the effect of zeta'' on it."""
-    from saltus.systems import Harmonic, Load, Metainterface
-
     model = Metainterface(beta0=1.4, damping=0.2)
 
     def jump(shake: float) -> float:
@@ -73,9 +82,6 @@ def _no_jump() -> dict[str, float]:
 
 def _energies(rng: np.random.Generator, impacts: int) -> dict[str, Any]:
     """r from the energies of both masses, against the paper's formula and the corrected one; the signs of [[T]]."""
-    from saltus.systems import System, VelocityReduction
-    from saltus.theory import energy_factor, energy_jump
-
     counts = dict.fromkeys(("sign_printed", "sign_corrected"), 0)
     worst = dict.fromkeys(("r_printed", "r_corrected"), 0.0)
     changes = []
@@ -116,17 +122,12 @@ def _as_printed(load: Any, b0: float, velocity: float, e: float) -> tuple[float,
 
 def _still_ground() -> dict[str, float]:
     """r - e^2 on a ground at rest, m = 0, from both sides."""
-    from saltus.systems import Metainterface, System
-    from saltus.theory import energy_factor
-
     system = System(model=Metainterface(beta0=1.3))
     return {"r_still": max(abs(energy_factor(system, -s * 0.7, s, e) - e * e) for s in (1, -1) for e in (0.2, 0.8, 1.0))}
 
 
 def _without_root() -> dict[str, float]:
     """An energy restitution on a moving ground that no velocity after the impact meets, and one that is met."""
-    from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface
-
     model, load = Metainterface(beta0=np.deg2rad(80.0)), Load(frequency=1.0, ground_horizontal=Harmonic(amplitude=0.5))
     law = EnergyRestitution(0.6)
     slow, fast = (float(law.velocity_after(model, 0.0, v, -1, 1, load)) for v in (0.05, 2.0))
@@ -136,8 +137,6 @@ def _without_root() -> dict[str, float]:
 
 def _inelastic(rng: np.random.Generator) -> dict[str, float]:
     """The restitution of errata 25 against the momentum balance of both layers solved numerically."""
-    from saltus.systems import InelasticImpact, Load, Metainterface, TwoLayer
-
     worst = 0.0
     for beta0, m in zip(rng.uniform(np.pi / 4 + 0.01, 3 * np.pi / 4 - 0.01, 50), rng.uniform(0, 2, 50), strict=True):
         matrix = TwoLayer(beta0=float(beta0), mass_ratio=float(m)).mass_matrix((0.0, 0.0))
@@ -157,8 +156,6 @@ def _inelastic(rng: np.random.Generator) -> dict[str, float]:
 
 def _pushing(rng: np.random.Generator) -> dict[str, float]:
     """How far the least e at which the closed layer's contact still pushes is from -cos(2 beta0), over 1+m going down (29)."""
-    from saltus.systems import TwoLayer
-
     worst = 0.0
     for beta0, m in zip(rng.uniform(np.pi / 4 + 0.01, 3 * np.pi / 4 - 0.01, 50), rng.uniform(0, 2, 50), strict=True):
         model = TwoLayer(beta0=float(beta0), mass_ratio=float(m))
@@ -169,8 +166,6 @@ def _pushing(rng: np.random.Generator) -> dict[str, float]:
 
 def _least_factor(model: Any, layer: int) -> float:
     """The velocity factor at which the contact of the layer that opens gives no impulse: linear in e, so two values find it."""
-    from saltus.systems import LayerState, other_impulse
-
     closing = -1.0 if layer == 1 else 1.0
     before = LayerState((0.0, 0.0), (closing, 0.0) if layer == 1 else (0.0, closing))
     none, full = (

@@ -9,6 +9,7 @@ import numpy as np
 
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import scalar_dataset, scalars
+from saltus.systems import PhysicalCell, UnitCell
 
 CELLS = ((0.5, 1.2), (0.8, 1.4), (1.1, 0.9), (0.6, 1.9))  # alpha0, beta0, rad
 
@@ -22,8 +23,6 @@ def compute() -> Any:
 
 
 def _cell(alpha0: float, beta0: float) -> dict[str, float]:
-    from saltus.systems import UnitCell
-
     cell = UnitCell(alpha0=alpha0, beta0=beta0)
     theta = np.linspace(1e-3, 0.95 * cell.line_limit, 60)
     phi = np.asarray(cell.phi(theta))
@@ -70,8 +69,6 @@ def _drawn(cell: Any, openings: np.ndarray) -> dict[str, float]:
 
 def _limits() -> dict[str, float]:
     """The straight line and the kinematic limit at beta0 = 80 degrees."""
-    from saltus.systems import UnitCell
-
     cell = UnitCell(alpha0=math.radians(45), beta0=math.radians(80))
     theta = np.linspace(0, cell.kinematic_limit, 2001)
     return {
@@ -88,8 +85,6 @@ def _limits() -> dict[str, float]:
 
 def _dimensions() -> dict[str, float]:
     """One cell written in seconds and in milliseconds: what changes has a dimension. tau against tau = t sqrt(M2 / K2)."""
-    from saltus.systems import PhysicalCell
-
     seconds = PhysicalCell(length=0.2, upper_mass=1.5, upper_stiffness=3.0, upper_damping=0.07)
     millis = PhysicalCell(length=0.2, upper_mass=1.5, upper_stiffness=3.0e-6, upper_damping=0.07e-3)
     inertia = seconds.upper_mass * seconds.length**2

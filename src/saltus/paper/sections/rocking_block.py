@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow import simulate
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import scalars
+from saltus.systems import Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction
+from saltus.theory import decayed_amplitude, final_time, rocking_energy_jump, rocking_period
 
 
 def block(alpha: float, e: float = 1.0) -> Any:
     """A free block of slenderness `alpha` (rad)."""
-    from saltus.systems import RockingBlock, System, VelocityReduction
-
     return System(model=RockingBlock(alpha=alpha), impact=VelocityReduction(e))
 
 
@@ -50,8 +51,6 @@ def _energies(alpha: np.ndarray, theta: np.ndarray, velocity: np.ndarray, ground
 
 def _equations(alpha: np.ndarray, theta: np.ndarray, velocity: np.ndarray, push: np.ndarray) -> dict[str, float]:
     """`EOM&Rock2` with either sign of zeta'' against `EOM&Rock`, and against the metainterface without its spring."""
-    from saltus.systems import Harmonic, Load, Metainterface, RockingBlock
-
     worst = dict.fromkeys(("rock2_printed", "rock2_corrected", "analogy"), 0.0)
     for a, angle, speed, shake in zip(alpha[:60], theta[:60], velocity[:60], push[:60], strict=True):
         side, beta0 = float(np.sign(angle)), np.pi / 2 - a
@@ -68,8 +67,6 @@ def _equations(alpha: np.ndarray, theta: np.ndarray, velocity: np.ndarray, push:
 
 def _linear_terms() -> dict[str, float]:
     """The coefficient of -theta that is left of each acceleration once the moment of the weight or load is taken off."""
-    from saltus.systems import Load, Metainterface, RockingBlock
-
     angle, beta0 = 0.3, 1.2
     moment = -np.cos(angle + beta0)
     cell = Metainterface(beta0=beta0).acceleration(0.0, angle, 0.0, 1, Load(vertical=-1.0))
@@ -79,8 +76,6 @@ def _linear_terms() -> dict[str, float]:
 
 def _conditions(rng: np.random.Generator, n: int) -> dict[str, Any]:
     """How often the energy falls, and how often each reading of the two conditions says so."""
-    from saltus.theory import rocking_energy_jump
-
     alpha, e = rng.uniform(0.05, 1.4, n), rng.uniform(0.05, 0.95, n)
     velocity, ground = rng.normal(size=n), 2 * rng.normal(size=n)
     pairs = zip(velocity, alpha, e, ground, strict=True)
@@ -97,9 +92,6 @@ def _conditions(rng: np.random.Generator, n: int) -> dict[str, Any]:
 
 def _decay(e: float = 0.9, alpha: float = 0.3, theta0: float = 1e-4) -> dict[str, float]:
     """Amplitude after one cycle and end of the rocking, simulated, over their closed forms."""
-    from saltus.flow import simulate
-    from saltus.theory import decayed_amplitude, final_time, rocking_period
-
     period = float(rocking_period(theta0, alpha=alpha))
     end = final_time(period=period, e=e)
     motion = simulate(block(alpha, e), theta=theta0, velocity=0.0, duration=1.2 * end)
@@ -156,7 +148,5 @@ def measure(data: Any) -> dict[str, Measured]:
 
 
 def _period_error(period: Any) -> float:
-    from saltus.theory import rocking_period
-
     exact = np.array([rocking_period(period["dot"].values * a, alpha=float(a)) for a in period["alpha"].values])
     return float(abs(period["simulated"].values / exact - 1).max())

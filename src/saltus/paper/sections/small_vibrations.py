@@ -7,8 +7,23 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow import simulate
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import TOLERANCE, scalar_dataset, scalars
+from saltus.systems import Load, Metainterface, System, VelocityReduction
+from saltus.theory import (
+    Stability,
+    equilibria,
+    final_time,
+    linear_equilibria,
+    linear_motion,
+    linear_period,
+    potential_energy,
+    short_period,
+    undeformed_stability,
+    upright_period,
+    vibrations,
+)
 
 BETA0, VERTICAL, SMALL = math.radians(80.0), -0.5, 1e-6
 
@@ -32,23 +47,17 @@ def free(
     vertical: float = VERTICAL, *, beta0: float = BETA0, stiffness: float = 1.0, damping: float = 0.0, e: float = 1.0
 ) -> Any:
     """The metainterface under a constant vertical load."""
-    from saltus.systems import Load, Metainterface, System, VelocityReduction
-
     model = Metainterface(beta0=beta0, stiffness_ratio=stiffness, damping=damping)
     return System(model=model, load=Load(vertical=vertical), impact=VelocityReduction(e))
 
 
 def _measured_period(system: Any, theta0: float, guess: float) -> float:
     """The time between the first and the third impact."""
-    from saltus.flow import simulate
-
     times = simulate(system, theta=theta0, velocity=0.0, duration=1.6 * guess, tol=TOLERANCE).impacts.time
     return float(times[2] - times[0])
 
 
 def _periods() -> dict[str, float]:
-    from saltus.theory import linear_period, short_period, upright_period
-
     exact = float(linear_period(SMALL, beta0=BETA0, vertical=VERTICAL))
     measured = _measured_period(free(), SMALL, exact)
     upright = math.radians(89.9)
@@ -65,9 +74,6 @@ def _periods() -> dict[str, float]:
 
 def _decay(e: float) -> dict[str, float]:
     """Peaks, cycle times and the end of a small vibration with losses at impacts."""
-    from saltus.flow import simulate
-    from saltus.theory import final_time, linear_period
-
     period = float(linear_period(SMALL, beta0=BETA0, vertical=VERTICAL))
     motion = simulate(free(e=e), theta=SMALL, velocity=0.0, duration=1.5 * final_time(period=period, e=e), tol=TOLERANCE)
     impact = motion.impacts.time[:6]
@@ -93,7 +99,6 @@ def _rest(motion: Any) -> float:
 
 def _equilibria() -> dict[str, float]:
     """How many deformed linear equilibria there are, k = 0.5, between the printed and the corrected bound and beyond both."""
-    from saltus.theory import linear_equilibria
 
     def count(load: float) -> int:
         return len(linear_equilibria(free(-load / math.sin(BETA0), stiffness=0.5))) - 1
@@ -104,8 +109,6 @@ def _equilibria() -> dict[str, float]:
 
 def _potential() -> dict[str, float]:
     """dP/dtheta by differences against the equation of motion's moments; stability of theta = 0 by the sign of V cos(beta0)."""
-    from saltus.theory import Stability, potential_energy, undeformed_stability
-
     system, worst, h = free(-1.3, stiffness=0.7), 0.0, 1e-3
     for theta in (-1.2, -0.4, 0.3, 1.1):
         p = [potential_energy(system, theta + n * h) for n in (-2, -1, 1, 2)]
@@ -118,9 +121,6 @@ def _potential() -> dict[str, float]:
 
 def _divergence() -> dict[str, float]:
     """Whether small motions just inside theta_A come back and just outside do not, beta0 close to pi/2, V = -1.2."""
-    from saltus.flow import simulate
-    from saltus.theory import equilibria, linear_equilibria
-
     system = free(-1.2, beta0=math.radians(89.5))
     linear = linear_equilibria(system)[-1].theta
     full = min(p.theta for p in equilibria(system) if p.theta > 0)
@@ -135,8 +135,6 @@ def _divergence() -> dict[str, float]:
 
 def _frequencies() -> dict[str, float]:
     """Omega_0 and mu of `fre_freq_xi` against the derivatives of the acceleration just beside theta = 0."""
-    from saltus.theory import vibrations
-
     system, worst, h = free(damping=0.3, stiffness=1.7).with_({"model.mass_ratio": 0.6}), 0.0, 1e-4
     for side, vibration in zip((1, -1), vibrations(system), strict=True):
         a = [system.model.acceleration(0.0, side * x, 0.0, side, system.load) for x in (0.0, h, 2 * h)]
@@ -149,8 +147,6 @@ def _frequencies() -> dict[str, float]:
 
 def _upright() -> dict[str, float]:
     """theta_A and its energy under the full equation against the paper's forms, beta0 = 89.9 deg, V = -1.3, k = 1.1."""
-    from saltus.theory import equilibria
-
     vertical, k, beta0 = -1.3, 1.1, math.radians(89.9)
     full = min((p for p in equilibria(free(vertical, stiffness=k, beta0=beta0)) if p.theta > 0), key=lambda p: p.theta)
     kappa, push = k + vertical * math.sin(beta0), vertical * math.cos(beta0)
@@ -163,9 +159,6 @@ def _upright() -> dict[str, float]:
 
 def _linear_solution() -> dict[str, float]:
     """Impact times of the piecewise-linear solution against the exact motion of small amplitude, with damping and loss."""
-    from saltus.flow import simulate
-    from saltus.theory import linear_motion
-
     system = free(damping=0.1, stiffness=1.5, e=0.9)
     linear = linear_motion(system, SMALL, 5)
     exact = simulate(system, theta=SMALL, velocity=0.0, duration=1.01 * float(linear.impact_times[-1]), tol=TOLERANCE)

@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 
 from saltus.branch_lines import branch_lines, smooth_lines
+from saltus.flow import simulate_many
+from saltus.orbits import PeriodicOrbit, orbits_of, solve
 from saltus.paper.figure_data import dataset
 from saltus.paper.measures.spectrum_features import detached, main_branch, turning
+from saltus.systems import System
 
 PHASES = 361  # over one forcing period
 BEYOND = 3e-3  # relative distance past a fold at which a motion is let go: nearer to it motions linger where the orbit was
@@ -19,8 +22,6 @@ SETTLE, LAST = 800, 12  # forcing periods until the motion after a jump is looke
 
 def orbit_at(branch: Any, index: int, value: float) -> Any:
     """The orbit of a branch near its point `index`, solved at a value of the parameter; None where Newton does not converge."""
-    from saltus.orbits import PeriodicOrbit, orbits_of, solve
-
     (near,) = orbits_of(branch.isel(point=[index]))
     found = solve(near.problem, near.solution.unknowns, np.array([value]))
     return None if found is None else PeriodicOrbit(near.problem, found)
@@ -114,8 +115,6 @@ def jumps(spectrum: Any) -> Any:
     Returns a Dataset over `jump`: `branch`, `fold` and `value`, the parameter at the fold and past it, `before` and `after`, the
     largest abs(theta) of the orbit at the fold and of the motion past it once it has settled.
     """
-    from saltus.systems import System
-
     system = System.from_json(str(spectrum.attrs["system"]))
     low, high = spectrum.attrs["bounds"]
     rows = []
@@ -139,8 +138,6 @@ def jumps(spectrum: Any) -> Any:
 
 def _settled(system: Any, path: str, values: np.ndarray, orbits: list[Any]) -> np.ndarray:
     """The largest abs(theta) on which motions settle from orbits' own states at other values of the parameter, (n,)."""
-    from saltus.flow import simulate_many
-
     if not orbits:
         return np.empty(0)
     starts: dict[str, Any] = {

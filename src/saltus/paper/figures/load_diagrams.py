@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.figure_data import scalar_dataset
-from saltus.paper.figures import spectra
-from saltus.paper.figures.panels import each
+from saltus.flow import simulate_many
+from saltus.paper.figure_data import joined, scalar_dataset, with_groups
+from saltus.paper.figures.harmonic_loads import AMPLITUDE, under_force
+from saltus.paper.figures.parallel_panels import each
+from saltus.paper.figures.response_panels import diagram
 from saltus.plots import (
     DOUBLE_COLUMN,
     draw_critical,
@@ -30,23 +32,19 @@ WAIT, LAST = 300, 10  # forcing periods
 
 def compute(frequencies: Mapping[str, float], largest: Mapping[float, float], **options: Any) -> Any:
     """One diagram under load (i) for each frequency, up to the amplitude for it, with the fate of rest on both sides of Hcr."""
-    return spectra.together(each(_panel, frequencies, largest=largest, **options), what="bifurcation diagram under load (i)")
+    return joined(each(_panel, frequencies, largest=largest, **options), what="bifurcation diagram under load (i)")
 
 
 def _panel(frequency: float, largest: Mapping[float, float], **options: Any) -> Any:
-    system = spectra.under_force(frequency=frequency)
-    tree = spectra.diagram(system, (LEAST, largest[frequency]), **options)
-    return spectra.with_groups(tree, {"undeformed": undeformed(system, tree.attrs["critical"])})
+    system = under_force(frequency=frequency)
+    tree = diagram(system, (LEAST, largest[frequency]), **options)
+    return with_groups(tree, {"undeformed": undeformed(system, tree.attrs["critical"])})
 
 
 def undeformed(system: Any, critical: float) -> Any:
     """Started at rest in theta = 0 just below and just above Hcr: whether it stays there, and how far it moves much later."""
-    from saltus.flow import simulate_many
-
     amplitudes = critical * np.array([1 - NEAR, 1 + NEAR])
-    ends = simulate_many(
-        system, theta=0.0, parameters={spectra.AMPLITUDE: amplitudes}, periods=WAIT, sample=("extrema",), last=LAST
-    )
+    ends = simulate_many(system, theta=0.0, parameters={AMPLITUDE: amplitudes}, periods=WAIT, sample=("extrema",), last=LAST)
     moved = np.maximum(ends["overall_largest_theta"].values, -ends["overall_smallest_theta"].values)
     late = np.maximum(ends["largest_theta"].values, -ends["smallest_theta"].values)
     values = {"held_below": int(moved[0] == 0.0), "held_above": int(moved[1] == 0.0), "later": float(late[1].max())}

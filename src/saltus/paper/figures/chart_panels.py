@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from saltus.paper.figures import spectra
-from saltus.paper.figures.panels import each
+from saltus.branch_lines import border_curves
+from saltus.paper.figure_data import joined
+from saltus.paper.figures.harmonic_loads import under_force
+from saltus.paper.figures.parallel_panels import each
 from saltus.plots import (
     DOUBLE_COLUMN,
     chart_legend,
-    curves_of,
     draw_chart,
     draw_closed_form,
     draw_lines,
@@ -21,6 +22,8 @@ from saltus.plots import (
     panel_label,
     styled,
 )
+from saltus.studies import bordered_chart
+from saltus.theory import high_frequency_onset
 
 WINDOW = ((-2.0, 2.0), (-2.0, 2.0))  # of the initial states
 LOWEST = -2.0  # V
@@ -29,20 +32,12 @@ FAST = 2.0  # Omega from which the closed form of the onset is drawn too
 CURVES = 20  # on which motions end, at most, for one chart
 
 
-def system(beta0: float = 80.0, damping: float = 0.1, frequency: float = 1.0) -> Any:
-    """The paper's system under load (i), `loadpatha`; beta0 in degrees."""
-    from saltus.systems import Harmonic, Load, Metainterface, System
-
-    model = Metainterface(beta0=math.radians(beta0), damping=damping)
-    return System(model=model, load=Load(frequency=frequency, horizontal=Harmonic(amplitude=0.1), vertical=-0.5))
-
-
 def compute(panels: Mapping[str, Mapping[str, Any]], size: int, curves: int = CURVES, **options: Any) -> Any:
     """A chart of `size` x `size` cells for each panel; options are those of `stability_chart`."""
     made = each(
         _panel, {name: {"curves": curves} | dict(values) for name, values in panels.items()}, "first", size=size, **options
     )
-    return spectra.together(made, what="stability charts under load (i)")
+    return joined(made, what="stability charts under load (i)")
 
 
 def _panel(values: Mapping[str, Any], **options: Any) -> Any:
@@ -53,9 +48,7 @@ def panel(
     *, beta0: float, damping: float, frequency: float, widest: float, size: int, curves: int = CURVES, **options: Any
 ) -> Any:
     """A `saltus.studies.bordered_chart` of the paper's system."""
-    from saltus.studies import bordered_chart
-
-    here = system(beta0, damping, frequency)
+    here = under_force(frequency, 0.1, beta0=beta0, damping=damping)
     horizontal, vertical = np.linspace(0.0, widest, size), np.linspace(LOWEST, 0.0, size)
     tree = bordered_chart(here, curves=curves, horizontal=horizontal, vertical=vertical, **({"window": WINDOW} | options))
     tree["static"].attrs |= {"what": "quasi-static borders", "saltus_version": tree["chart"].attrs["saltus_version"]}
@@ -88,14 +81,12 @@ def draw(data: Any, columns: int, height: float) -> Any:
     if cells is not None:
         bar = figure.colorbar(cells, ax=axes[: len(panels)].tolist(), fraction=0.03, pad=0.01, format="%.2g")
         bar.set_label(r"largest $\max_\tau|\theta|$ of the stable motions (rad)")
-    chart_legend(figure, [curve for _, tree in panels for curve in curves_of(tree)], fast)
+    chart_legend(figure, [curve for _, tree in panels for curve in border_curves(tree)], fast)
     return figure
 
 
 def _closed_form(ax: Any, tree: Any) -> bool:
     """Mark the onset's closed form (erratum 28) where the load is fast; returns whether it is."""
-    from saltus.theory import high_frequency_onset
-
     frequency = float(tree.attrs["frequency"])
     if frequency < FAST:
         return False
