@@ -12,10 +12,10 @@ from saltus.continuation import Continuation, Cut, End, Events, Zero, located
 from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, grazing
 from saltus.orbits.grazing import other_side
 from saltus.orbits.images import asymmetry, falls_onto_image, halves_of, nearest, passes_image, repetition
-from saltus.orbits.orbit import TOUCH
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.signature import Signature
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, UserFunction
+from saltus.orbits.tolerances import TOLERANCES
 
 Run = Continuation
 
@@ -64,7 +64,7 @@ class BranchEvents(OrbitEvents):
 
     def accepts(self, point: OrbitPoint, ahead: OrbitPoint) -> bool:
         """Whether a step has not gone over to the orbits that are their own images, nor, from one grazing, beyond the next."""
-        skipped = grazing(point) <= TOUCH and grazing(ahead) < 0.0
+        skipped = grazing(point) <= TOLERANCES.touch and grazing(ahead) < 0.0
         return not skipped and not falls_onto_image(point, ahead)
 
     def barrier(self) -> Test:

@@ -10,9 +10,10 @@ from saltus.continuation import End, TestFunction
 from saltus.flow import segments as at
 from saltus.orbits.bifurcations import scaled_determinant
 from saltus.orbits.conditions import Singular, cubic, quadratic
-from saltus.orbits.grazing import TOGETHER, removed
+from saltus.orbits.grazing import removed
 from saltus.orbits.special_curve import SpecialCurvePoint
 from saltus.orbits.special_point import SpecialKind
+from saltus.orbits.tolerances import TOLERANCES
 
 NARROW = 1e-15  # width of the bracket, in the step that contains the point
 CAP = 1.0  # of the room that a motion has before another grazing, which may be infinite
@@ -61,7 +62,7 @@ def room(point: SpecialCurvePoint) -> float:
     if touching:
         touch = point.solution.unknowns[2 * touching[0]]
         away = np.abs(np.array([phases - touch + turn * orbit.problem.closing for turn in (-1, 0, 1)])).min(axis=0)
-        humps = humps[~(away < TOGETHER)]
+        humps = humps[~(away < TOLERANCES.pair)]
     return min(CAP, float(speeds.min(initial=np.inf)), float(humps.min(initial=np.inf)))
 
 

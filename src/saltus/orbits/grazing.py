@@ -6,15 +6,13 @@ import numpy as np
 
 from saltus.continuation import End
 from saltus.flow import segments as at
-from saltus.orbits.orbit import TOUCH
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.special_point import OrbitEnd
+from saltus.orbits.tolerances import TOLERANCES
 
 PROBES = 10.0 ** -np.arange(2, 12.0)  # along the new branch, until one direction is seen to be admissible
-SAME = 1e-7  # between states a period apart: a grazing is located to rounding, but where it touches only to its square root
-TOGETHER = 1e-4  # phase between the two impacts of a pair that vanishes, and their speeds
 
 
 def other_side(point: OrbitPoint) -> OrbitPoint | End:
@@ -23,7 +21,7 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
     A gap that touches zero between impacts gains a pair of impacts without speed there, or a single one at a wall that turns
     the motion round; impacts that have lost their speed are left out.
     """
-    changed = removed(point) if point.orbit.slowest < TOUCH else inserted(point)
+    changed = removed(point) if point.orbit.slowest < TOLERANCES.touch else inserted(point)
     if isinstance(changed, End):
         return changed
     problem, unknowns = changed
@@ -93,7 +91,7 @@ def _vanishing_pair(phases: np.ndarray, speeds: np.ndarray, slow: int, closing: 
     later = phases[(slow + 1) % n] + (closing if slow + 1 == n else 0.0) - phases[slow]
     earlier = phases[slow] - phases[slow - 1] + (closing if slow == 0 else 0.0)
     neighbour, distance = ((slow + 1) % n, later) if abs(later) < abs(earlier) else ((slow - 1) % n, earlier)
-    return [slow, neighbour] if abs(distance) < TOGETHER and speeds[neighbour] < TOGETHER else []
+    return [slow, neighbour] if abs(distance) < TOLERANCES.pair and speeds[neighbour] < TOLERANCES.pair else []
 
 
 def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Problem, np.ndarray] | End:
@@ -104,12 +102,12 @@ def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Problem, np.ndarray]
     touch = point.solution.unknowns[2 * slow]
     lengths = np.diff(np.append(point.solution.unknowns[::2], point.solution.unknowns[0] + problem.closing))
     side = signature.along()[int(np.argmax(lengths))]
-    whole = 2.0 * np.pi * np.ceil(touch / (2.0 * np.pi))
+    phase_zero = 2.0 * np.pi * np.ceil(touch / (2.0 * np.pi))
     contact = np.array([float(problem.at(point.solution.values).model.contact), 0.0])
     for periods in range(1, signature.period + 1):  # three families may meet here: then on with that of the shortest period
         other = problem.with_signature(Signature((), periods, False, side))
-        state = other.carried(contact, touch, whole, point.solution.values)
-        later = other.carried(contact, touch, whole + other.closing, point.solution.values)
-        if state is not None and later is not None and np.abs(later - state).max() < SAME:
+        state = other.carried(contact, touch, phase_zero, point.solution.values)
+        later = other.carried(contact, touch, phase_zero + other.closing, point.solution.values)
+        if state is not None and later is not None and np.abs(later - state).max() < TOLERANCES.touching_state:
             return other, state
     return End(OrbitEnd.NO_MOTION, point.parameter, detail="from")

@@ -9,9 +9,7 @@ import numpy as np
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
-
-SAME = 1e-5  # between unknowns of orbits that coincide where both graze
-APART = 1e-6  # by which an orbit differs from its own image, to be more than rounding
+from saltus.orbits.tolerances import TOLERANCES
 
 
 def asymmetry(point: OrbitPoint) -> np.ndarray | None:
@@ -41,20 +39,22 @@ def halves_of(unknowns: np.ndarray, signature: Signature) -> np.ndarray:
 def passes_image(a: OrbitPoint, b: OrbitPoint) -> bool:
     """Whether a step goes through an orbit that is its own image."""
     before, after = asymmetry(a), asymmetry(b)
-    return before is not None and after is not None and bool(before @ after < 0.0) and np.abs(before).max() > APART
+    return before is not None and after is not None and bool(before @ after < 0.0) and np.abs(before).max() > TOLERANCES.image
 
 
 def falls_onto_image(a: OrbitPoint, b: OrbitPoint) -> bool:
     """Whether a step has ended on the branch of the orbits that are their own images, coming from one that is not."""
     before, after = asymmetry(a), asymmetry(b)
-    return before is not None and after is not None and bool(np.abs(before).max() > APART > 100.0 * np.abs(after).max())
+    return (
+        before is not None and after is not None and bool(np.abs(before).max() > TOLERANCES.image > 100.0 * np.abs(after).max())
+    )
 
 
 def repetition(point: OrbitPoint) -> str | None:
     """What an orbit is that is another one gone round several times, or its own mirror image; None for one that is not."""
     signature, n = point.orbit.signature, len(point.orbit.signature.sides)
     difference = asymmetry(point)
-    if signature.period % 2 and difference is not None and np.abs(difference).max() < SAME:
+    if signature.period % 2 and difference is not None and np.abs(difference).max() < TOLERANCES.grazing_orbits:
         return "symmetric orbit"
     for periods in range(1, signature.period):
         part = n * periods // signature.period
@@ -62,7 +62,7 @@ def repetition(point: OrbitPoint) -> str | None:
             continue
         pairs = point.solution.unknowns.reshape(-1, part, 2).copy()
         pairs[:, :, 0] -= 2.0 * math.pi * periods * np.arange(len(pairs))[:, None]
-        if signature.sides == signature.sides[:part] * len(pairs) and np.ptp(pairs, axis=0).max() < SAME:
+        if signature.sides == signature.sides[:part] * len(pairs) and np.ptp(pairs, axis=0).max() < TOLERANCES.grazing_orbits:
             return f"orbit of period {periods}"
     return None
 

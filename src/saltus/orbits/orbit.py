@@ -14,9 +14,8 @@ from saltus.flow import segments as at
 from saltus.orbits.newton import Solution
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
+from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import System
-
-TOUCH = 1e-9  # gap and speed below which a touch is a grazing, to within which grazings are located
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +124,8 @@ class PeriodicOrbit:
     def admissible(self) -> bool:
         """Whether it is a motion of the system: every impact has a speed, the next one comes later, the gap is open between."""
         phases = self._phases
-        in_order = np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.period)) > -TOUCH
-        return self.clearance > -TOUCH and self.slowest > -TOUCH and bool(in_order.all())
+        in_order = np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.period)) > -TOLERANCES.touch
+        return self.clearance > -TOLERANCES.touch and self.slowest > -TOLERANCES.touch and bool(in_order.all())
 
     @cached_property
     def margins(self) -> dict[str, float]:
@@ -147,7 +146,7 @@ class PeriodicOrbit:
     @property
     def grazes(self) -> bool:
         """Whether it touches the contact without speed: motions beside it then have no derivative, and multipliers no meaning."""
-        return min(abs(self.clearance), abs(self.slowest)) < TOUCH
+        return min(abs(self.clearance), abs(self.slowest)) < TOLERANCES.touch
 
     @property
     def stable(self) -> bool:
@@ -168,7 +167,7 @@ class PeriodicOrbit:
         return {model.coordinates[0]: float(model.contact), "velocity": float(after), "time": time}
 
     def motion(self, periods: float | None = None, tol: float = 1e-13) -> Motion:
-        """The exact motion from its state, over one period of the orbit if not said otherwise."""
+        """The exact motion from its state, over one period of the orbit if nothing else is given."""
         return simulate(self.system, **self.start(), periods=self.period if periods is None else periods, tol=tol)
 
     @cached_property
@@ -194,11 +193,10 @@ class PeriodicOrbit:
             n = self.problem.own
             return (float(self.solution.unknowns[0]), float(self.solution.unknowns[1])) if n == 1 else (
                 self.solution.unknowns[:n], self.solution.unknowns[n:])  # fmt: skip
-        motion = simulate(self.system, **self.start(), duration=self._to_phase_zero(), tol=1e-13, dense=False)
+        start = self.start()
+        ahead = 2.0 * math.pi / self.frequency - start["time"]
+        motion = simulate(self.system, **start, duration=ahead, tol=1e-13, dense=False)
         return float(np.atleast_1d(motion.position)[0]), float(np.atleast_1d(motion.velocity)[0])
-
-    def _to_phase_zero(self) -> float:
-        return 2.0 * math.pi / self.frequency - float(self.impact_times[0])
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name in ("problem", "solution"):

@@ -1,8 +1,8 @@
 """Periodic orbits that rest at the contact for a part of their period (losses at impact).
 
-Impacts die away in a finite time, the system rests, and the load alone fixes when it is released (`releases.py`). So the
-motion after a release is the same whatever came before: an orbit is found by following the motion from release to release
-until one repeats, nothing has to be solved for, and its multipliers are 0.
+Impacts die away in a finite time, the system rests, and the load alone fixes when it is released. So the motion after a release
+is the same whatever came before: an orbit is found by following the motion from release to release until one repeats, nothing
+has to be solved for, and its multipliers are 0.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ import numpy as np
 from saltus.flow import EventKind, Motion, Release, load_releases, peak_near, simulate
 from saltus.flow import segments as at
 from saltus.orbits.newton import Solution
-from saltus.orbits.orbit import TOUCH, PeriodicOrbit
+from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import is_symmetric, keeps_symmetry
+from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import System
 
-SAME = 1e-9  # of a forcing period: releases are isolated, and known to rounding
 INTO = 1e-3  # of the first flight after a release, where the look at it begins: before it the gap only opens
 RELEASED, LANDED, SIDE = 0, 1, 2  # in `excursions`
 
@@ -39,7 +39,7 @@ class RestingOrbit(PeriodicOrbit):
     excursions: np.ndarray  # (n, 3) of the (half) period: when released, when at rest again, and the side released to
     bends: np.ndarray  # (impacts,): the gap's second derivative just before each; > 0 only for those that a grazing brings
 
-    def _whole(self, column: int) -> np.ndarray:
+    def _over_period(self, column: int) -> np.ndarray:
         values = self.excursions[:, column]
         if not self.symmetric:
             return values
@@ -52,17 +52,17 @@ class RestingOrbit(PeriodicOrbit):
     @property
     def releases(self) -> np.ndarray:
         """The times at which it leaves rest, from phase 0 of the load's period in which the first one lies, (n,)."""
-        return self._whole(RELEASED)
+        return self._over_period(RELEASED)
 
     @property
     def release_sides(self) -> np.ndarray:
         """The sides to which it does, (n,)."""
-        return self._whole(SIDE).astype(int)
+        return self._over_period(SIDE).astype(int)
 
     @property
     def rests(self) -> np.ndarray:
         """The times at which it comes to rest, each after the release of the same index, (n,)."""
-        return self._whole(LANDED)
+        return self._over_period(LANDED)
 
     @property
     def rest_durations(self) -> np.ndarray:
@@ -96,25 +96,18 @@ class RestingOrbit(PeriodicOrbit):
     @property
     def grazes(self) -> bool:
         """Whether it touches the contact without speed, apart from the impacts that die away."""
-        return min(abs(self.clearance), float(self.touching.min(initial=math.inf))) < TOUCH
+        return min(abs(self.clearance), float(self.touching.min(initial=math.inf))) < TOLERANCES.touch
 
     @property
     def stable(self) -> bool:
         """True, unless a release is only touched, a rest has no duration or it grazes."""
-        return bool(self.pulls.min() > TOUCH and self.rest_durations.min() > TOUCH) and not self.grazes
+        return bool(self.pulls.min() > TOLERANCES.touch and self.rest_durations.min() > TOLERANCES.touch) and not self.grazes
 
     def start(self) -> dict[str, Any]:
         """The arguments of `simulate` that start the motion: at its first release."""
         model = self.system.model
         time, side = float(self.excursions[0, RELEASED]), int(self.excursions[0, SIDE])
         return {model.coordinates[0]: float(model.contact), "velocity": 0.0, "time": time, "side": side}
-
-    @cached_property
-    def state(self) -> tuple[Any, Any]:
-        """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
-        ahead = 2.0 * math.pi / self.frequency - float(self.excursions[0, RELEASED])
-        motion = simulate(self.system, **self.start(), duration=ahead, tol=1e-13, dense=False)
-        return float(np.atleast_1d(motion.position)[0]), float(np.atleast_1d(motion.velocity)[0])
 
     @cached_property
     def defect(self) -> float:
@@ -157,7 +150,7 @@ def resting_orbit(base: Problem, release: Release, max_period: int) -> RestingOr
     motion = _released(system, release, max_period + 1, dense=False)
     chain, times = [release], [release.time]
     for event in motion.events.of(EventKind.RELEASE):
-        if event.time - release.time < SAME * period:
+        if event.time - release.time < TOLERANCES.release * period:
             continue
         following = _known(roots, event.time, event.side, system)
         if following is None:
@@ -185,7 +178,7 @@ def _known(roots: tuple[Release, ...], time: float, side: int, system: System) -
         return abs((root.time - time + 0.5 * period) % period - 0.5 * period)
 
     nearest = min((root for root in roots if root.side == side), key=apart, default=None)
-    return nearest if nearest is not None and apart(nearest) < SAME * period else None
+    return nearest if nearest is not None and apart(nearest) < TOLERANCES.release * period else None
 
 
 def _orbit(base: Problem, chain: tuple[Release, ...], periods: int) -> RestingOrbit | None:
@@ -199,7 +192,7 @@ def _orbit(base: Problem, chain: tuple[Release, ...], periods: int) -> RestingOr
     symmetric = periods % 2 == 1 and image is not None and mirrored
     span = 0.5 * periods if symmetric else float(periods)
     motion = _released(system, first, span)
-    excursions = _excursions(motion, first, first.time + span * period, SAME * period)
+    excursions = _excursions(motion, first, first.time + span * period, TOLERANCES.release * period)
     if excursions is None:
         return None
     impacts = motion.impacts

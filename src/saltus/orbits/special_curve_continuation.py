@@ -16,15 +16,15 @@ from saltus.orbits.branch_events import OrbitEvents
 from saltus.orbits.codimension import curve_test, curve_tests, room
 from saltus.orbits.conditions import Condition, Singular, Slow
 from saltus.orbits.find import divide
-from saltus.orbits.grazing import TOGETHER, inserted
+from saltus.orbits.grazing import inserted
 from saltus.orbits.newton import Solution
-from saltus.orbits.orbit import TOUCH
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.special_curve import ConditionedCurve, SpecialCurve, SpecialCurvePoint
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.symmetry import half, keeps_symmetry, over_full_period
+from saltus.orbits.tolerances import TOLERANCES
 from saltus.progress import Progress, silent
 
 FOLLOWED = (SpecialKind.LP, SpecialKind.PD, SpecialKind.BPC, SpecialKind.GR)
@@ -178,7 +178,7 @@ def _evaluated(problem: Problem, unknowns: np.ndarray, values: np.ndarray) -> So
 def _touching(special: SpecialPoint) -> tuple[Signature, np.ndarray]:
     """The signature with more impacts of the two that meet at a grazing, and the orbit's unknowns in it."""
     point = special.point
-    if point.orbit.slowest < TOUCH:  # then the touch is an impact of its own, whose gap has its minimum there too
+    if point.orbit.slowest < TOLERANCES.touch:  # then the touch is an impact of its own, whose gap has its minimum there too
         return point.orbit.signature, point.solution.unknowns
     problem, unknowns = inserted(point)
     return problem.signature, unknowns
@@ -189,4 +189,5 @@ def _first_without_speed(problem: Problem, unknowns: np.ndarray) -> int:
     phases, speeds = unknowns[::2], unknowns[1::2]
     slow = int(np.argmin(np.abs(speeds)))
     before = phases[slow] - phases[slow - 1] + (problem.closing if slow == 0 else 0.0)
-    return (slow - 1) % len(speeds) if len(speeds) > 1 and abs(before) < TOGETHER and abs(speeds[slow - 1]) < TOGETHER else slow
+    is_second = len(speeds) > 1 and max(abs(before), abs(speeds[slow - 1])) < TOLERANCES.pair
+    return (slow - 1) % len(speeds) if is_second else slow

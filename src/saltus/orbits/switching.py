@@ -17,7 +17,7 @@ from saltus.orbits.signature import Signature
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.symmetry import full_period
 
-LONGEST = 64  # forcing periods of an orbit: periods double six times
+MOST_DOUBLED = 64  # forcing periods of an orbit: periods double six times
 
 
 def switch_branch(
@@ -65,7 +65,7 @@ def _kernel(matrix: np.ndarray) -> np.ndarray:
 def _doubled(point: OrbitPoint) -> OrbitPoint | None:
     """The orbit gone round twice, and the direction in which the two rounds differ."""
     problem, signature = point.orbit.problem, point.orbit.signature
-    if 2 * signature.period > LONGEST:
+    if 2 * signature.period > MOST_DOUBLED:
         return None
     twice = Signature((*signature.sides, *signature.sides), 2 * signature.period, False, signature.side)
     unknowns, direction = point.solution.unknowns, _kernel(point.equations.jacobian(-1.0))

@@ -7,11 +7,10 @@ import numpy as np
 from saltus.orbits.newton import Solution, solve
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
+from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import Load, System
 
 SAMPLES = np.linspace(0.05, 0.95, 19)  # of a period, at which loads are compared; a harmonic of order 9 needs 19
-EQUAL = 1e-12
-SAME = 1e-7  # between the halves of an orbit: both are solved to 1e-12, but near a grazing Newton leaves more
 
 
 def is_symmetric(system: System) -> bool:
@@ -31,7 +30,7 @@ def _equal(load: Load, mirrored: Load, name: str, times: np.ndarray, shift: floa
         left, right = one.acceleration(times), other.acceleration(times + shift)
     else:
         left, right = one(times), other(times + shift)
-    return bool(np.allclose(left, right, rtol=EQUAL, atol=EQUAL))
+    return bool(np.allclose(left, right, rtol=TOLERANCES.load, atol=TOLERANCES.load))
 
 
 def keeps_symmetry(system: System, path: str) -> bool:
@@ -52,9 +51,8 @@ def half(problem: Problem, solution: Solution) -> tuple[Problem, Solution] | Non
     n = len(signature.sides) // 2
     if n % 2 == 0 or len(signature.sides) % 2:
         return None
-    phases, speeds = solution.unknowns[::2], solution.unknowns[1::2]
-    halfway = np.pi * signature.period
-    if np.abs(phases[n:] - phases[:n] - halfway).max() > SAME or np.abs(speeds[n:] - speeds[:n]).max() > SAME:
+    first, second = solution.unknowns.reshape(2, n, 2)
+    if np.abs(second - first - [np.pi * signature.period, 0.0]).max() > TOLERANCES.halves:
         return None
     return _solved(
         problem.with_signature(Signature(signature.sides[:n], signature.period, True)), solution.unknowns[: 2 * n], solution
@@ -66,7 +64,7 @@ def _half_shooting(problem: Problem, solution: Solution) -> tuple[Problem, Solut
         return None
     other = problem.with_signature(Signature((), problem.signature.period, True, problem.signature.side))
     found = _solved(other, solution.unknowns, solution)
-    return found if found and np.abs(found[1].unknowns - solution.unknowns).max() < SAME else None
+    return found if found and np.abs(found[1].unknowns - solution.unknowns).max() < TOLERANCES.halves else None
 
 
 def _solved(problem: Problem, unknowns: np.ndarray, solution: Solution) -> tuple[Problem, Solution] | None:
