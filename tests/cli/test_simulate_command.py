@@ -70,6 +70,7 @@ def test_the_summary_tells_impacts_and_rest(saltus, study, tmp_path):
         17.82077858790958, abs=1e-10
     )  # design/numerics.md
     assert float(re.search(r"theta at the end +(\S+)", out)[1]) == 0.0
+    assert re.search(r"other events +1 rest +\n", out)  # the impacts are counted above
     assert re.search(r"kinematic limit +respected", out)
 
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from saltus.flow import EventKind
+
 if TYPE_CHECKING:
     from saltus.flow import Motion
 
@@ -42,8 +44,7 @@ def _events(motion: Motion) -> list[tuple[str, str]]:
     impacts = motion.impacts
     last = f", the last at {impacts.time[-1]:.12g} with speed {abs(impacts.velocity_before[-1]):.6g}" if len(impacts) else ""
     rows = [("impacts", f"{len(impacts)}{last}")]
-    kinds = Counter(event.kind.value for event in motion.events)
-    kinds.pop("crossing", None)
+    kinds = Counter(event.kind for event in motion.events if event.kind is not EventKind.IMPACT)
     if kinds:
         rows.append(("other events", ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))))
     rest = motion.rest_time
