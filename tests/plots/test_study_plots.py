@@ -123,7 +123,7 @@ def diagram(amplitudes=(0.5, 1.0), beta0=1.4, path="load.frequency", kind="Metai
         "system": json.dumps({"model": {"type": kind, "beta0": beta0}}),
     }
     return xarray.DataTree.from_dict(
-        {"/": xarray.Dataset(attrs=attrs), "branch_000": branch, "attractors": dots, "bands": bands, "strobes": strobes}
+        {"/": xarray.Dataset(attrs=attrs), "branch_000": branch, "attractors": dots, "bands": bands, "stroboscopic": strobes}
     )
 
 
@@ -146,7 +146,7 @@ def test_no_limit_is_drawn_where_there_is_none_or_it_varies(changes):
 def test_a_diagram_of_nothing_but_rest_is_drawn():
     tree = diagram()
     del tree["branch_000"]
-    tree["strobes"]["peak"][:] = 0.0
+    tree["stroboscopic"]["peak"][:] = 0.0
     figure = draw_diagram(tree)
     low, high = figure.axes[0].get_ylim()
     assert low <= 0.0 < high

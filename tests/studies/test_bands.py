@@ -5,7 +5,8 @@ import pytest
 from shared_systems import forced
 
 from saltus import ParameterError, WallOscillator
-from saltus.studies.diagram.bands import Band, Bands, Tried, band_dataset, chaotic_bands
+from saltus.studies import chaotic_bands
+from saltus.studies.diagram.bands import Band, Bands, Tried, band_dataset
 from saltus.systems import Harmonic, Load, System
 
 WINDOW = ((-4.0, 4.0), (-4.0, 4.0))
@@ -38,8 +39,8 @@ def test_an_edge_lies_between_a_value_with_chaos_and_one_without(quasi_periodic_
 
 def test_settled_motions_show_their_cycle_alone(quasi_periodic_band):
     tried = quasi_periodic_band.tried
-    shown = np.isfinite(tried.strobes[..., 0]).sum(axis=2)
-    assert (shown[tried.chaotic] == tried.strobes.shape[2]).all()
+    shown = np.isfinite(tried.states[..., 0]).sum(axis=2)
+    assert (shown[tried.chaotic] == tried.states.shape[2]).all()
     assert (shown[~tried.chaotic & ~tried.undecided] <= 16).all()
 
 
@@ -63,7 +64,7 @@ def test_transients_of_chaos_at_high_frequency_make_no_band():
 def test_results_do_not_depend_on_the_run(quasi_periodic_band):
     again = bands(forced(0.2), "load.frequency", (0.35, 0.43))
     assert again.bands == quasi_periodic_band.bands
-    assert np.array_equal(again.tried.strobes, quasi_periodic_band.tried.strobes, equal_nan=True)
+    assert np.array_equal(again.tried.states, quasi_periodic_band.tried.states, equal_nan=True)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ def draw_diagram(tree: Any) -> Figure:
     """A Figure from the DataTree of `response_spectrum` or `bifurcation_diagram`."""
     low, high = (float(x) for x in tree.attrs["bounds"])
     name, unit = symbol(tree.attrs["coordinate"]), _unit(tree)
-    simulated = "strobes" in tree.children
+    simulated = "stroboscopic" in tree.children
     figure = new_figure(DOUBLE_COLUMN, 150.0 if simulated else 95.0)
     axes = figure.subplots(1 + simulated, 1, sharex=True, squeeze=False, height_ratios=[3, 2][: 1 + simulated])[:, 0]
     axes[0].set_xlim(low, high)
@@ -71,7 +71,7 @@ def _limits(tree: Any) -> tuple[float, float]:
 
 def draw_stroboscopic_states(ax: Any, tree: Any) -> None:
     """Direct simulation: where motions are at phase 0 of the load, period after period, from every start."""
-    strobes = tree["strobes"]
+    strobes = tree["stroboscopic"]
     draw_bands(ax, tree)
     places = strobes["position"].values
     moving = np.nanmax(strobes["peak"].values, axis=2, initial=0.0) > AT_REST

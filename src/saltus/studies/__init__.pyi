@@ -1,7 +1,7 @@
 from .chart.borders import Borders, exact_borders, with_borders
 from .chart.chart import bordered_chart, stability_chart
 from .chart.disagreements import disagreements
-from .diagram.bands import chaotic_bands
+from .diagram.chaos_search import chaotic_bands
 from .diagram.diagram import bifurcation_diagram, orbit_diagram, response_spectrum
 from .portrait import phase_portrait
 

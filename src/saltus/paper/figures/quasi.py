@@ -53,8 +53,8 @@ def draw(data: Any) -> Any:
 
 def _strobes(ax: Any, tree: Any) -> None:
     draw_bands(ax, tree)
-    places = tree["strobes"]["position"].values
-    values = np.broadcast_to(tree["strobes"]["value"].values[:, None, None], places.shape)
+    places = tree["stroboscopic"]["position"].values
+    values = np.broadcast_to(tree["stroboscopic"]["value"].values[:, None, None], places.shape)
     ax.plot(values.ravel(), places.ravel(), **POINTS)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,19 +11,29 @@ import numpy as np
 from saltus.checks import Rectangle, check_bounds, check_number, check_window, checked_by
 from saltus.errors import ParameterError
 from saltus.orbits import STEP, search_orbits
+from saltus.progress import Progress, part_of, silent
 from saltus.studies.checks import check_diagram
-from saltus.studies.diagram.bands import chaotic_bands
-from saltus.studies.diagram.branch_set import Atlas
+from saltus.studies.diagram.branch_set import BranchSet
+from saltus.studies.diagram.chaos_search import chaotic_bands
 from saltus.studies.diagram.diagram_dataset import diagram_tree
 from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
 
-VALUES = 25  # of the parameter at which is searched
-STARTS = 48  # initial states at each
-BANDS = 121  # values at which chaos is looked for
-SEARCHED, FOLLOWED, CONFIRMED = 0.3, 0.7, 0.9  # shares of the work done after the search, the branches, the bands
+VALUES = 25  # of the parameter at which is searched, where none are given
+
+
+@dataclass(frozen=True)
+class WorkShares:
+    """The share of the work that is done after each part."""
+
+    search: float = 0.3
+    branches: float = 0.7
+    bands: float = 0.9
+
+
+SHARES = WorkShares()
 
 
 def _check(
@@ -32,7 +43,7 @@ def _check(
     check_number("step", step, above=0.0)
     _values(bounds, values)
     check_window(window, system)
-    if not (progress is None or callable(progress)):
+    if not callable(progress):
         raise ParameterError(
             f"progress must be a function of the fraction done and of what is being done, got {progress!r}", "progress"
         )
@@ -46,14 +57,14 @@ def orbit_diagram(
     *,
     max_period: int = 6,
     values: Iterable[float] | None = None,
-    starts: int = STARTS,
+    starts: int = 48,
     window: Rectangle | None = None,
     seed: int = 0,
     repelling: int = 1,
     switch: bool = True,
     step: float = STEP,
-    bands: int = BANDS,
-    progress: Callable[[float, str], object] | None = None,
+    bands: int = 121,
+    progress: Progress = silent,
 ) -> xarray.DataTree:
     """Search, follow, switch and confirm.
 
@@ -78,40 +89,37 @@ def orbit_diagram(
     Returns:
         A DataTree: the search in the attributes and in `search`; `branch_000`, ... (see `branch_dataset.py`, with `defect` after
         a period and, for stable orbits, `kept` after 20); `attractors`, what simulation settled on; `bands` of chaos with
-        brackets of their edges and the special points there, `exponents` and `strobes` (the stroboscopic points of what was
-        simulated to find them: the brute-force diagram). The attribute `left` counts the special points at which a family is born
-        that was not followed: within the bounds the branch covers less than a fiftieth of the range, or the orbits have less than
-        a hundredth of its largest amplitude, or there were 30 branches already. An orbit that its multipliers call stable, but
-        that does not stay where it is for 20 periods, is not called so; `unconfirmed` counts these on each branch.
+        brackets of their edges and the special points there, `exponents` and `stroboscopic` (the states at phase 0 of what was
+        simulated to find them). The attribute `left` counts the special points at which a family is born that was not followed,
+        see `BranchSettings`. An orbit that its multipliers call stable, but that does not stay where it is for 20 periods, is not
+        called so; `unconfirmed` counts these on each branch.
 
     Raises:
         ParameterError: an argument without meaning.
     """
     low, high = check_bounds(bounds)
-    grid = _values((low, high), values)
-    say = progress or (lambda share, what: None)
-    say(0.0, "searching")
+    progress(0.0, "searching")
     found = search_orbits(
         system.with_({path: 0.5 * (low + high)}),
         path,
-        grid,
+        _values((low, high), values),
         max_period=max_period,
         starts=starts,
         window=window,
         seed=seed,
         repelling=repelling,
-        progress=lambda share: say(SEARCHED * share, "searching"),
+        progress=lambda share: progress(SHARES.search * share, "searching"),
     )
-    atlas = Atlas(path, (low, high), max_period, step, switch)
-    atlas.fill(
-        sorted(found.orbits, key=lambda o: (o.period, not o.stable)),
-        lambda share: say(SEARCHED + (FOLLOWED - SEARCHED) * share, f"following, {len(atlas.branches)} branches"),
-    )
-    say(FOLLOWED, "looking for chaos")
-    chaos = chaotic_bands(system, path, (low, high), count=bands, window=window, seed=seed) if bands else None
-    say(CONFIRMED, "confirming")
-    tree = diagram_tree(system, atlas.branches, found, (low, high), chaos, max_period=max_period, left=atlas.left)
-    say(1.0, "done")
+    branches = BranchSet(path, (low, high), max_period, step, switch)
+    following = part_of(progress, SHARES.search, SHARES.branches)
+    branches.fill(sorted(found.orbits, key=lambda orbit: (orbit.period, not orbit.stable)), following)
+    chaos = None
+    if bands:
+        looking = part_of(progress, SHARES.branches, SHARES.bands)
+        chaos = chaotic_bands(system, path, (low, high), count=bands, window=window, seed=seed, progress=looking)
+    progress(SHARES.bands, "confirming")
+    tree = diagram_tree(system, branches.branches, found, (low, high), chaos, max_period=max_period, left=branches.left)
+    progress(1.0, "done")
     return tree
 
 

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.orbits import Branch, PeriodicOrbit, RestingOrbit, Search, defects
+from saltus.provenance import provenance
 from saltus.studies.diagram.bands import Bands, band_dataset
 from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
 
-KEPT = 1e-8  # the distance within which
-KEPT_ROUNDS = 20  # periods for which a stable orbit must stay where it is
-INSTANTS = 64
+STAYS = 1e-8  # the distance within which a stable orbit must stay where it is
+STAYS_ROUNDS = 20  # for so many of its periods
+INSTANTS = 64  # of a period at which an orbit that rests is compared with itself
 
 
 def diagram_tree(
@@ -24,19 +25,16 @@ def diagram_tree(
     """The DataTree that `orbit_diagram` returns; `facts` are further attributes."""
     import xarray
 
-    import saltus
-
-    attributes = {
-        "system": system.to_json(),
-        "path": found.path,
-        "coordinate": system.model.coordinates[0],
-        "bounds": list(bounds),
-        "starts": found.starts,
-        "window": np.ravel(found.window).tolist(),
-        "seed": found.seed,
-        "saltus": saltus.__version__,
+    attributes = provenance(
+        system,
+        seed=found.seed,
+        path=found.path,
+        coordinate=system.model.coordinates[0],
+        bounds=list(bounds),
+        starts=found.starts,
+        window=np.ravel(found.window).tolist(),
         **facts,
-    }
+    )
     nodes = {"/": xarray.Dataset(attrs=attributes)}
     by_length = sorted(branches, key=lambda b: (b.points[0].orbit.period, -len(b.points)))
     nodes |= {f"branch_{i:03d}": confirmed(branch) for i, branch in enumerate(by_length)}
@@ -63,12 +61,12 @@ def confirmed(branch: Branch) -> xarray.Dataset:
     stable = np.flatnonzero(data["stable"].values)
     kept = np.full(len(orbits), np.nan)
     if stable.size:
-        kept[stable] = _distances([orbits[i] for i in stable], KEPT_ROUNDS)
-    lost = ~(kept[stable] < KEPT)
+        kept[stable] = _distances([orbits[i] for i in stable], STAYS_ROUNDS)
+    lost = ~(kept[stable] < STAYS)
     data["stable"][stable[lost]] = 0
     data.attrs["unconfirmed"] = int(lost.sum())
     data["defect"] = ("point", _distances(orbits, 1), {"long_name": "distance after one period, by the event-driven flow"})
-    data["kept"] = ("point", kept, {"long_name": f"distance after {KEPT_ROUNDS} periods, where stable"})
+    data["kept"] = ("point", kept, {"long_name": f"distance after {STAYS_ROUNDS} periods, where stable"})
     return data
 
 
@@ -90,27 +88,21 @@ def _attractors(found: Search) -> xarray.Dataset:
     """What motions settled on, a dot for each at each value."""
     import xarray
 
-    dots = found.settled
-    columns = {
-        "parameter": ("dot", dots.value, {"long_name": found.path}),
-        "amplitude": ("dot", dots.amplitude),
-        "highest": ("dot", dots.highest),
-        "lowest": ("dot", dots.lowest),
-        "period": ("dot", dots.period, {"long_name": "forcing periods after which it repeats"}),
-    }
-    return xarray.Dataset(columns)
+    texts = {"parameter": found.path, "period": "forcing periods after which it repeats"}
+    dots = {name: getattr(found.settled, name) for name in ("amplitude", "highest", "lowest", "period")}
+    columns = {"parameter": found.settled.value} | dots
+    return xarray.Dataset(
+        {name: ("dot", values, {"long_name": texts[name]} if name in texts else {}) for name, values in columns.items()}
+    )
 
 
 def _search(found: Search) -> xarray.Dataset:
     """Where was searched, and how many of the motions led to no orbit."""
     import xarray
 
+    unsettled = {"long_name": "motions that did not settle: slow, of a longer period, or chaotic"}
     columns = {
-        "unsettled": (
-            "searched",
-            found.unsettled,
-            {"long_name": "motions that did not settle: slow, of a longer period, or chaotic"},
-        ),
+        "unsettled": ("searched", found.unsettled, unsettled),
         "at_rest": ("searched", found.at_rest, {"long_name": "motions that came to rest"}),
     }
     return xarray.Dataset(columns, coords={"searched": ("searched", found.values, {"long_name": found.path})})
