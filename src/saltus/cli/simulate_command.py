@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +12,17 @@ if TYPE_CHECKING:
     from saltus.config import Study
     from saltus.flow import Motion
 
-MOST_SAMPLES = 1_000_000  # written unless the study asks for more
-LONG_MOTION = 20_000  # periods; beyond this a motion is sampled as it goes, so that memory is bounded
+
+@dataclass(frozen=True)
+class SampleSettings:
+    """How densely a motion is written where the study does not say."""
+
+    max_samples: int = 1_000_000  # More would make motion.nc larger than what other programs read at once.
+    per_period: int = 200  # So many does a motion write by itself in a forcing period.
+    max_dense_periods: int = 20_000  # The dense output of a longer motion takes more memory than a laptop has.
+
+
+SETTINGS = SampleSettings()
 
 
 def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
@@ -61,18 +71,18 @@ def long_samples(study: Study) -> Any:
 
     given, period = study.settings().arguments, study.system.load.period
     span = given["periods"] * (period or 1.0) if "periods" in given else given["duration"]
-    if span / (period or 2 * np.pi) <= LONG_MOTION:
+    if span / (period or 2 * np.pi) <= SETTINGS.max_dense_periods:
         return None
     start = given.get("time", 0.0)
-    return np.linspace(start, start + span, study.settings().samples or MOST_SAMPLES)
+    return np.linspace(start, start + span, study.settings().samples or SETTINGS.max_samples)
 
 
 def sample_times(motion: Motion, samples: int | None) -> Any:
-    """Evenly spaced times over a motion, or None for its own choice where that is no more than `MOST_SAMPLES`."""
+    """Evenly spaced times over a motion, or None for its own choice where that is not too many."""
     import numpy as np
 
     period = motion.system.load.period
-    short = period is None or 200 * (motion.time - motion.start) / period <= MOST_SAMPLES
+    short = period is None or SETTINGS.per_period * (motion.time - motion.start) / period <= SETTINGS.max_samples
     if motion.samples is not None or (samples is None and short):
         return None
-    return np.linspace(motion.start, motion.time, MOST_SAMPLES if samples is None else samples)
+    return np.linspace(motion.start, motion.time, SETTINGS.max_samples if samples is None else samples)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -56,6 +57,11 @@ class Layer:
     def curvature(self, x: Any) -> Any:
         """d2P/dx2; at x = 0 the stiffness kappa of the linearised equation."""
         return self.stiffness - self.outward * np.cos(self.beta0 + x) + self.vertical * np.sin(self.beta0 + x)
+
+    def eigenvalues(self, curvature: float) -> tuple[complex, complex]:
+        """Those of the motion linearised where d2P/dx2 = `curvature`, the faster growing one first."""
+        root = cmath.sqrt(self.damping**2 - 4 * self.mass * curvature)
+        return (-self.damping + root) / (2 * self.mass), (-self.damping - root) / (2 * self.mass)
 
     def inflections(self) -> list[float]:
         """The openings inside the kinematic limit where d2P/dx2 = 0, in closed form, increasing."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -114,7 +113,5 @@ def _deformed(layer: Layer, x: float) -> Equilibrium:
     stability = Stability.STABLE if curvature > 0 else Stability.UNSTABLE
     if x in layer.inflections():
         stability = Stability.FOLD
-    root = cmath.sqrt(layer.damping**2 - 4 * layer.mass * curvature)
-    rates = ((-layer.damping + root) / (2 * layer.mass), (-layer.damping - root) / (2 * layer.mass))
     within = x <= math.pi - layer.beta0
-    return Equilibrium(layer.side * x, stability, float(layer.potential(x)), curvature, rates, within)
+    return Equilibrium(layer.side * x, stability, float(layer.potential(x)), curvature, layer.eigenvalues(curvature), within)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import dataclass
 
@@ -67,7 +66,7 @@ def _linear_equilibrium(layer: Layer) -> Equilibrium | None:
     if min(abs(kappa), abs(push)) <= MOMENT_ROUNDING * layer.scale or push / kappa < 0:
         return None
     x = push / kappa
-    root = cmath.sqrt(layer.damping**2 - 4 * layer.mass * kappa)
-    rates = ((-layer.damping + root) / (2 * layer.mass), (-layer.damping - root) / (2 * layer.mass))
     stability = Stability.STABLE if kappa > 0 else Stability.UNSTABLE
-    return Equilibrium(layer.side * x, stability, -(push**2) / (2 * kappa), kappa, rates, x <= math.pi - layer.beta0)
+    return Equilibrium(
+        layer.side * x, stability, -(push**2) / (2 * kappa), kappa, layer.eigenvalues(kappa), x <= math.pi - layer.beta0
+    )
