@@ -1,6 +1,7 @@
 """Curves of special points in two parameters: against closed forms, against one-parameter branches, and through cusps."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -201,6 +202,15 @@ def test_the_unsymmetric_orbits_change_sides_at_a_degenerate_symmetry_breaking()
     forms = [normal_form(locus.points[place + k]) for k in (-2, 2)]
     ratio = [form / shift[0] for form, shift in zip(forms, shifts, strict=True)]
     assert ratio[0] * ratio[1] > 0  # the sign of the normal form says the side
+
+
+def test_there_is_no_normal_form_where_the_equations_are_singular() -> None:
+    """Exactly singular, as they are where a curve comes to loads of zero: no codimension-two point is looked for there."""
+    point = low_frequency("BPC").points[3]
+    equations = point.equations
+    singular = replace(equations, here=np.zeros_like(equations.here), there=np.zeros_like(equations.there))
+    assert math.isfinite(normal_form(point))
+    assert math.isnan(normal_form(replace(point, equations=singular)))
 
 
 @pytest.mark.thorough

@@ -147,14 +147,17 @@ def cubic(condition: Singular, solution: Solution, at: ConditionValue) -> float:
 
     They lie on the other side of the parameter where it changes its sign (GPD, DBPC). Perturbed by +-a u + a^2 h / 2, J h =
     -F_yy u u, over two (half) periods in turn, the part of the equations along +-d is odd in a: here its third difference,
-    refined once. NaN where the motion is so near to another kind that it cannot be followed at the perturbed orbit.
+    refined once. NaN where J is singular, or the motion so near to another kind that it cannot be followed when it is perturbed.
     """
     u, d = (x / np.linalg.norm(x) for x in (at.right, at.left))
     bend, n = condition.bend(solution, u), u.size
     if bend is None:
         return math.nan
     curvature = bend[:n, : bend.shape[0]] @ condition.along(u)
-    h = np.linalg.solve(solution.equations.jacobian(), -curvature)
+    try:
+        h = np.linalg.solve(solution.equations.jacobian(), -curvature)
+    except np.linalg.LinAlgError:
+        return math.nan
 
     def third(a: float) -> float:
         pair = [solution.unknowns + s * a * u + 0.5 * a**2 * h for s in (1, -1)]
