@@ -172,6 +172,20 @@ def test_a_step_is_cut_where_the_equations_change_and_goes_on_with_others():
     assert found.solved_at(0.5)[0].place[0] == pytest.approx(1.0, abs=1e-13)
 
 
+class Wall(Events):
+    """A barrier beyond 1 that cannot be located, as it has no value there."""
+
+    def barrier(self):
+        return Function("wall", lambda point: 1.0 if point.parameter <= 1.0 else -math.inf)
+
+
+def test_what_lies_outside_the_bounds_is_no_event():
+    line = Explicit(lambda z: z[0] - z[1], lambda z: np.array([1.0, -1.0]))
+    inside, outside = (both_ways(line.start(0.0, 0.0), Wall, {"p": (-1.0, high)}) for high in (1.0, 2.0))
+    assert inside.ends == (End(CurveEnd.BOUND, -1.0), End(CurveEnd.BOUND, 1.0))
+    assert outside.ends[1].reason is CurveEnd.NOT_LOCATED
+
+
 def test_where_no_step_is_short_enough_the_end_says_so():
     spike = Explicit(
         lambda z: z[1] - abs(z[0]) ** 0.5, lambda z: np.array([-0.5 * np.sign(z[0]) / max(abs(z[0]), 1e-300) ** 0.5, 1.0])

@@ -90,22 +90,22 @@ class Continuation:
         return None, step
 
     def _accept(self, point: Any, ahead: Any, born: bool) -> bool:
-        """Take a step up to the first of its events; returns whether the curve goes on with other equations."""
+        """Take a step up to the first of its events; returns whether the curve goes on with other equations.
+
+        The step is cut at the bounds first, as what happens outside of them is none of the curve's events.
+        """
+        ahead, end = self._beyond(point, ahead) or (ahead, None)
         cut = self.events.cut(point, ahead)
         if isinstance(cut, End):
             self.end = cut
             return False
-        ahead = ahead if cut is None else cut.point
+        ahead, end = (ahead, end) if cut is None else (cut.point, None)
         self.end = None if born else self.events.interrupted(self, point, ahead)
         if self.end is not None:
             return False
-        bound, closed = self._beyond(point, ahead), False
-        if bound is not None:
-            (ahead, end), cut = bound, None
-        elif closed := self._closes(point, ahead):
+        closed = end is None and self._closes(point, ahead)
+        if closed:
             ahead, end, cut = self.points[0], End(CurveEnd.CLOSED), None
-        else:
-            end = None
         if closed or not born:
             self._note(point, ahead)
         self.points.append(ahead)
