@@ -12,6 +12,7 @@ from shared_systems import forced, steady, walled
 
 from saltus.attractors import basins_of_attraction
 from saltus.attractors.basins.basin_cells import cell_arguments, cells
+from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.find import Attractors, find_attractors
 from saltus.errors import ParameterError
 from saltus.plots.basins import draw_basins
@@ -35,7 +36,7 @@ def test_labels_and_times_are_those_of_single_simulations(found: Attractors, pic
     for i, j in zip(rng.integers(0, 11, 12), rng.integers(0, 13, 12), strict=True):
         path = strobes(SYSTEM, np.array([THETA[j], VELOCITY[i]]), 90)
         label = int(picture["label"].values[i, j])
-        apart = np.abs(path[:, None] - found.of(label).strobes).max(axis=2).min(axis=1)
+        apart = np.abs(path[:, None] - found.of(label).states).max(axis=2).min(axis=1)
         assert apart[-1] < 1e-6
         assert int(picture["time"].values[i, j]) == np.flatnonzero(apart > 0.01)[-1] + 1
 
@@ -63,14 +64,14 @@ def test_an_attractor_that_was_not_known_gets_a_label_after_the_others(found: At
 
 
 def test_a_cell_on_an_attractor_has_reached_it(found: Attractors) -> None:
-    (theta, velocity) = found.of(1).strobes[0]
+    (theta, velocity) = found.of(1).states[0]
     here = basins_of_attraction(SYSTEM, theta=[theta], velocity=[velocity], found=found)
     assert int(here["label"][0, 0]) == 1
     assert float(here["time"][0, 0]) == 0.0
 
 
 def test_blocks_with_plain_arguments_give_the_whole(found: Attractors, picture: xarray.Dataset) -> None:
-    arguments = json.loads(json.dumps(cell_arguments(found)))
+    arguments = json.loads(json.dumps(cell_arguments(SYSTEM, Labelling(SYSTEM, found.targets, 500, 1e-2, 1e-11))))
     for rows in (slice(0, 4), slice(4, 11)):
         block = cells(arguments, {"velocity": VELOCITY[rows].tolist(), "theta": THETA.tolist()})
         assert np.array_equal(block["label"], picture["label"].values[rows])
@@ -152,7 +153,7 @@ def test_the_picture_shows_each_basin_in_its_own_lightness(picture: xarray.Datas
     assert abs(greys[0] - greys[1]) > 0.3
     marks = [line for line in ax.lines if line.get_marker() in ("o", "s")]
     assert [(float(m.get_xdata()[0]), float(m.get_ydata()[0])) for m in marks] == [
-        (float(picture["strobe_theta"][i, 0]), float(picture["strobe_velocity"][i, 0])) for i in range(2)
+        (float(picture["section_theta"][i, 0]), float(picture["section_velocity"][i, 0])) for i in range(2)
     ]
     assert "(rad)" in ax.get_xlabel()
     texts = [text.get_text() for text in figure.legends[0].get_texts()]

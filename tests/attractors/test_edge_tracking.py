@@ -9,8 +9,9 @@ from shared_systems import forced, steady
 import saltus
 from saltus.attractors.basins.boundaries import clipped, edge_saddles, edges
 from saltus.attractors.basins.grid import basins_of_attraction
-from saltus.attractors.basins.labelling import label_states
+from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.find import Attractors, find_attractors
+from saltus.checks import Window
 
 SYSTEM = forced(W=0.88)
 GRID = np.linspace(-2.5, 2.5, 31)
@@ -27,7 +28,7 @@ def picture(found: Attractors) -> xarray.Dataset:
 
 
 def label(found: Attractors, states: np.ndarray) -> np.ndarray:
-    return label_states(found.system, found.targets, states, 500, 1e-2, 1e-11)[0]
+    return Labelling(found.system, found.targets, 500, 1e-2, 1e-11).of(states)[0]
 
 
 @pytest.mark.thorough
@@ -70,7 +71,7 @@ def test_one_basin_has_no_curves() -> None:
 
 def test_curves_are_cut_at_the_window() -> None:
     line = np.stack([np.linspace(-4.0, 4.0, 81), np.zeros(81)], axis=1)
-    shown = clipped((line, line), ((-1.0, 1.0), (-1.0, 1.0)))
+    shown = clipped([line, line], Window((-1.0, 1.0), (-1.0, 1.0)))
     assert np.nanmax(np.abs(shown)) == pytest.approx(1.5)
     gaps = np.isnan(shown[:, 0])
     assert gaps.sum() == 2

@@ -15,7 +15,7 @@ import saltus
 from saltus import ParameterError
 from saltus.attractors import lyapunov_many, lyapunov_spectrum
 from saltus.attractors.lyapunov.area_contraction import Contraction, impact_factor
-from saltus.attractors.lyapunov.renormalisation import LONGEST, piece_count
+from saltus.attractors.lyapunov.renormalisation import LONGEST_SPAN, span_count
 from saltus.theory import equilibria
 
 
@@ -126,7 +126,7 @@ def test_the_sum_of_the_exponents_is_the_divergence_of_random_systems():
             "c": rng.uniform(0.0, 2.0),
         }
         system = forced(W=rng.uniform(0.3, 3.0), H=rng.uniform(0.5, 4.0), **numbers)
-        found = lyapunov_spectrum(system, theta=rng.uniform(-1, 1), periods=48, transient=20, shadow=False)
+        found = lyapunov_spectrum(system, theta=rng.uniform(-1, 1), periods=48, transient=20, two_trajectories=False)
         if found.note is None:
             assert found.sum_defect < 1e-8
             checked += 1
@@ -156,10 +156,10 @@ def test_the_contraction_of_an_impact_that_depends_on_the_ground_is_that_of_its_
 def test_the_lanes_have_the_same_exponents_as_the_single_motion():
     """A settled motion, one in the transient and one with a period in many pieces, under losses and unequal layers."""
     systems = [forced(0.5, w, e=0.95, m=0.3) for w in (0.15, 0.7, 1.0)]
-    assert [piece_count(s.load.period) for s in systems] == [7, 2, 1]
+    assert [span_count(s.load.period) for s in systems] == [7, 2, 1]
     many = lyapunov_many(systems[0], {"load.frequency": [0.15, 0.7, 1.0]}, theta=0.9, periods=40, transient=10, tol=1e-12)
     for i, system in enumerate(systems):
-        one = lyapunov_spectrum(system, theta=0.9, periods=40, transient=10, shadow=False)
+        one = lyapunov_spectrum(system, theta=0.9, periods=40, transient=10, two_trajectories=False)
         np.testing.assert_allclose(many.exponent[i], one.values, rtol=0, atol=1e-7)
         np.testing.assert_allclose(many.error[i], one.errors, rtol=1e-4, atol=1e-9)
         np.testing.assert_allclose([many.at_half[i], many.later_half[i]], one.halves, rtol=0, atol=1e-7)
@@ -170,7 +170,7 @@ def test_the_values_that_are_known_of_the_three_chaotic_motions():
     where = {"load.frequency": [0.38, 1.2, 1.6], "load.horizontal.amplitude": [0.2, 2.0, 3.0]}
     found = lyapunov_many(forced(1.0, 1.0), where, theta=0.3, periods=400)
     assert found.positive.all()
-    assert (found.cycle == 0).all()
+    assert (found.period == 0).all()
     known = np.array([0.03, 0.12, 0.2])
     assert (np.abs(found.exponent[:, 0] - known) < 0.15 * known + found.error[:, 0]).all()
     np.testing.assert_allclose(found.exponent.sum("index"), -0.1, rtol=0, atol=1e-8)
@@ -183,10 +183,10 @@ def test_chaos_and_a_periodic_motion_coexist_at_large_amplitude(frequency):
     found = lyapunov_many(
         forced(3.0, frequency), theta=states[:, 0], velocity=states[:, 1], periods=200, transient=1000, tol=1e-10
     )
-    chaotic = found.positive & (found.cycle == 0)
+    chaotic = found.positive & (found.period == 0)
     assert chaotic.sum() >= 3
-    assert (found.cycle > 0).sum() >= 3
-    assert (found.exponent[:, 0].where(found.cycle > 0, -1.0) < -0.01).all()
+    assert (found.period > 0).sum() >= 3
+    assert (found.exponent[:, 0].where(found.period > 0, -1.0) < -0.01).all()
 
 
 def test_error_bars_hold_between_independent_motions_on_one_attractor():
@@ -202,7 +202,7 @@ def test_error_bars_hold_between_independent_motions_on_one_attractor():
 def test_growth_by_shear_alone_is_not_taken_for_chaos():
     """Without damping, on a torus, derivatives grow in proportion to the time; in a longer run the exponent falls."""
     system = forced(0.05, 1.3, C=0.0)
-    short, long = (lyapunov_spectrum(system, theta=0.5, periods=n, transient=100, shadow=False) for n in (64, 400))
+    short, long = (lyapunov_spectrum(system, theta=0.5, periods=n, transient=100, two_trajectories=False) for n in (64, 400))
     assert short.values[0] > 0.0
     assert long.values[0] < 0.5 * short.values[0]
     assert not short.positive
@@ -265,7 +265,7 @@ def test_threads_do_not_get_in_each_others_way_in_a_fresh_process():
 def test_progress_goes_from_nothing_to_all():
     for follow in (lyapunov_many, lyapunov_spectrum):
         told = []
-        follow(forced(0.5, 1.0), theta=0.3, periods=64, transient=5, progress=told.append)
+        follow(forced(0.5, 1.0), theta=0.3, periods=64, transient=5, progress=lambda done, _, told=told: told.append(done))
         assert told == sorted(told)
         assert told[-1] == 1.0
 
@@ -279,7 +279,7 @@ def test_the_factor_of_impacts_is_that_of_the_law():
 
 def test_pieces_are_short():
     for length in (0.5, 6.4, 6.6, 63.0):
-        assert length / piece_count(length) <= LONGEST
+        assert length / span_count(length) <= LONGEST_SPAN
 
 
 RECORD = saltus.Record([0.0, 1.0], [0.0, 1.0])

@@ -71,7 +71,7 @@ def test_mirror_images_are_two_attractors_even_where_no_start_leads_to_one() -> 
 def test_a_symmetric_cycle_is_its_own_mirror_image() -> None:
     found = find_attractors(forced(1.0, 2.4), starts=48)
     assert [(member.label, member.period, member.mirror) for member in found] == [(1, 1, 1), (2, 3, 2), (3, 3, 3)]
-    assert all(len(member.strobes) == member.period for member in found)
+    assert all(len(member.states) == member.period for member in found)
 
 
 def test_labels_do_not_depend_on_the_sample() -> None:
@@ -82,7 +82,7 @@ def test_labels_do_not_depend_on_the_sample() -> None:
 def test_under_a_constant_load_they_are_rest_and_the_stable_equilibria() -> None:
     found = find_attractors(steady(), starts=48)
     stable = sorted(e.theta for e in equilibria(steady()) if e.stability.value == "stable")
-    assert sorted(float(member.strobes[0, 0]) for member in found) == pytest.approx(stable, abs=1e-9)
+    assert sorted(float(member.states[0, 0]) for member in found) == pytest.approx(stable, abs=1e-9)
     assert found.of(0).kind == "rest"
     assert [found.of(label).mirror for label in (1, 2)] == [2, 1]
 
@@ -114,7 +114,7 @@ def test_known_stable_orbits_count_and_repelling_ones_do_not(branch: saltus.Bran
 def test_further_starts_find_but_do_not_count() -> None:
     system = forced(W=0.88)
     whole = find_attractors(system, starts=32)
-    found = find_attractors(system, starts=1, also=np.concatenate([member.strobes for member in whole]))
+    found = find_attractors(system, starts=1, also=np.concatenate([member.states for member in whole]))
     assert len(found) == 2
     assert sum(member.starts for member in found) == 1
 
@@ -150,7 +150,7 @@ def test_a_sampled_set_knows_its_points_from_others() -> None:
     assert target.distance(np.array([3.0, 0.5])) > 1.9 > target.grain
     assert target.distance(np.array([np.nan, 0.0])) == np.inf
     again = Target.from_dict(target.to_dict())
-    assert np.array_equal(again.strobes, points)
+    assert np.array_equal(again.states, points)
     assert (again.label, again.kind) == (1, "chaotic")
 
 

@@ -67,7 +67,7 @@ def test_forward_it_shrinks_onto_its_first_segment_to_1e_8(which: str, request: 
     found: Manifold = request.getfixturevalue(which)
     system, q = found.orbit.system, found.orbit.period
     rng, tried = np.random.default_rng(0), 0
-    for branch in found.curves:
+    for branch in found.branches:
         inside = np.flatnonzero(np.isfinite(branch.states).all(axis=1) & (np.abs(branch.states).max(axis=1) < 3.0))
         for i in rng.choice(inside, 6):
             periods = math.floor(branch.place[i] * q + 1e-9)
@@ -76,7 +76,7 @@ def test_forward_it_shrinks_onto_its_first_segment_to_1e_8(which: str, request: 
                 continue
             end = strobes(system, branch.states[i], periods)[-1]
             point = (branch.point + periods) % q
-            offset = end - found.strobes[point]
+            offset = end - found.orbit_states[point]
             along = offset @ found.directions[point]
             rounds = (branch.point + periods) // q  # directions are carried from point 0 on, and turn where a round is complete
             assert np.sign(along) == branch.side * np.sign(found.multiplier) ** rounds
@@ -89,7 +89,7 @@ def test_forward_it_shrinks_onto_its_first_segment_to_1e_8(which: str, request: 
 
 def test_each_point_goes_to_its_place_a_period_before(curve: Manifold) -> None:
     """The map shifts the place by 1: so the image of the points of one level are points of the level before, to 1e-8."""
-    for branch in curve.curves:
+    for branch in curve.branches:
         levels = [np.flatnonzero(np.floor(branch.place + 1e-12) == n) for n in (6, 7)]
         before = {round(float(branch.place[i]) % 1.0, 12): branch.states[i] for i in levels[0]}
         pairs = [(i, before[key]) for i in levels[1] if (key := round(float(branch.place[i]) % 1.0, 12)) in before]
@@ -100,11 +100,11 @@ def test_each_point_goes_to_its_place_a_period_before(curve: Manifold) -> None:
 
 def test_motions_from_it_approach_the_saddle_and_those_beside_it_leave_to_both_sides(curve: Manifold) -> None:
     system, stable = curve.orbit.system, [1.58618614, 2.25614202]
-    branch = curve.curves[0]
+    branch = curve.branches[0]
     inside = np.flatnonzero(np.isfinite(branch.states).all(axis=1) & (branch.place > 6) & (np.abs(branch.states[:, 0]) < 2.5))
     i = inside[len(inside) // 2]
     path = strobes(system, branch.states[i], 14)
-    apart = np.abs(path - curve.strobes[0]).max(axis=1)
+    apart = np.abs(path - curve.orbit_states[0]).max(axis=1)
     assert apart.min() < 1e-4 < 0.3 < apart[0]
     tangent = branch.states[i + 1] - branch.states[i - 1]
     aside = 1e-3 * np.array([-tangent[1], tangent[0]]) / np.hypot(*tangent)
@@ -137,7 +137,7 @@ def test_with_impacts_that_lose_speed_the_multiplier_is_the_closed_forms_and_the
     orbit = saltus.find_orbit(system, x=float(x), velocity=float(velocity), period=2, settle=0)
     found = stable_manifold(orbit, window=((-1.0, 0.3), (-1.5, 1.5)), periods=20)
     assert found.multiplier == pytest.approx(min(np.abs(known.multipliers)), rel=1e-9)
-    assert len({branch.point for branch in found.curves}) == 2
+    assert len({branch.point for branch in found.branches}) == 2
     grid = np.linspace(-1.0, 0.3, 66), np.linspace(-1.5, 1.5, 61)
     labels = basins_of_attraction(system, x=grid[0], velocity=grid[1])["label"].values
     cell = np.array([grid[0][1] - grid[0][0], grid[1][1] - grid[1][0]])
@@ -149,7 +149,7 @@ def test_with_impacts_that_lose_speed_the_multiplier_is_the_closed_forms_and_the
 
 
 def test_neighbours_are_as_close_as_the_step(curve: Manifold) -> None:
-    for branch in curve.curves:
+    for branch in curve.branches:
         chords = np.hypot(*np.diff(branch.states, axis=0).T)
         inside = (np.abs(branch.states) <= 3.0).all(axis=1)
         assert chords[inside[1:] & inside[:-1]].max() <= 0.01 * 3.0 * (1 + 1e-9)
@@ -160,7 +160,7 @@ def test_the_unstable_manifold_leads_to_both_attractors(saddle: saltus.PeriodicO
     assert found.multiplier * stable_manifold(saddle, periods=1, step=0.2).multiplier == pytest.approx(
         math.exp(-0.1 * 2.0 * math.pi / 0.88), rel=1e-9
     )  # the determinant of the map
-    ends = sorted(float(branch.states[-1, 0]) for branch in found.curves)
+    ends = sorted(float(branch.states[-1, 0]) for branch in found.branches)
     attracting = saltus.search_orbits(forced(W=0.88), "load.frequency", [0.88], max_period=1, starts=16, repelling=0).orbits
     assert ends == pytest.approx(sorted(orbit.state[0] for orbit in attracting), abs=1e-5)
 
@@ -216,7 +216,7 @@ def test_without_damping_a_separatrix_has_the_energy_of_its_saddle() -> None:
     (rest,) = (value for theta, value in energy.items() if theta == 0.0)
     for branch in separatrices(system):
         top = min(energy.items(), key=lambda item: abs(item[0] - branch.saddle))[1]
-        assert branch.ends == "saddle"
+        assert branch.end == "saddle"
         for velocity in branch.impacts[:, 1]:
             assert 0.5 * velocity**2 == pytest.approx(top - rest, abs=1e-9)
     assert sum(len(branch.impacts) for branch in separatrices(system)) == 2
@@ -225,7 +225,7 @@ def test_without_damping_a_separatrix_has_the_energy_of_its_saddle() -> None:
 def test_separatrices_cross_the_contact_where_an_independent_integration_does() -> None:
     system = steady()
     points = [e for e in equilibria(system) if e.eigenvalues is not None and e.eigenvalues[0].real > 0 > e.eigenvalues[1].real]
-    assert [s.theta for s in saddles(system)] == pytest.approx([p.theta for p in points], abs=1e-12)
+    assert [s.place for s in saddles(system)] == pytest.approx([p.theta for p in points], abs=1e-12)
     ours = separatrices(system)
     for point in points:
         for outward in (True, False):

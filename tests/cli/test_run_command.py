@@ -54,7 +54,7 @@ def test_a_study_asks_for_a_motion_a_portrait_and_attractors_at_once(saltus, stu
     assert f"{len(stable)} stable and {saddles} unstable equilibria, {2 * saddles} separatrices.\n" in result.stdout
     assert result.stdout.endswith(f"Results are in {tmp_path / 'out'}: attractors.nc, attractors.png, attractors.pdf\n")
     with xarray.open_dataset(tmp_path / "out" / "attractors.nc", engine="h5netcdf") as data:
-        places = np.sort(np.append(data["strobe_theta"].values[data["attractor"].values > 0, 0], 0.0))
+        places = np.sort(np.append(data["section_theta"].values[data["attractor"].values > 0, 0], 0.0))
         np.testing.assert_allclose(places, stable, atol=1e-7)
         assert System.from_json(data.attrs["system"]) == load_study(path).system
 
@@ -94,7 +94,7 @@ def test_basins_are_those_of_python_and_their_cells_stay_in_a_store(saltus, stud
     assert files(tmp_path / "out") == ["basins.nc", "basins.zarr"]
     whole = basins_of_attraction(load_study(path).system, theta=np.linspace(-2, 2, 6), velocity=np.linspace(-2, 2, 5))
     with xarray.open_dataset(tmp_path / "out" / "basins.nc", engine="h5netcdf") as data:
-        for name in ("label", "time", "cells", "strobe_theta"):
+        for name in ("label", "time", "cells", "section_theta"):
             np.testing.assert_array_equal(data[name], whole[name])
     assert status(tmp_path / "out" / "basins.zarr").done == 3
     assert "period 1, amplitude 1.02, 100 % of the cells" in result.stdout

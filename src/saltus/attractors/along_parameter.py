@@ -2,36 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.attractors.attractor import REST, Attractor, Attractors, Target
-from saltus.attractors.attractors_dataset import coordinate, provenance
+from saltus.attractors.attractors_dataset import about, attractor_columns, variable
 from saltus.attractors.find import find_attractors
-from saltus.checks import Rectangle, check_number, check_path
+from saltus.attractors.kind import AttractorKind
+from saltus.checks import Rectangle, check_along, check_number, check_path
 from saltus.errors import ParameterError
+from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
 
-THRESHOLD = 0.3  # distance of two sets, relative to their size, up to which one may be the other's continuation
-SEEDS = 64  # points of each attractor from which motions start at the next value
-OTHER_PERIOD = 0.5  # of the threshold, for sets that repeat after different periods
-LED = 3.0  # times the threshold, for sets of one period where motions from the one settle on the other
-
 
 @dataclass(frozen=True)
-class Event:
-    """An attractor that begins or ends between two values of the parameter."""
+class MatchingSettings:
+    """By what an attractor is known again at the next value of the parameter."""
 
-    kind: str  # "birth" or "death"
-    label: int
-    before: float  # the last value without it (birth) or with it (death)
-    after: float
+    # Two sets may be one attractor up to this distance of one another, relative to their size.
+    threshold: float = 0.3
+    # Up to so many times the threshold where they repeat after different periods, as across a period doubling.
+    other_period: float = 0.5
+    # Up to so many times the threshold where they have one period and motions from the one settle on the other.
+    led: float = 3.0
+    # Motions start at the next value from so many states of each attractor.
+    seeds: int = 64
+    # So large a part of the states of a sampled set must be near the other one, as the rest are states of a random sample.
+    share: float = 0.95
+
+
+SETTINGS = MatchingSettings()
 
 
 def attractors_along(
@@ -44,9 +50,9 @@ def attractors_along(
     max_period: int = 16,
     seed: int = 0,
     known: Any = (),
-    threshold: float = THRESHOLD,
+    threshold: float = SETTINGS.threshold,
     tol: float = 1e-11,
-    progress: Callable[[float], object] | None = None,
+    progress: Progress = silent,
 ) -> xarray.Dataset:
     """The attractors at each value of a parameter, with labels that an attractor keeps as the parameter changes.
 
@@ -64,7 +70,7 @@ def attractors_along(
         window, starts, max_period, seed, tol: as for `attractors`.
         known: branches along the same parameter, whose stable orbits count at every value.
         threshold: the largest relative distance of one and the same attractor at neighbouring values.
-        progress: called with the fraction done.
+        progress: called with the fraction done and what is being done.
 
     Returns:
         A Dataset over (value, attractor), nan where it does not exist: `fraction`, `error`, `amplitude`, `largest_...`,
@@ -75,10 +81,7 @@ def attractors_along(
         ParameterError: a path to no number, values that are not monotonic, and as for `attractors`.
     """
     check_number("threshold", threshold, above=0.0)
-    grid = _values(system, path, values)
-    rows: list[Attractors] = []
-    names: list[dict[int, int]] = []  # identity by label, at each value
-    seeds: list[np.ndarray] = []
+    grid, followed = _values(system, path, values), _Followed(threshold)
     for i, value in enumerate(grid):
         here = find_attractors(
             system.with_({path: float(value)}),
@@ -87,20 +90,61 @@ def attractors_along(
             max_period=max_period,
             seed=seed,
             known=known,
-            also=np.concatenate(seeds) if seeds else (),
+            also=followed.seeds,
             tol=tol,
+            progress=part_of(progress, i / len(grid), (i + 1) / len(grid), path),
         )
-        taken = max((name for row in names for name in row.values()), default=REST)
-        if rows:
-            apart = _distances(rows[-1], here, [len(points) for points in seeds])
-            names.append(_identities(rows[-1], names[-1], here, apart, threshold, taken))
-        else:
-            names.append({member.label: member.label for member in here})
-        rows.append(here)
-        seeds = [member.strobes[-SEEDS:] for member in here]
-        if progress is not None:
-            progress((i + 1) / len(grid))
-    return _dataset(system, path, grid, rows, names, {"threshold": threshold, "starts": starts, "seed": seed, "tol": tol})
+        followed.add(here)
+    numbers = {"threshold": threshold, "starts": starts, "seed": seed, "tol": tol}
+    return _dataset(system, path, grid, followed, numbers)
+
+
+@dataclass
+class _Followed:
+    """The attractors at the values so far, and the identities of each by its label there."""
+
+    threshold: float
+    rows: list[Attractors] = field(default_factory=list)
+    names: list[dict[int, int]] = field(default_factory=list)
+
+    @property
+    def seeds(self) -> np.ndarray:
+        """States of the attractors at the last value, (n, 2)."""
+        last = self.rows[-1] if self.rows else ()
+        return np.concatenate([np.empty((0, 2)), *(member.states[-SETTINGS.seeds :] for member in last)])
+
+    def add(self, here: Attractors) -> None:
+        """Add the attractors at the next value, found from the seeds too: each goes on as the nearest one before, or is new."""
+        found: dict[int, int] = {}
+        for (old, new), distance in sorted(self._distances(here).items(), key=lambda item: item[1]):
+            if distance < self.threshold and new not in found and self.names[-1][old] not in found.values():
+                found[new] = self.names[-1][old]
+        taken = max((name for row in self.names for name in row.values()), default=REST)
+        for member in here:
+            if member.label not in found:
+                taken += member.kind is not AttractorKind.REST
+                found[member.label] = REST if member.kind is AttractorKind.REST else taken
+        self.rows.append(here)
+        self.names.append(found)
+
+    def _distances(self, here: Attractors) -> dict[tuple[int, int], float]:
+        """How far each attractor is from each of those before, by their labels."""
+        if not self.rows:
+            return {}
+        before = self.rows[-1]
+        parts = np.split(here.carried, np.cumsum([len(member.states[-SETTINGS.seeds :]) for member in before])[:-1])
+        led = {old.label: set(part.tolist()) for old, part in zip(before, parts, strict=True)} if len(before) else {}
+        return {(old.label, new.label): _apart(old, new, led[old.label] == {new.label}) for old in before for new in here}
+
+    def events(self, grid: np.ndarray) -> list[tuple[str, int, float, float]]:
+        """Births and deaths: their kind, the label, and the last value before them and the first one after."""
+        found = []
+        for i in range(1, len(grid)):
+            old, new = set(self.names[i - 1].values()), set(self.names[i].values())
+            edges = float(grid[i - 1]), float(grid[i])
+            found += [("death", label, *edges) for label in sorted(old - new)]
+            found += [("birth", label, *edges) for label in sorted(new - old)]
+        return found
 
 
 def set_distance(one: Target, other: Target) -> float:
@@ -108,10 +152,10 @@ def set_distance(one: Target, other: Target) -> float:
 
     Between sampled sets 5 % of the points may lie farther away, as they are points of a random sample.
     """
-    forth, back = other.distance(one.strobes), one.distance(other.strobes)
-    share = 0.95 if one.dense or other.dense else 1.0
+    forth, back = other.distance(one.states), one.distance(other.states)
+    share = SETTINGS.share if one.dense or other.dense else 1.0
     apart = max(float(np.quantile(forth, share)), float(np.quantile(back, share)))
-    size = max(float(np.abs(target.strobes).max()) for target in (one, other))
+    size = max(float(np.abs(target.states).max()) for target in (one, other))
     return apart / size if size > 0.0 else 0.0 if apart == 0.0 else np.inf
 
 
@@ -123,42 +167,13 @@ def _distances(before: Attractors, here: Attractors, seeds: list[int]) -> dict[t
 
 
 def _apart(old: Attractor, new: Attractor, led: bool) -> float:
-    if "rest" in (old.kind, new.kind):
+    """The distance of two attractors, in which those that look like one count as nearer."""
+    if AttractorKind.REST in (old.kind, new.kind):
         return 0.0 if old.kind == new.kind else np.inf
     distance = set_distance(old.target, new.target)
     if old.period != new.period:
-        return distance / OTHER_PERIOD
-    return distance / LED if led else distance
-
-
-def _identities(
-    before: Attractors,
-    names: dict[int, int],
-    here: Attractors,
-    apart: dict[tuple[int, int], float],
-    threshold: float,
-    taken: int,
-) -> dict[int, int]:
-    """The identity of each attractor: that of the one before which it continues, the nearest pair first, or a new one."""
-    found: dict[int, int] = {}
-    for (old, new), distance in sorted(apart.items(), key=lambda item: item[1]):
-        if distance < threshold and new not in found and names[old] not in found.values():
-            found[new] = names[old]
-    for member in here:
-        if member.label not in found:
-            taken += member.kind != "rest"
-            found[member.label] = REST if member.kind == "rest" else taken
-    return found
-
-
-def _events(grid: np.ndarray, names: list[dict[int, int]]) -> list[Event]:
-    events = []
-    for i in range(1, len(grid)):
-        old, new = set(names[i - 1].values()), set(names[i].values())
-        edges = float(grid[i - 1]), float(grid[i])
-        events += [Event("death", label, *edges) for label in sorted(old - new)]
-        events += [Event("birth", label, *edges) for label in sorted(new - old)]
-    return events
+        return distance / SETTINGS.other_period
+    return distance / SETTINGS.led if led else distance
 
 
 def _values(system: System, path: str, values: Any) -> np.ndarray:
@@ -170,46 +185,33 @@ def _values(system: System, path: str, values: Any) -> np.ndarray:
     steps = np.diff(grid)
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all() or not ((steps > 0).all() or (steps < 0).all()):
         raise ParameterError(f"values must be numbers of {path} that increase, or that decrease, got {values!r}", "values")
-    for value in grid:
-        system.with_({path: float(value)})  # refuses what the system does
+    check_along(system, path, grid, "values")
     return grid
 
 
-def _dataset(
-    system: System, path: str, grid: np.ndarray, rows: list[Attractors], names: list[dict[int, int]], more: dict[str, Any]
-) -> xarray.Dataset:
+def _dataset(system: System, path: str, grid: np.ndarray, followed: _Followed, numbers: dict[str, Any]) -> xarray.Dataset:
     import xarray
 
-    coordinate_name, unit = coordinate(system)
-    identities = sorted({name for row in names for name in row.values()})
-    shape = (len(grid), len(identities))
-    columns: dict[str, tuple[str, str, Callable[[Attractor], float]]] = {
-        "fraction": ("1", "share of the initial states that end there", lambda m: m.fraction),
-        "error": ("1", "binomial standard error of the share", lambda m: m.error),
-        "amplitude": (unit, f"max abs({coordinate_name})", lambda m: m.amplitude),
-        f"largest_{coordinate_name}": (unit, f"the largest {coordinate_name}", lambda m: m.highest),
-        f"smallest_{coordinate_name}": (unit, f"the smallest {coordinate_name}", lambda m: m.lowest),
-        "period": ("1", "forcing periods after which it repeats, 0 where it does not", lambda m: float(m.period)),
-    }
-    tables = {name: np.full(shape, np.nan) for name in columns}
-    kinds = np.full(shape, "", dtype="<U16")
-    for i, (row, name) in enumerate(zip(rows, names, strict=True)):
+    identities = sorted({name for row in followed.names for name in row.values()})
+    columns = attractor_columns(system)
+    tables = {key: np.full((len(grid), len(identities)), np.nan) for key in columns}
+    kinds = np.full((len(grid), len(identities)), "", dtype="<U16")
+    for i, (row, name) in enumerate(zip(followed.rows, followed.names, strict=True)):
         for member in row:
             j = identities.index(name[member.label])
-            kinds[i, j] = member.kind
-            for key, (_, _, read) in columns.items():
-                tables[key][i, j] = read(member)
-    over = ("value", "attractor")
-    variables: dict[str, Any] = {
-        key: (over, tables[key], {"units": units, "long_name": text}) for key, (units, text, _) in columns.items()
-    }
-    variables["kind"] = (over, kinds, {"units": "1", "long_name": "rest, periodic, quasi-periodic or chaotic"})
-    variables["undecided"] = ("value", [row.undecided for row in rows], {"units": "1", "long_name": "undecided initial states"})
-    events = _events(grid, names)
-    for key, text in (("kind", "birth or death"), ("label", "label"), ("before", f"{path} before"), ("after", f"{path} after")):
-        variables[f"event_{key}"] = ("event", np.array([getattr(e, key) for e in events]), {"units": "1", "long_name": text})
+            kinds[i, j] = str(member.kind)
+            for key, (part, _, _) in columns.items():
+                tables[key][i, j] = getattr(member, part)
+    over, events = ("value", "attractor"), followed.events(grid)
+    variables = {key: variable(over, tables[key], units, text) for key, (_, units, text) in columns.items()}
+    variables["kind"] = variable(over, kinds, "1", "rest, periodic, quasi-periodic or chaotic")
+    variables["undecided"] = variable("value", [row.undecided for row in followed.rows], "1", "undecided initial states")
+    for i, (key, text) in enumerate(
+        (("kind", "birth or death"), ("label", "label"), ("before", f"{path} before"), ("after", f"{path} after"))
+    ):
+        variables[f"event_{key}"] = variable("event", np.array([event[i] for event in events]), "1", text)
     axes = {
-        "value": ("value", grid, {"units": "1", "long_name": path}),
+        "value": variable("value", grid, "1", path),
         "attractor": ("attractor", np.array(identities, dtype=int), {"long_name": "identity; 0 is rest"}),
     }
-    return xarray.Dataset(variables, axes, provenance(system, "attractors along a parameter") | {"path": path} | more)
+    return xarray.Dataset(variables, axes, about(system, "attractors along a parameter", path=path, **numbers))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.attractors.kind import AttractorKind
 from saltus.checks import Window
 from saltus.orbits import PeriodicOrbit
 from saltus.systems import System
@@ -19,56 +20,56 @@ if TYPE_CHECKING:
 
 UNDECIDED = -1  # the label of what ends on no known attractor
 REST = 0  # the label of rest at the contact, always
-NEAR = 1e-6  # two strobe points that count as one, relative to their size or to 1
+NEAR = 1e-6  # two states at phase 0 this near to one another count as one, relative to their size or to 1
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Where an attractor meets the stroboscopic section, phase 0 of the load: all points of a cycle, many of a chaotic set."""
+    """Where an attractor meets the stroboscopic section, phase 0 of the load: all states of an orbit, many of a chaotic set."""
 
     label: int
-    kind: str  # "rest", "periodic", "quasi-periodic" or "chaotic"
-    strobes: np.ndarray  # (n, 2), coordinate and velocity
+    kind: AttractorKind
+    states: np.ndarray  # (n, 2), coordinate and velocity at phase 0
 
     @property
     def dense(self) -> bool:
-        """Whether the points are a sample of infinitely many."""
-        return self.kind not in ("rest", "periodic")
+        """Whether the states are a sample of infinitely many."""
+        return self.kind not in (AttractorKind.REST, AttractorKind.PERIODIC)
 
     @cached_property
     def _tree(self) -> Any:
         from scipy.spatial import cKDTree
 
-        return cKDTree(self.strobes)
+        return cKDTree(self.states)
 
     @cached_property
     def grain(self) -> float:
         """The distance within which a point counts as one of a sampled set: twice what 95 % of its own keep to."""
         if not self.dense:
             return 0.0
-        apart, _ = self._tree.query(self.strobes, k=2, p=np.inf)
+        apart, _ = self._tree.query(self.states, k=2, p=np.inf)
         return float(2.0 * np.quantile(apart[:, 1], 0.95))
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """How far states (..., 2) are from the nearest of its points, in the larger of the two coordinates, (...)."""
+        """How far states (..., 2) are from the nearest of its own, in the larger of the two coordinates, (...)."""
         if self.dense:
             finite = np.isfinite(points).all(axis=-1)
             apart, _ = self._tree.query(np.where(finite[..., None], points, 0.0), p=np.inf)
             return np.where(finite, apart, np.inf)
         distance = np.full(points.shape[:-1], np.inf)
-        for strobe in self.strobes:
-            apart = np.maximum(np.abs(points[..., 0] - strobe[0]), np.abs(points[..., 1] - strobe[1]))
+        for state in self.states:
+            apart = np.maximum(np.abs(points[..., 0] - state[0]), np.abs(points[..., 1] - state[1]))
             np.fmin(distance, apart, out=distance)
         return distance
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON takes it."""
-        return {"label": self.label, "kind": self.kind, "strobes": self.strobes.tolist()}
+        return {"label": self.label, "kind": str(self.kind), "states": self.states.tolist()}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Target:
         """The inverse of `to_dict`."""
-        return cls(int(data["label"]), str(data["kind"]), np.asarray(data["strobes"], dtype=float).reshape(-1, 2))
+        return cls(int(data["label"]), AttractorKind(data["kind"]), np.asarray(data["states"], dtype=float).reshape(-1, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,14 +91,14 @@ class Attractor:
         return self.target.label
 
     @property
-    def kind(self) -> str:
-        """rest, periodic, quasi-periodic or chaotic."""
+    def kind(self) -> AttractorKind:
+        """What it is."""
         return self.target.kind
 
     @property
-    def strobes(self) -> np.ndarray:
-        """Its points at phase 0 of the load, (n, 2)."""
-        return self.target.strobes
+    def states(self) -> np.ndarray:
+        """Its states at phase 0 of the load, (n, 2)."""
+        return self.target.states
 
     @property
     def period(self) -> int:
@@ -121,6 +122,11 @@ class Attractor:
         It is 0 where none or all of n starts end there; the share is then within 3 / n of it with a probability of 95 %.
         """
         return math.sqrt(self.fraction * (1.0 - self.fraction) / self.of) if self.of else math.nan
+
+    def labelled(self, label_of: Mapping[int, int], **changes: Any) -> Attractor:
+        """The same with other labels, its mirror image's included."""
+        target = replace(self.target, label=label_of[self.label])
+        return replace(self, target=target, mirror=label_of.get(self.mirror, UNDECIDED), **changes)
 
     def __repr__(self) -> str:
         what = f"period {self.period}" if self.orbit is not None else self.kind

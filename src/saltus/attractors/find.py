@@ -3,23 +3,38 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from saltus.attractors.attractor import REST, UNDECIDED, Attractors
-from saltus.attractors.registry import FAILED, OPEN, Collection
+from saltus.attractors.attractor import REST, UNDECIDED, Attractor, Attractors
+from saltus.attractors.kind import AttractorKind
+from saltus.attractors.registry import Place, Registry
 from saltus.attractors.stroboscopic_section import with_clock
 from saltus.checks import Rectangle, check_count, check_number, check_states, check_window, checked_by
 from saltus.errors import ParameterError
-from saltus.flow import find_recurrence
+from saltus.flow import RECURRENCE, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, initial_states
+from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
 
-FIRST, SECOND = 400, 4000  # forcing periods in which motions may settle; those that have not then get the second
-KEPT = 256  # strobes of them that are kept
-MOST_VERDICTS = 8  # of motions that never settle: each takes seconds
+
+@dataclass(frozen=True)
+class FindSettings:
+    """How long motions are followed before their attractor is asked for."""
+
+    # Motions may settle in so many forcing periods, and those that have not then in so many more.
+    first: int = 400
+    second: int = 4000
+    # So many of their last states at phase 0 are kept, to be compared with sets that do not repeat.
+    kept: int = 256
+    # At most so many motions that never settle are given a verdict of their own, as each takes seconds.
+    verdicts: int = 8
+
+
+SETTINGS = FindSettings()
 
 
 def _check(
@@ -28,7 +43,7 @@ def _check(
     with_clock(system)
     check_states("also", also)
     check_count("starts", starts, 1)
-    check_count("max_period", max_period, 1, 16)
+    check_count("max_period", max_period, 1, RECURRENCE.compiled_max_period)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     check_window(window, system)
     check_count("seed", seed, 0)
@@ -46,7 +61,7 @@ def find_attractors(
     known: Iterable[PeriodicOrbit | Branch] | PeriodicOrbit | Branch = (),
     also: Any = (),
     tol: float = 1e-11,
-    progress: Callable[[float], object] | None = None,
+    progress: Progress = silent,
 ) -> Attractors:
     """The attractors on which motions from a window of initial states at phase 0 end, each certified, with its share of them.
 
@@ -65,69 +80,64 @@ def find_attractors(
         known: stable orbits, or branches of which those at the system's parameter are taken, that count as attractors too.
         also: further initial states (n, 2), which do not count in the shares.
         tol: the error of a step, as for `simulate_many`.
-        progress: called with the fraction done, first when all arguments have been checked.
+        progress: called with the fraction done and what is being done.
 
     Raises:
         ParameterError: several coordinates, a load that never repeats, known orbits of another system, numbers without meaning.
     """
-    clock, further = with_clock(system), check_states("also", also)
-    area = check_window(window, system)
-    given = _known(system, known)
-    say = progress or (lambda _: None)
-    say(0.0)
-    states = initial_states(clock, starts, area, seed)
-    collection = Collection(clock)
-    for orbit in given:
-        collection.add_orbit(orbit)
-    places = _places(collection, np.concatenate([states, further]), max_period, tol, say)
-    collection.add_images()
-    label_of = order(collection)
-    counts = np.bincount(places[:starts][places[:starts] >= 0], minlength=len(collection.targets))
-    ends = np.array([label_of.get(int(place), UNDECIDED) for place in places], dtype=int)
-    members = collection.members(label_of, counts, starts)
-    say(1.0)
-    return Attractors(system, members, states, ends[:starts], ends[starts:], area, seed, tol, tuple(collection.reasons))
+    clock, further, area = with_clock(system), check_states("also", also), check_window(window, system)
+    progress(0.0, "motions")
+    states, registry = initial_states(clock, starts, area, seed), Registry(clock)
+    for orbit in _known(system, known):
+        registry.add_orbit(orbit)
+    places = _assigned(registry, np.concatenate([states, further]), max_period, tol, progress)
+    registry.add_images()
+    final = final_labels(registry.members)
+    counts = np.bincount(places[:starts][places[:starts] >= 0], minlength=len(registry.members))
+    ends = np.array([final.get(int(place), UNDECIDED) for place in places], dtype=int)
+    members = [member.labelled(final, starts=int(counts[member.label]), of=starts) for member in registry.members]
+    members.sort(key=lambda member: member.label)
+    progress(1.0, "attractors")
+    return Attractors(system, tuple(members), states, ends[:starts], ends[starts:], area, seed, tol, tuple(registry.reasons))
 
 
-def _places(
-    collection: Collection, states: np.ndarray, max_period: int, tol: float, say: Callable[[float], object]
-) -> np.ndarray:
-    """The place in the collection of the attractor on which each motion ends; below 0 where that is undecided."""
-    options: dict[str, Any] = {"max_period": max_period, "kept": KEPT, "tol": tol}
-    ends = find_recurrence(collection.system, states, FIRST, **options, progress=lambda done, _: say(0.3 * done))
-    places = collection.take(ends)
-    left = np.flatnonzero(places == OPEN)
+def _assigned(registry: Registry, states: np.ndarray, max_period: int, tol: float, progress: Progress) -> np.ndarray:
+    """The label in the registry of the attractor on which each motion ends; below 0 where that is undecided."""
+    options: dict[str, Any] = {"max_period": max_period, "kept": SETTINGS.kept, "tol": tol}
+    ends = find_recurrence(registry.system, states, SETTINGS.first, **options, progress=part_of(progress, 0.0, 0.3))
+    labels = registry.assign(ends)
+    left = np.flatnonzero(labels == Place.OPEN)
     if not left.size:
-        return places
-    last = ends.states[left, -1]
-    ends = find_recurrence(collection.system, last, SECOND, **options, progress=lambda done, _: say(0.3 + 0.4 * done))
-    later = collection.take(ends)
-    collection.belonging(ends, later)
-    for turn in range(MOST_VERDICTS):
-        waiting = np.flatnonzero(later == OPEN)
+        return labels
+    begin = ends.states[left, -1]
+    ends = find_recurrence(registry.system, begin, SETTINGS.second, **options, progress=part_of(progress, 0.3, 0.7))
+    later = registry.assign(ends)
+    registry.assign_unsettled(ends, later)
+    for turn in range(SETTINGS.verdicts):
+        waiting = np.flatnonzero(later == Place.OPEN)
         if not waiting.size:
             break
-        later[waiting[0]] = collection.judge(ends, int(waiting[0]), max_period)
-        collection.belonging(ends, later)
-        say(0.7 + 0.3 * turn / MOST_VERDICTS)
-    if (later == OPEN).any():
-        collection.reasons.append(f"{int((later == OPEN).sum())} motions do not settle in {FIRST + SECOND} forcing periods")
-    places[left] = np.where(later == OPEN, FAILED, later)
-    return places
+        later[waiting[0]] = registry.judge(ends.states[waiting[0], -1], max_period)
+        registry.assign_unsettled(ends, later)
+        progress(0.7 + 0.3 * turn / SETTINGS.verdicts, "verdicts")
+    if (later == Place.OPEN).any():
+        periods = SETTINGS.first + SETTINGS.second
+        registry.reasons.append(f"{int((later == Place.OPEN).sum())} motions do not settle in {periods} forcing periods")
+    labels[left] = np.where(later == Place.OPEN, Place.FAILED, later)
+    return labels
 
 
-def order(collection: Collection) -> dict[int, int]:
-    """Labels by place, the same for the same set: rest is 0, then cycles by period, amplitude and sign, then the others."""
+def final_labels(members: list[Attractor]) -> dict[int, int]:
+    """Labels by those of a registry, the same for the same set: rest, then orbits by period, amplitude and sign, then others."""
 
-    def rank(place: int) -> tuple[float, ...]:
-        orbit, (low, high) = collection.orbits[place], collection.ranges[place]
-        if orbit is None:
-            return 1.0, 0.0, round(max(high, -low), 2), -round(float(collection.targets[place].strobes[:, 0].mean()), 2)
-        return 0.0, float(orbit.period), round(max(high, -low), 6), -round(high, 6)
+    def rank(member: Attractor) -> tuple[float, ...]:
+        if member.orbit is None:
+            return 1.0, 0.0, round(member.amplitude, 2), -round(float(member.states[:, 0].mean()), 2)
+        return 0.0, float(member.period), round(member.amplitude, 6), -round(member.highest, 6)
 
-    moving = [place for place, target in enumerate(collection.targets) if target.kind != "rest"]
-    labels = {place: i + 1 for i, place in enumerate(sorted(moving, key=rank))}
-    return labels | {place: REST for place, target in enumerate(collection.targets) if target.kind == "rest"}
+    moving = sorted((member for member in members if member.kind is not AttractorKind.REST), key=rank)
+    labels = {member.label: REST for member in members if member.kind is AttractorKind.REST}
+    return labels | {member.label: i for i, member in enumerate(moving, 1)}
 
 
 def _known(system: System, known: Any) -> list[PeriodicOrbit]:

@@ -73,17 +73,26 @@ def certify(system: System, state: np.ndarray, period: int | None, max_period: i
 
     Without a period the one of its nearest return within `max_period` is tried, and a motion on its way there may be farther off.
     """
-    name = system.model.coordinates[0]
-    begin = {name: float(state[0]), "velocity": float(state[1])}
     later = section_states(system, state[None], period or max_period, tol=1e-12)[0]
     states = np.concatenate([[state], later])
     q = period or nearest_return(states[::-1], max_period)
-    try:
-        orbit = orbit_from(Problem(system, Signature((), 1)), begin, q)
-    except MotionError:
-        orbit = None
+    orbit = solved_orbit(system, state, q, admissible=False)
     within = DEFECT if period else SLOW
     if orbit is None:
         return Certificate(None, np.inf, within)
     apart = np.abs(states[:q] - np.array(orbit.state)).max(axis=1)
     return Certificate(orbit, float(apart.min()), within)
+
+
+def solved_orbit(system: System, state: np.ndarray, period: int, admissible: bool = True) -> PeriodicOrbit | None:
+    """The orbit that a motion from a state (2,) at phase 0 follows over so many periods, if one solves its equations there."""
+    try:
+        orbit = orbit_from(Problem(system, Signature((), 1)), start_at(system, state), period)
+    except MotionError:
+        return None
+    return orbit if orbit is not None and (orbit.admissible or not admissible) else None
+
+
+def start_at(system: System, state: np.ndarray) -> dict[str, Any]:
+    """A state (coordinate, velocity) as `simulate` takes it."""
+    return {system.model.coordinates[0]: float(state[0]), "velocity": float(state[1])}

@@ -4,6 +4,7 @@ from .ensemble.dataset_reading import stop_names, stroboscopic
 from .ensemble.ensemble import compiled_lanes, simulate_many
 from .ensemble.ensemble_dataset import Wanted
 from .ensemble.inputs import Inputs, read_inputs
+from .ensemble.tangent_ensemble import TangentEnsemble
 from .ensemble.threads import Jobs, Lanes, available_cores
 from .load_release import Release, contact_pull, load_releases, peak_near
 from .motion import DenseOutput, Event, EventKind, Impacts, Motion
@@ -40,6 +41,7 @@ __all__ = [
     "Release",
     "Sensitivities",
     "Stop",
+    "TangentEnsemble",
     "Validity",
     "Wanted",
     "available_cores",

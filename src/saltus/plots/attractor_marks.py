@@ -28,7 +28,7 @@ def draw_points(ax: Any, dataset: Any, name: str, i: int, **style: Any) -> None:
     """Attractor `i` at phase 0 of the load: large marks where it repeats itself, else some of its points."""
     repeats = str(dataset["attractor_kind"].values[i]) in ("rest", "periodic")
     mark = MARK | {"marker": MARKERS[i % len(MARKERS)]} if repeats else POINT
-    ax.plot(dataset[f"strobe_{name}"].values[i], dataset["strobe_velocity"].values[i], **{**mark, **style})
+    ax.plot(dataset[f"section_{name}"].values[i], dataset["section_velocity"].values[i], **{**mark, **style})
 
 
 def steady(dataset: Any) -> bool:

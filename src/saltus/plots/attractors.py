@@ -26,7 +26,7 @@ HALO = [Stroke(linewidth=2.2, foreground="white"), Normal()]  # so that an attra
 @styled
 def draw_attractors(dataset: Any, width: float = 1.3 * SINGLE_COLUMN) -> Figure:
     """A Figure from the dataset of attractors that were searched: a dot for each start, a mark for each point at phase 0."""
-    name = next(str(v).removeprefix("strobe_") for v in dataset if str(v).startswith("strobe_") and v != "strobe_velocity")
+    name = next(str(v).removeprefix("section_") for v in dataset if str(v).startswith("section_") and v != "section_velocity")
     colours = attractor_colours([int(n) for n in dataset["attractor"].values])
     figure = new_figure(width, 0.82 * width + 4.2 * (len(colours) + 1) // 2)
     ax = figure.subplots()

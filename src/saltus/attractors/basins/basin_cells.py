@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.attractor import Attractors, Target
-from saltus.attractors.basins.labelling import label_states
+from saltus.attractors.attractor import Target
+from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.stroboscopic_section import with_clock
 from saltus.errors import ParameterError
-from saltus.progress import Progress
+from saltus.progress import Progress, silent
 from saltus.provenance import provenance
 from saltus.systems import System
 
 if TYPE_CHECKING:
     from saltus.sweep import Plan
 
-PERIODS = 500
-WITHIN = 1e-2
 FUNCTION = "saltus.attractors.basins.basin_cells:cells"
-
 Grid = tuple[np.ndarray, np.ndarray]  # velocities, coordinates
 
 
@@ -38,44 +35,28 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
         {"label": int16 (velocities, coordinates), "time": float (velocities, coordinates)}.
     """
     system = System.from_dict(arguments["system"])
-    targets = [Target.from_dict(item) for item in arguments["attractors"]]
+    targets = tuple(Target.from_dict(item) for item in arguments["attractors"])
     grid = np.asarray(block["velocity"], dtype=float), np.asarray(block[system.model.coordinates[0]], dtype=float)
-    numbers = (int(arguments["periods"]), float(arguments["within"]), float(arguments["tol"]))
-    label, time = label_grid(with_clock(system), targets, grid, *numbers)
+    numbers = int(arguments["periods"]), float(arguments["within"]), float(arguments["tol"])
+    label, time = _label_grid(Labelling(with_clock(system), targets, *numbers), grid)
     return {"label": label, "time": time}
 
 
-def cell_arguments(found: Attractors, *, periods: int = PERIODS, within: float = WITHIN, tol: float = 1e-11) -> dict[str, Any]:
-    """The arguments of `cells` that are the same for all blocks."""
-    targets = [target.to_dict() for target in found.targets]
-    return {"system": found.system.to_dict(), "attractors": targets, "periods": periods, "within": within, "tol": tol}
-
-
-def label_grid(
-    system: System,
-    targets: Iterable[Target],
-    grid: Grid,
-    periods: int,
-    within: float,
-    tol: float,
-    say: Callable[[float], object] = lambda _: None,
-) -> tuple[np.ndarray, np.ndarray]:
+def _label_grid(labelling: Labelling, grid: Grid, progress: Progress = silent) -> tuple[np.ndarray, np.ndarray]:
     """Labels and times over the grid, (velocities, coordinates) each."""
-    states = np.stack(np.meshgrid(grid[1], grid[0]), axis=-1).reshape(-1, 2)
-    label, time = label_states(system, targets, states, periods, within, tol, say)
-    shape = (len(grid[0]), len(grid[1]))
-    return label.reshape(shape), time.reshape(shape)
+    label, time = labelling.of(np.stack(np.meshgrid(grid[1], grid[0]), axis=-1).reshape(-1, 2), progress)
+    return label.reshape(len(grid[0]), len(grid[1])), time.reshape(len(grid[0]), len(grid[1]))
 
 
 def computed_cells(
-    found: Attractors, grid: Grid, numbers: Mapping[str, Any], rows: int, progress: Progress, **where: Any
+    system: System, labelling: Labelling, grid: Grid, rows: int, progress: Progress, **where: Any
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same, as a sweep in chunks of `rows` velocities if `where` says where they are kept or who computes them.
 
     Args:
-        found: the attractors.
+        system: the system as it was given, whose load may be constant.
+        labelling: the attractors, and how motions are labelled by them.
         grid: the initial states.
-        numbers: `periods`, `within` and `tol` of the cells.
         rows: velocities in a chunk.
         progress: called with the share of the cells that are done.
         where: `store`, `workers` and `scheduler` of `saltus.sweep.run`, or None.
@@ -83,13 +64,19 @@ def computed_cells(
     from saltus.sweep import run
 
     if all(value is None for value in where.values()):
-        system = with_clock(found.system)
-        return label_grid(system, found.targets, grid, **numbers, say=lambda done: progress(done, "cells"))
-    data = run(_plan(found, grid, rows, numbers), progress=progress, **where)
+        return _label_grid(labelling, grid, progress)
+    data = run(_plan(system, labelling, grid, rows), progress=progress, **where)
     return np.array(data["label"]), np.array(data["time"])
 
 
-def _plan(found: Attractors, grid: Grid, rows: int, numbers: Mapping[str, Any]) -> Plan:
+def cell_arguments(system: System, labelling: Labelling) -> dict[str, Any]:
+    """The arguments of `cells` that are the same for all blocks."""
+    targets = [target.to_dict() for target in labelling.targets]
+    numbers = {"periods": labelling.periods, "within": labelling.within, "tol": labelling.tol}
+    return {"system": system.to_dict(), "attractors": targets, **numbers}
+
+
+def _plan(system: System, labelling: Labelling, grid: Grid, rows: int) -> Plan:
     from saltus.sweep import Plan, Variable
 
     variables = {
@@ -98,8 +85,8 @@ def _plan(found: Attractors, grid: Grid, rows: int, numbers: Mapping[str, Any]) 
     }
     return Plan(
         function=FUNCTION,
-        arguments=cell_arguments(found, **numbers),
-        axes={"velocity": grid[0], found.system.model.coordinates[0]: grid[1]},
+        arguments=cell_arguments(system, labelling),
+        axes={"velocity": grid[0], system.model.coordinates[0]: grid[1]},
         chunk={"velocity": rows},
         variables=variables,
         attrs=provenance(kind="basin_cells", title="cells of basins computed by saltus"),

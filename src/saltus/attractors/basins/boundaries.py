@@ -8,35 +8,49 @@ boundary has one of a short period, and returns near to where it was. From there
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from saltus.attractors.attractor import UNDECIDED, Attractors
-from saltus.attractors.attractors_dataset import is_constant
 from saltus.attractors.manifolds.phase_plane import separatrices
-from saltus.attractors.manifolds.saddle_manifolds import HYPERBOLIC, check_window, stable_manifold
-from saltus.attractors.registry import Collection
-from saltus.attractors.stroboscopic_section import section_states
+from saltus.attractors.manifolds.saddle_manifolds import is_saddle, stable_manifold
+from saltus.attractors.orbit_certificate import solved_orbit
+from saltus.attractors.stroboscopic_section import is_constant, section_states
+from saltus.checks import Window, check_window
 from saltus.orbits import PeriodicOrbit, is_symmetric, same_orbit
 from saltus.systems import System
 
-STEP = 0.01  # of the manifolds, in half widths of the window
-POINTS = 8_000  # of each side of a manifold
-LONGEST = 6  # forcing periods of a saddle
-MOST_SADDLES = 4  # those of the fewest periods: where there are more, the manifold of each comes near all of the boundary
-EDGES = 12  # places of the boundary that are tracked
-PARTS, ROUNDS = 32, 9  # into which an interval is cut, and how often: 33^9 is past rounding
-TRACKED = 40  # forcing periods of the motion by the boundary
-RETURN = 0.2  # the farthest return from which Newton's method is tried
 
+@dataclass(frozen=True)
+class BoundarySettings:
+    """How saddles on the boundary are found, and their manifolds computed."""
+
+    # The manifolds are as fine as this, in half widths of the window, and have at most so many points on each side of a saddle.
+    step: float = 0.01
+    points: int = 8_000
+    # Saddles of up to so many forcing periods are looked for, and so many of the fewest are taken: where there are more, the
+    # manifold of each comes near all of the boundary.
+    max_period: int = 6
+    saddles: int = 4
+    # The edge is tracked from so many places of the boundary, for so many forcing periods.
+    edges: int = 12
+    tracked: int = 40
+    # An interval across the boundary is cut by so many states, and so often: 33^9 is past rounding.
+    cuts: int = 32
+    rounds: int = 9
+    # Newton's method is tried from returns that are no farther than this.
+    farthest_return: float = 0.2
+    # Curves are given up to so many half widths from the middle of the window.
+    margin: float = 1.5
+
+
+SETTINGS = BoundarySettings()
 Label = Callable[[np.ndarray], np.ndarray]  # states (n, 2) -> labels (n,)
 
 
-def boundaries(
-    found: Attractors, label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndarray
-) -> tuple[np.ndarray, ...]:
-    """The curves at which the basins of a grid meet, each an array (n, 2) with nan between pieces.
+def basin_boundaries(found: Attractors, label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """The curves at which the basins of a grid meet, in a row, (n, 2), with nan between them.
 
     Under a constant load they are the separatrices of the saddle equilibria in the window of the grid. Under a periodic load they
     are the stable manifolds of the saddle orbits, at most 4 and of up to 6 forcing periods, to which tracking of the edge leads.
@@ -44,32 +58,34 @@ def boundaries(
 
     Args:
         found: the attractors.
-        label: tells the label of states.
+        label: the labels of states.
         labels: the labels of the grid, (velocities, coordinates).
         along, velocity: the grid.
     """
-    window = (float(along[0]), float(along[-1])), (float(velocity[0]), float(velocity[-1]))
-    check_window(window, STEP)
+    bounds = (float(along[0]), float(along[-1])), (float(velocity[0]), float(velocity[-1]))
+    window = check_window(bounds, found.system)
     if is_constant(found.system.load):
-        return tuple(np.stack([curve.theta, curve.velocity], axis=1) for curve in separatrices(found.system, window))
-    saddles = edge_saddles(found.system, *edges(label, labels, along, velocity))
-    return tuple(stable_manifold(saddle, window=window, step=STEP, points=POINTS).states for saddle in saddles)
+        curves = [np.stack([curve.theta, curve.velocity], axis=1) for curve in separatrices(found.system, window)]
+    else:
+        saddles = edge_saddles(found.system, *edges(label, labels, along, velocity))
+        curves = [stable_manifold(saddle, window=window, step=SETTINGS.step, points=SETTINGS.points).states for saddle in saddles]
+    return clipped(curves, window)
 
 
 def edges(label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of states (n, 2) with different labels, as close as rounding lets them be, at places spread over the boundary."""
     rows, columns = np.nonzero((labels[:, 1:] != labels[:, :-1]) & (labels[:, 1:] != UNDECIDED) & (labels[:, :-1] != UNDECIDED))
-    chosen = np.unique(np.linspace(0, max(len(rows) - 1, 0), min(EDGES, len(rows))).astype(int))
+    chosen = np.unique(np.linspace(0, max(len(rows) - 1, 0), min(SETTINGS.edges, len(rows))).astype(int))
     rows, columns = rows[chosen], columns[chosen]
     low = np.stack([along[columns], velocity[rows]], axis=1)
     high = np.stack([along[columns + 1], velocity[rows]], axis=1)
     first = labels[rows, columns]
-    for _ in range(ROUNDS if len(rows) else 0):
-        share = np.linspace(0.0, 1.0, PARTS + 2)[None, 1:-1, None]
+    for _ in range(SETTINGS.rounds if len(rows) else 0):
+        share = np.linspace(0.0, 1.0, SETTINGS.cuts + 2)[None, 1:-1, None]
         between = low[:, None] + share * (high - low)[:, None]
-        other = label(between.reshape(-1, 2)).reshape(len(rows), PARTS) != first[:, None]
+        other = label(between.reshape(-1, 2)).reshape(len(rows), SETTINGS.cuts) != first[:, None]
         between = np.concatenate([low[:, None], between, high[:, None]], axis=1)
-        place = np.where(other.any(axis=1), np.argmax(other, axis=1), PARTS)  # the last state with the first label
+        place = np.where(other.any(axis=1), np.argmax(other, axis=1), SETTINGS.cuts)  # the last state with the first label
         pick = np.arange(len(rows))
         low, high = between[pick, place], between[pick, place + 1]
     return low, high
@@ -77,53 +93,45 @@ def edges(label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndar
 
 def edge_saddles(system: System, low: np.ndarray, high: np.ndarray) -> list[PeriodicOrbit]:
     """The saddle orbits near which motions from both sides of the boundary come; and their mirror images."""
-    if not len(low):
-        return []
-    collection, found = Collection(system), list[PeriodicOrbit]()
-    for track in section_states(system, 0.5 * (low + high), TRACKED):
-        for state, periods in _returns(track):
-            orbit = collection.solved(state, periods)
-            if orbit is None or not _is_saddle(orbit):
+    found: list[PeriodicOrbit] = []
+    for track in section_states(system, 0.5 * (low + high), SETTINGS.tracked) if len(low) else ():
+        for state, period in _returns(track):
+            orbit = solved_orbit(system, state, period)
+            if orbit is None or not is_saddle(orbit):
                 continue
-            for one in (orbit, *_image(collection, orbit)):
+            for one in (orbit, *_image(orbit)):
                 if not any(same_orbit(one, other, mirrored=False) for other in found):
                     found.append(one)
-    return sorted(found, key=lambda orbit: orbit.period)[:MOST_SADDLES]
+    return sorted(found, key=lambda orbit: orbit.period)[: SETTINGS.saddles]
 
 
 def _returns(track: np.ndarray) -> list[tuple[np.ndarray, int]]:
     """The states of a motion nearest to which it comes back, and after how many periods, for each number of these."""
     chosen = []
-    for q in range(1, LONGEST + 1):
+    for q in range(1, SETTINGS.max_period + 1):
         apart = np.abs(track[q:] - track[:-q]).max(axis=1)
         apart = apart[: len(apart) // 2]  # later it has left the boundary for an attractor, and returns there
         nearest = int(np.nanargmin(apart))
-        if apart[nearest] < RETURN:
+        if apart[nearest] < SETTINGS.farthest_return:
             chosen.append((track[nearest], q))
     return chosen
 
 
-def clipped(curves: tuple[np.ndarray, ...], window: Any) -> np.ndarray:
+def clipped(curves: list[np.ndarray], window: Window) -> np.ndarray:
     """The curves in a row, (n, 2), with nan between them and where they are outside the window by more than its half."""
-    frame = check_window(window, STEP)
     parts = [np.full((0, 2), np.nan)]
     for curve in curves:
-        far = ~(np.abs(frame.scaled(curve)) <= 1.5).all(axis=1)
+        far = ~(np.abs(window.scaled(curve)) <= SETTINGS.margin).all(axis=1)
         parts += [np.where(far[:, None], np.nan, curve), np.full((1, 2), np.nan)]
     joined = np.concatenate(parts)
     gone = np.isnan(joined).any(axis=1)
     return joined[~(gone & np.append(True, gone[:-1]))] if len(joined) else joined
 
 
-def _is_saddle(orbit: PeriodicOrbit) -> bool:
-    size = np.sort(np.abs(orbit.multipliers))
-    return bool(0.0 < size[0] < 1.0 - HYPERBOLIC and 1.0 + HYPERBOLIC < size[1] < np.inf)
-
-
-def _image(collection: Collection, orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
+def _image(orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
     """The mirror image of an orbit that is not its own."""
-    if orbit.symmetric or not is_symmetric(collection.system):
+    if orbit.symmetric or not is_symmetric(orbit.system):
         return []
-    state = -section_states(collection.system, np.array([orbit.state]), 0.5)[0, 0]
-    image = collection.solved(state, orbit.period)
+    state = -section_states(orbit.system, np.array([orbit.state]), 0.5)[0, 0]
+    image = solved_orbit(orbit.system, state, orbit.period)
     return [] if image is None else [image]

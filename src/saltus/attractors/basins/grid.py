@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.attractors.attractor import NEAR, REST, UNDECIDED, Attractor, Attractors, Target
-from saltus.attractors.attractors_dataset import attractor_table, coordinate, labels, provenance
-from saltus.attractors.basins.basin_cells import PERIODS, WITHIN, Grid, check_basin_store, computed_cells
-from saltus.attractors.basins.labelling import label_states
+from saltus.attractors.attractors_dataset import about, attractor_table, coordinate, labels, variable
+from saltus.attractors.basins.basin_cells import Grid, check_basin_store, computed_cells
+from saltus.attractors.basins.boundaries import basin_boundaries
+from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.find import find_attractors
+from saltus.attractors.kind import AttractorKind
 from saltus.attractors.stroboscopic_section import with_clock
 from saltus.checks import Window, check_axis, check_count, check_number, check_window, checked_by
 from saltus.errors import ParameterError
@@ -24,11 +26,26 @@ from saltus.systems import System, reversed_system
 if TYPE_CHECKING:
     import xarray
 
-CELLS = 201  # along an axis for which no numbers are given
-NARROWEST = 1e-6  # half width of a window around a grid of one point
-ROWS = 25  # velocities in a chunk, which then takes seconds
-MOST_NEW = 64  # states of cells that end nowhere known from which new attractors are looked for, at a time
-ROUNDS = 3
+
+@dataclass(frozen=True)
+class BasinSettings:
+    """The numbers of a picture of basins."""
+
+    # So many cells are taken along an axis for which no numbers are given.
+    cells: int = 201
+    # The half width of the window around a grid of one point.
+    narrowest: float = 1e-6
+    # A motion is followed for so many forcing periods at most, and has reached its attractor within this distance of it.
+    periods: int = 500
+    within: float = 1e-2
+    # So many velocities are in a chunk of a store, which then takes seconds.
+    rows: int = 25
+    # New attractors are looked for from so many states of cells that end on no known one, and so often.
+    new_states: int = 64
+    rounds: int = 3
+
+
+SETTINGS = BasinSettings()
 
 
 def _check(
@@ -65,11 +82,11 @@ def basins_of_attraction(
     *,
     velocity: Iterable[float] | None = None,
     found: Attractors | None = None,
-    periods: int = PERIODS,
-    within: float = WITHIN,
+    periods: int = SETTINGS.periods,
+    within: float = SETTINGS.within,
     curves: bool = False,
     tol: float = 1e-11,
-    rows: int = ROWS,
+    rows: int = SETTINGS.rows,
     store: Path | str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -89,13 +106,13 @@ def basins_of_attraction(
         found: the attractors and their labels; by default those that `attractors` finds, over the grid.
         periods: the most forcing periods of each motion.
         within: that distance, in the larger of coordinate and velocity.
-        curves: adds the curves at which basins meet, computed by the backward flow (see `boundaries`), as `boundary_...` over
-            `boundary_point`, nan between pieces.
+        curves: adds the curves at which basins meet, computed by the backward flow (see `basin_boundaries`), as `boundary_...`
+            over `boundary_point`, nan between curves.
         tol: the error of a step.
         rows: velocities of the grid in one chunk of a store, or of what a worker computes.
         store, workers, scheduler: where the cells are kept and who computes them, see `saltus.sweep.run`; the attractors are
             found first, and the curves at the end, at every run. Where none is given all cells are computed at once.
-        progress: called with the fraction done and what is being done, first when all arguments have been checked.
+        progress: called with the fraction done and what is being done.
         coordinates: the coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201).
 
     Returns:
@@ -109,58 +126,49 @@ def basins_of_attraction(
     grid = _grid(clock, velocity, coordinates, found)
     progress(0.0, "attractors")
     if found is None:
-        window = _around(clock, grid)
-        found = find_attractors(system, window=window, tol=tol, progress=lambda done: progress(0.1 * done, "attractors"))
-    numbers: dict[str, Any] = {"periods": periods, "within": within, "tol": tol}
+        found = find_attractors(system, window=_around(clock, grid), tol=tol, progress=part_of(progress, 0.0, 0.1))
+    labelling = Labelling(clock, found.targets, periods, within, tol)
     where = {"store": store, "workers": workers, "scheduler": scheduler}
-    label, time = computed_cells(found, grid, numbers, int(rows), part_of(progress, 0.1, 0.9), **where)
-    members, label, time, reasons = _with_new(system, found, grid, label, time, periods, within, tol)
-    data = _dataset(system, members, grid, label, time, numbers | {"reasons": reasons})
+    label, time = computed_cells(system, labelling, grid, int(rows), part_of(progress, 0.1, 0.9), **where)
+    found = _with_new(found, labelling, grid, label, time)
+    data = _dataset(found, grid, label, time, {"periods": periods, "within": within, "tol": tol})
     if curves:
-        data = data.assign(_meeting(replace(found, members=members), grid, label, periods, within, tol))
-    progress(1.0, "cells")
+        data = data.assign(_curves(found, replace(labelling, targets=found.targets), grid, label))
+    progress(1.0, "basins")
     return data
 
 
-def _with_new(
-    system: System, found: Attractors, grid: Grid, label: np.ndarray, time: np.ndarray, periods: int, within: float, tol: float
-) -> tuple[tuple[Attractor, ...], np.ndarray, np.ndarray, list[str]]:
-    """Attractors that only cells of the grid lead to, and these cells with their labels."""
-    members, reasons = list(found.members), list(found.reasons)
-    clock, seen = with_clock(system), np.zeros(label.shape, dtype=bool)
-    for _ in range(ROUNDS):
+def _with_new(found: Attractors, labelling: Labelling, grid: Grid, label: np.ndarray, time: np.ndarray) -> Attractors:
+    """The attractors with those to which only cells of the grid lead; `label` and `time` of these cells are filled in."""
+    members, reasons, seen = list(found.members), list(found.reasons), np.zeros(label.shape, dtype=bool)
+    for _ in range(SETTINGS.rounds):
         rows, columns = np.nonzero((label == UNDECIDED) & ~seen)
         if not rows.size:
             break
-        chosen = np.linspace(0, rows.size - 1, min(MOST_NEW, rows.size)).astype(int)
+        states = np.stack([grid[1][columns], grid[0][rows]], axis=1)
+        chosen = np.linspace(0, rows.size - 1, min(SETTINGS.new_states, rows.size)).astype(int)
         seen[rows[chosen], columns[chosen]] = True
-        states = np.stack([grid[1][columns[chosen]], grid[0][rows[chosen]]], axis=1)
-        more = find_attractors(system, starts=1, also=states, tol=tol)
+        more = find_attractors(found.system, starts=1, also=states[chosen], tol=labelling.tol)
         new = [member for member in more if not any(_same(member.target, known.target) for known in members)]
         reasons = list(dict.fromkeys([*reasons, *more.reasons]))
         if not new:
             continue
         fresh = _relabelled(new, 1 + max([member.label for member in members], default=REST))
         members += fresh
-        all_states = np.stack([grid[1][columns], grid[0][rows]], axis=1)
-        targets = tuple(member.target for member in fresh)
-        label[rows, columns], time[rows, columns] = label_states(clock, targets, all_states, periods, within, tol)
-    return tuple(sorted(members, key=lambda member: member.label)), label, time, reasons
+        further = replace(labelling, targets=tuple(member.target for member in fresh))
+        label[rows, columns], time[rows, columns] = further.of(states)
+    members.sort(key=lambda member: member.label)
+    return replace(found, members=tuple(members), reasons=tuple(reasons))
 
 
-def _meeting(found: Attractors, grid: Grid, label: np.ndarray, periods: int, within: float, tol: float) -> dict[str, Any]:
+def _curves(found: Attractors, labelling: Labelling, grid: Grid, label: np.ndarray) -> dict[str, Any]:
     """The curves at which basins meet, as variables."""
-    from saltus.attractors.basins.boundaries import boundaries, clipped
-
-    clock, (name, unit) = with_clock(found.system), coordinate(found.system)
-    curves = boundaries(
-        found, lambda states: label_states(clock, found.targets, states, periods, within, tol)[0], label, grid[1], grid[0]
-    )
-    points = clipped(curves, (grid[1][[0, -1]], grid[0][[0, -1]]))
-    text = "of the stable manifolds between basins, nan between pieces"
+    name, unit = coordinate(found.system)
+    points = basin_boundaries(found, lambda states: labelling.of(states)[0], label, grid[1], grid[0])
+    text = "of the stable manifolds between basins, nan between curves"
     return {
-        f"boundary_{name}": ("boundary_point", points[:, 0], {"units": unit, "long_name": f"{name} {text}"}),
-        "boundary_velocity": ("boundary_point", points[:, 1], {"units": "1", "long_name": f"velocity {text}"}),
+        f"boundary_{key}": variable("boundary_point", points[:, i], unit, f"{key} {text}")
+        for i, key in enumerate((name, "velocity"))
     }
 
 
@@ -173,38 +181,26 @@ def _check_curves(system: System, grid: Grid) -> None:
 
 
 def _same(one: Target, other: Target) -> bool:
+    """Whether two attractors are one."""
     if one.kind != other.kind:
         return False
-    apart = other.distance(one.strobes)
-    return (
-        bool(np.median(apart) < other.grain)
-        if other.dense
-        else bool(apart.max() < 10.0 * NEAR * (1.0 + np.abs(one.strobes).max()))
-    )
+    apart = other.distance(one.states)
+    if other.dense:
+        return bool(np.median(apart) < other.grain)
+    return bool(apart.max() < 10.0 * NEAR * (1.0 + np.abs(one.states).max()))
 
 
 def _relabelled(new: list[Attractor], first: int) -> list[Attractor]:
     """New attractors with labels after the known ones, rest with its own; shares of the few states say nothing."""
-    label_of = {m.label: first + i for i, m in enumerate(m for m in new if m.kind != "rest")} | {REST: REST}
-    return [
-        Attractor(
-            target=Target(label_of[m.label], m.kind, m.strobes),
-            highest=m.highest,
-            lowest=m.lowest,
-            orbit=m.orbit,
-            starts=0,
-            of=0,
-            mirror=label_of.get(m.mirror, UNDECIDED),
-            evidence=m.evidence,
-        )
-        for m in new
-    ]
+    moving = [member.label for member in new if member.kind is not AttractorKind.REST]
+    label_of = {label: first + i for i, label in enumerate(moving)} | {REST: REST}
+    return [member.labelled(label_of, starts=0, of=0) for member in new]
 
 
 def _around(system: System, grid: Grid) -> Window:
     """The least window around the contact that holds a grid."""
     contact = check_window(None, system).centre[0]
-    wide, fast = (float(max(np.abs(a - m).max(), NARROWEST)) for a, m in ((grid[1], contact), (grid[0], 0.0)))
+    wide, fast = (float(max(np.abs(a - m).max(), SETTINGS.narrowest)) for a, m in ((grid[1], contact), (grid[0], 0.0)))
     return Window((contact - wide, contact + wide), (-fast, fast))
 
 
@@ -217,33 +213,31 @@ def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: 
                 f"{type(system.model).__name__} has no coordinate {other!r}; give {name}=... and velocity=...", other
             )
     window = check_window(None if found is None else found.window, system)
-    along = window.centre[0] + window.half[0] * np.linspace(-1.0, 1.0, CELLS)
+    along = window.centre[0] + window.half[0] * np.linspace(-1.0, 1.0, SETTINGS.cells)
     if system.model.sides:
         along = along[np.max([np.asarray(system.model.gap(along, s)) for s in system.model.sides], axis=0) >= 0.0]
-    speeds = window.centre[1] + window.half[1] * np.linspace(-1.0, 1.0, CELLS) if velocity is None else velocity
+    speeds = window.centre[1] + window.half[1] * np.linspace(-1.0, 1.0, SETTINGS.cells) if velocity is None else velocity
     places = coordinates.get(name)
     return check_axis("velocity", speeds), check_axis(name, along if places is None else places)
 
 
-def _dataset(
-    system: System, members: tuple[Attractor, ...], grid: Grid, label: np.ndarray, time: np.ndarray, more: dict[str, Any]
-) -> xarray.Dataset:
+def _dataset(found: Attractors, grid: Grid, label: np.ndarray, time: np.ndarray, numbers: dict[str, Any]) -> xarray.Dataset:
     import xarray
 
-    name, unit = coordinate(system)
-    dims = ("velocity", name)
-    share = [float((label == member.label).mean()) for member in members]
-    period = with_clock(system).load.period or math.nan
-    variables: dict[str, Any] = attractor_table(members, system)
+    name, unit = coordinate(found.system)
+    share = [float((label == member.label).mean()) for member in found]
+    period = with_clock(found.system).load.period or math.nan
+    variables: dict[str, Any] = attractor_table(found.members, found.system)
     variables |= {
-        "label": (dims, label, {"units": "1", "long_name": "attractor on which the motion ends, -1 for undecided"}),
-        "time": (dims, time, {"units": f"2 pi / Omega = {period:.9g}", "long_name": "forcing periods to reach the attractor"}),
-        "cells": ("attractor", np.array(share), {"units": "1", "long_name": "share of the grid"}),
+        "label": variable(("velocity", name), label, "1", "attractor on which the motion ends, -1 for undecided"),
+        "time": variable(("velocity", name), time, f"2 pi / Omega = {period:.9g}", "forcing periods to reach the attractor"),
+        "cells": variable("attractor", np.array(share), "1", "share of the grid"),
     }
     axes = {
-        "velocity": ("velocity", grid[0], {"units": "1", "long_name": f"d {name} / d tau at phase 0"}),
-        name: (name, grid[1], {"units": unit, "long_name": f"{name} at phase 0"}),
-        "attractor": labels(members),
+        "velocity": variable("velocity", grid[0], unit, f"d {name} / d tau at phase 0"),
+        name: variable(name, grid[1], unit, f"{name} at phase 0"),
+        "attractor": labels(found.members),
     }
     undecided = float((label == UNDECIDED).mean())
-    return xarray.Dataset(variables, axes, provenance(system, "basins") | more | {"undecided": undecided})
+    attributes = about(found.system, "basins", **numbers, reasons=list(found.reasons), undecided=undecided)
+    return xarray.Dataset(variables, axes, attributes)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -49,6 +51,37 @@ def uncertainty(series: np.ndarray) -> np.ndarray:
     finite = np.where(np.isneginf(series), 0.0, series)
     widening = np.sqrt(len(series) * np.sum(weights(len(series)) ** 2))
     return np.where(lost, 0.0, STUDENT * widening * _largest_standard_error(finite))
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Averages of rates over a run and over each of its halves, with half widths of their 95 % intervals."""
+
+    value: np.ndarray  # (...)
+    error: np.ndarray  # (...)
+    halves: np.ndarray  # (2, ...): from the first and from the second half of the run alone
+    half_errors: np.ndarray  # (2, ...)
+
+    @classmethod
+    def of(cls, rates: np.ndarray) -> Estimate:
+        """The averages of a series of rates, (entries, ...)."""
+        half = len(rates) // 2
+        parts = (rates[:half], rates[-half:])
+        averages, errors = ([measure(part) for part in parts] for measure in (average, uncertainty))
+        return cls(average(rates), uncertainty(rates), np.stack(averages), np.stack(errors))
+
+    def positive(self, duration: Any) -> np.ndarray:
+        """Whether rates of growth over runs of these durations are above 0 by more than their error and the resolution.
+
+        They must be so in all and in both halves of the run.
+        """
+        above = self.value - self.error > resolution(duration)
+        return np.asarray(above & (self.halves - self.half_errors > resolution(np.asarray(duration) / 2)).all(axis=0))
+
+
+def resolution(duration: Any) -> Any:
+    """2 ln(t) / t: the largest rate over a run of this duration that growth by the square of the time has."""
+    return np.vectorize(lambda t: 2.0 * math.log(max(t, math.e)) / t, otypes=[float])(duration)
 
 
 def _largest_standard_error(series: np.ndarray) -> Any:

@@ -1,4 +1,8 @@
-"""Runs in pieces: how a long run of derivatives is cut, and which systems and lengths can have one."""
+"""Renormalisation: how a long run of derivatives is cut into spans, after each of which they are made orthonormal again.
+
+All methods of this room share it: which systems and lengths can have a run, into how many spans a forcing period is cut, and the
+frame of derivatives with which it begins.
+"""
 
 from __future__ import annotations
 
@@ -8,21 +12,35 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors.lyapunov.averages import BATCHES
-from saltus.checks import check_count
-from saltus.systems import System
+from saltus.attractors.stroboscopic_section import check_periodic
+from saltus.checks import check_count, check_number
+from saltus.flow import Motion
+from saltus.systems import System, check_system
 
-LONGEST = 6.5  # units of time: a forcing period at Omega = 1, over which derivatives grow and shrink by less than 1e6
-
-
-def pieces_of(system: System) -> tuple[float, int]:
-    """The length of the period, 1 under constant loads, and into how many pieces it is cut."""
-    length = system.load.period or 1.0
-    return length, piece_count(length)
+LONGEST_SPAN = 6.5  # units of time: a forcing period at Omega = 1, over which derivatives grow and shrink by less than 1e6
 
 
-def piece_count(length: float) -> int:
-    """Into how many pieces a period of this length is cut."""
-    return max(1, math.ceil(length / LONGEST))
+def check_run(function: str, system: Any, periods: Any, transient: Any, tol: float) -> None:
+    """Refuse what has no exponents, and a run too short for error bars of its halves.
+
+    Raises:
+        ParameterError: with the name of the argument.
+    """
+    check_system(system, function)
+    check_periodic(system)
+    check_count("periods", periods, 2 * BATCHES)
+    check_count("transient", transient, 0)
+    check_number("tol", tol, at_least=1e-15, at_most=1e-6)
+
+
+def period_length(system: System) -> float:
+    """The forcing period; 1 under constant loads, where a unit of time stands for it."""
+    return system.load.period or 1.0
+
+
+def span_count(length: float) -> int:
+    """Into how many spans a period of this length is cut."""
+    return max(1, math.ceil(length / LONGEST_SPAN))
 
 
 def first_frame(size: int) -> np.ndarray:
@@ -34,11 +52,7 @@ def first_frame(size: int) -> np.ndarray:
     return frame
 
 
-def check_run(periods: Any, transient: Any) -> None:
-    """Refuse a run too short for error bars of its halves, and what is no whole number.
-
-    Raises:
-        ParameterError: with the least number.
-    """
-    for name, value, least in (("periods", periods, 2 * BATCHES), ("transient", transient, 0)):
-        check_count(name, value, least)
+def state_of(motion: Motion) -> dict[str, Any]:
+    """The state at the end of a motion, as `simulate` takes it."""
+    names = motion.system.model.coordinates
+    return {**dict(zip(names, np.atleast_1d(motion.position).tolist(), strict=True)), "velocity": motion.velocity}

@@ -1,47 +1,56 @@
-"""The stroboscopic map's largest exponent without derivatives: a shadow beside the motion, moved back after every period."""
+"""The stroboscopic map's largest exponent without derivatives, from two trajectories beside one another."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from saltus.attractors.lyapunov.renormalisation import state_of
 from saltus.flow import simulate
+from saltus.progress import Progress, silent
 from saltus.systems import System
 
-DISTANCE = 1e-7  # of the shadow: far above the error of a period, far below what bends the map
+DISTANCE = 1e-7  # of the two: far above the error of a period, far below what bends the map
+ACCURACY = 1e-5  # what motions at that distance, with errors of their own, may miss of an exponent
 TOLERANCE = 1e-14
+TOLD = 16  # periods between calls of the progress
 
 
-def shadow_growth(
-    system: System, state: dict[str, Any], periods: int, length: float, progress: Callable[[float], object] | None = None
+def separation_growth(
+    system: System, state: dict[str, Any], periods: int, length: float, progress: Progress = silent
 ) -> np.ndarray:
     """ln(distance after a period / distance before) for each period, (periods,); -inf once both states are the same.
 
-    The shadow is moved along the line to it (Benettin, Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9). Where it lies on
-    the other side of the contact, or meets it once more, nothing is special.
+    After each period the second state is moved back to the distance of 1e-7 along the line to it (Benettin, Galgani, Giorgilli
+    and Strelcyn, Meccanica 15 (1980) 9). Where it lies on the other side of the contact, or meets it once more, nothing is
+    special.
     """
-    names = system.model.coordinates
-    here = np.concatenate([[state[name] for name in names], np.atleast_1d(state["velocity"])])
+    here = _vector(state)
     away = np.full(here.size, DISTANCE / np.sqrt(here.size))
     growth = np.full(periods, -np.inf)
-
-    def strobe(at: np.ndarray) -> np.ndarray:
-        velocity = at[len(names) :].tolist()
-        start = dict(zip(names, at[: len(names)].tolist(), strict=True))
-        speeds = velocity[0] if len(names) == 1 else tuple(velocity)
-        motion = simulate(system, **start, velocity=speeds, duration=length, tol=TOLERANCE, dense=False)
-        return np.concatenate([np.atleast_1d(motion.position), np.atleast_1d(motion.velocity)])
-
     for p in range(periods):
-        following = strobe(here)
-        apart = strobe(here + away) - following
+        following = _mapped(system, here, length)
+        apart = _mapped(system, here + away, length) - following
         distance = float(np.linalg.norm(apart))
         if distance == 0.0:
             break
         growth[p] = np.log(distance / np.linalg.norm(away))
         here, away = following, apart * (DISTANCE / distance)
-        if progress is not None and p % 16 == 15:
-            progress((p + 1) / periods)
+        if p % TOLD == TOLD - 1:
+            progress((p + 1) / periods, "two trajectories")
     return growth
+
+
+def _vector(state: dict[str, Any]) -> np.ndarray:
+    """Coordinates, then velocities."""
+    return np.concatenate([np.atleast_1d(values) for values in state.values()]).astype(float)
+
+
+def _mapped(system: System, state: np.ndarray, length: float) -> np.ndarray:
+    """The state a period later."""
+    names = system.model.coordinates
+    velocity = state[len(names) :].tolist()
+    start: dict[str, Any] = dict(zip(names, state[: len(names)].tolist(), strict=True))
+    start["velocity"] = velocity[0] if len(names) == 1 else tuple(velocity)
+    return _vector(state_of(simulate(system, **start, duration=length, tol=TOLERANCE, dense=False)))

@@ -9,12 +9,12 @@ from __future__ import annotations
 import cmath
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from saltus.attractors.manifolds.saddle_manifolds import check_window
+from saltus.attractors.manifolds.saddle_manifolds import PLANE
 from saltus.attractors.stroboscopic_section import with_clock
+from saltus.checks import Rectangle, check_window
 from saltus.errors import ParameterError
 from saltus.systems import Constant, System
 
@@ -40,7 +40,7 @@ class Equilibrium:
         return self.eigenvalues is not None and self.eigenvalues[0].real > 0.0 > self.eigenvalues[1].real
 
 
-def equilibria(system: System, window: Any = ((-3.0, 3.0), (-3.0, 3.0))) -> tuple[Equilibrium, ...]:
+def equilibria(system: System, window: Rectangle = PLANE) -> tuple[Equilibrium, ...]:
     """The equilibria in a window of the phase plane, by their coordinate, the contact among them where it is one.
 
     They are the zeros of the acceleration at rest between 2001 points of the window: two that are nearer to one another than a
@@ -49,9 +49,9 @@ def equilibria(system: System, window: Any = ((-3.0, 3.0), (-3.0, 3.0))) -> tupl
     Raises:
         ParameterError: a load that is not constant, several coordinates, a window without meaning.
     """
-    frame = check_window(window, 0.1)
+    area = check_window(window, system)
     check_constant(system)
-    model, low, high = system.model, float(frame.centre[0] - frame.half[0]), float(frame.centre[0] + frame.half[0])
+    model, low, high = system.model, *area.coordinate
     found = []
     for side in model.sides or (1,):
         grid = np.linspace(low, high, GRID)

@@ -6,29 +6,40 @@ A saddle is left and approached along (1, lambda), lambda its eigenvalues (see `
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
-from saltus.attractors.manifolds.equilibria import equilibria
-from saltus.attractors.manifolds.manifold_growth import Window
-from saltus.attractors.manifolds.saddle_manifolds import check_window
-from saltus.checks import check_number
+from saltus.attractors.manifolds.equilibria import Equilibrium, equilibria
+from saltus.attractors.manifolds.manifold_growth import has_left
+from saltus.attractors.manifolds.saddle_manifolds import PLANE
+from saltus.checks import Rectangle, Window, check_number, check_window
 from saltus.flow import Motion, simulate
 from saltus.systems import System, VelocityReduction, reversed_system
 
-OFFSET = 1e-6  # from the saddle; the curve leaves its tangent by the square of this
-CLOSE = 1e-4  # distance at which a separatrix is said to end at a saddle
-PIECE = 2.0  # of time that is followed at once
-
 
 @dataclass(frozen=True)
-class Saddle:
-    """A saddle equilibrium under a constant load."""
+class SeparatrixSettings:
+    """How a separatrix is followed."""
 
-    theta: float
-    side: int
-    rates: tuple[float, float]  # the eigenvalues, the positive one first
+    # It begins so far from the saddle, and leaves its tangent there by the square of this.
+    offset: float = 1e-6
+    # It ends at a saddle within this distance, once it has been ten times as far from all.
+    close: float = 1e-4
+    # So much time is followed at once.
+    span: float = 2.0
+
+
+SETTINGS = SeparatrixSettings()
+
+
+class SeparatrixEnd(StrEnum):
+    """Where a separatrix ends."""
+
+    WINDOW = "window"  # it has left the window for good
+    SADDLE = "saddle"
+    SPAN = "span"  # the time asked for is over
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,26 +51,19 @@ class Separatrix:
     theta: np.ndarray  # (n,)
     velocity: np.ndarray  # (n,)
     impacts: np.ndarray  # (m, 2): the times and velocities, just before each, of the impacts of the forward motion, latest first
-    ends: str  # "window", "saddle" or "span"
+    end: SeparatrixEnd
 
 
-def saddles(system: System, window: Any = ((-3.0, 3.0), (-3.0, 3.0))) -> tuple[Saddle, ...]:
+def saddles(system: System, window: Rectangle = PLANE) -> tuple[Equilibrium, ...]:
     """The saddle equilibria in a window of the phase plane, by their coordinate.
 
     Raises:
         ParameterError: a load that is not constant; a window without meaning.
     """
-    points = equilibria(system, window)
-    return tuple(Saddle(p.place, p.side, _rates(p.eigenvalues)) for p in points if p.saddle and p.eigenvalues)
+    return tuple(point for point in equilibria(system, window) if point.saddle)
 
 
-def _rates(values: tuple[complex, complex]) -> tuple[float, float]:
-    return values[0].real, values[1].real
-
-
-def separatrices(
-    system: System, window: Any = ((-3.0, 3.0), (-3.0, 3.0)), *, span: float = 60.0, step: float = 0.02
-) -> tuple[Separatrix, ...]:
+def separatrices(system: System, window: Rectangle = PLANE, *, span: float = 60.0, step: float = 0.02) -> tuple[Separatrix, ...]:
     """The stable manifolds of all saddles in a window: the curves that part the basins of a constant load.
 
     Each branch is followed back for at most `span` of time, until it leaves the window for good (three half widths) or comes to
@@ -68,46 +72,48 @@ def separatrices(
     Raises:
         ParameterError: a load that is not constant, an impact law without an inverse, numbers without meaning.
     """
-    frame = check_window(window, 0.1)
+    area = check_window(window, system)
     check_number("span", span, above=0.0)
     check_number("step", step, above=0.0)
     points = saddles(system, window)
+    places = np.array([point.place for point in points])
     backward = reversed_system(system)
-    return tuple(_branch(backward, saddle, away, points, frame, span, step) for saddle in points for away in (1.0, -1.0))
+    return tuple(_branch(backward, point, away, places, area, (span, step)) for point in points for away in (1.0, -1.0))
 
 
 def _branch(
-    backward: System, saddle: Saddle, away: float, points: tuple[Saddle, ...], frame: Window, span: float, step: float
+    backward: System, saddle: Equilibrium, away: float, saddles: np.ndarray, window: Window, times: tuple[float, float]
 ) -> Separatrix:
-    """The branch to one side of a saddle."""
-    name = backward.model.coordinates[0]
-    theta, velocity = saddle.theta + away * OFFSET, -away * OFFSET * saddle.rates[1]
-    now, ends, left = 0.0, "span", False
-    pieces: list[np.ndarray] = []
+    """The branch to one side of a saddle, for at most a span of time with a step; `saddles` are the places of all, (n,)."""
+    assert saddle.eigenvalues is not None
+    span, step = times
+    theta, velocity = saddle.place + away * SETTINGS.offset, -away * SETTINGS.offset * saddle.eigenvalues[1].real
+    now, end, left = 0.0, SeparatrixEnd.SPAN, False
+    parts: list[np.ndarray] = []
     impacts: list[np.ndarray] = []
-    while now < span and ends == "span":
-        start: dict[str, Any] = {name: theta, "velocity": velocity}
-        motion = simulate(backward, **start, duration=PIECE, tol=1e-13)
-        piece = _sampled(motion, now, step)
-        apart = np.min([np.hypot(piece[1] - p.theta, piece[2]) for p in points], axis=0)
-        back = np.flatnonzero(apart < CLOSE)
+    while now < span and end is SeparatrixEnd.SPAN:
+        start: dict[str, Any] = {backward.model.coordinates[0]: theta, "velocity": velocity}
+        motion = simulate(backward, **start, duration=SETTINGS.span, tol=1e-13)
+        part = _sampled(motion, now, step)
+        apart = np.min(np.hypot(part[1] - saddles[:, None], part[2]), axis=0)
+        back = np.flatnonzero(apart < SETTINGS.close)
         if left and back.size:
-            piece, ends = piece[:, : back[0] + 1], "saddle"
-        elif frame.far(piece[1:, -1:].T)[0]:
-            ends = "window"
-        left = left or bool(apart[-1] > 10.0 * CLOSE)
-        within = motion.impacts.time < piece[0, -1] - now + step
+            part, end = part[:, : back[0] + 1], SeparatrixEnd.SADDLE
+        elif has_left(window, part[1:, -1:].T)[0]:
+            end = SeparatrixEnd.WINDOW
+        left = left or bool(apart[-1] > 10.0 * SETTINGS.close)
+        within = motion.impacts.time < part[0, -1] - now + step
         impacts.append(np.stack([now + motion.impacts.time, -motion.impacts.velocity_after], axis=1)[within])
-        pieces.append(piece)
-        now, theta, velocity = now + PIECE, motion.position, motion.velocity
-    time, thetas, velocities = np.concatenate(pieces, axis=1)
+        parts.append(part)
+        now, theta, velocity = now + SETTINGS.span, motion.position, motion.velocity
+    time, thetas, velocities = np.concatenate(parts, axis=1)
     contacts = np.concatenate(impacts) * np.array([-1.0, 1.0])
-    return Separatrix(saddle.theta, -time, thetas, -velocities, contacts, ends)
+    return Separatrix(saddle.place, -time, thetas, -velocities, contacts, end)
 
 
 def _sampled(motion: Motion, begin: float, step: float) -> np.ndarray:
     """Rows (time, coordinate, velocity) of a motion, with both sides of every impact, and nan between them where they differ."""
-    times = np.linspace(0.0, PIECE, round(PIECE / step) + 1)
+    times = np.linspace(0.0, SETTINGS.span, round(SETTINGS.span / step) + 1)
     theta, velocity = motion.at(times)
     impacts, contact = motion.impacts, float(motion.system.model.contact)
     rows = [np.stack([times, theta, velocity])]

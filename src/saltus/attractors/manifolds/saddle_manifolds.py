@@ -17,28 +17,30 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors.manifolds.manifold_growth import Level, Window, grow
+from saltus.attractors.manifolds.manifold_growth import Growth, GrowthEnd, Level, Segment
+from saltus.attractors.orbit_certificate import start_at
 from saltus.attractors.stroboscopic_section import section_states
-from saltus.checks import check_count, check_number
+from saltus.checks import Rectangle, check_count, check_number, check_window
 from saltus.errors import MotionError, ParameterError
-from saltus.flow import motions_from, sensitivities
+from saltus.flow import last_states, motions_from, sensitivities
 from saltus.orbits import PeriodicOrbit
 from saltus.systems import System, reversed_system
 
 OFFSET = 1e-6  # d: the segment lies off the manifold by its square, which shrinks from there on
 TOLERANCE = 1e-13
 HYPERBOLIC = 1e-6  # by which multipliers must differ from 1 in modulus
+PLANE = ((-3.0, 3.0), (-3.0, 3.0))  # the window of the state plane in which curves are wanted where none is given
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class ManifoldBranch:
     """One branch of a manifold of one point of the orbit: from the orbit on, nan where it is outside the window."""
 
-    point: int  # of the orbit, which at phase 0 is at `strobes[point]`
+    point: int  # of the orbit, which at phase 0 is at `orbit_states[point]`
     side: int  # +1 or -1: along or against the direction
     states: np.ndarray  # (n, 2): coordinate and velocity at phase 0
     place: np.ndarray  # (n,): s + forcing periods / q, which the map shifts by 1 / q
-    ends: str  # why it does not go on
+    end: GrowthEnd  # why it does not go on
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +50,15 @@ class Manifold:
     orbit: PeriodicOrbit
     stable: bool
     multiplier: float  # mu_s or mu_u, of the orbit's whole period
-    strobes: np.ndarray  # (q, 2): the orbit at phase 0
+    orbit_states: np.ndarray  # (q, 2): the orbit at phase 0
     directions: np.ndarray  # (q, 2): unit vectors along the manifold there
-    curves: tuple[Curve, ...]
+    branches: tuple[ManifoldBranch, ...]
 
     @property
     def states(self) -> np.ndarray:
-        """All curves in a row, (n, 2), with nan between them: as lines are drawn."""
+        """All branches in a row, (n, 2), with nan between them: as lines are drawn."""
         gap = np.full((1, 2), np.nan)
-        return np.concatenate([part for curve in self.curves for part in (curve.states, gap)])
+        return np.concatenate([part for branch in self.branches for part in (branch.states, gap)])
 
     @property
     def length(self) -> float:
@@ -72,7 +74,7 @@ class Manifold:
 def stable_manifold(
     orbit: PeriodicOrbit,
     *,
-    window: tuple[tuple[float, float], tuple[float, float]] = ((-3.0, 3.0), (-3.0, 3.0)),
+    window: Rectangle = PLANE,
     periods: int = 40,
     step: float = 0.01,
     points: int = 100_000,
@@ -97,7 +99,7 @@ def stable_manifold(
 def unstable_manifold(
     orbit: PeriodicOrbit,
     *,
-    window: tuple[tuple[float, float], tuple[float, float]] = ((-3.0, 3.0), (-3.0, 3.0)),
+    window: Rectangle = PLANE,
     periods: int = 40,
     step: float = 0.01,
     points: int = 100_000,
@@ -112,46 +114,37 @@ def _manifold(orbit: PeriodicOrbit, stable: bool, window: Any, periods: int, ste
     check_count("periods", periods, 1)
     check_count("points", points, 100)
     check_number("step", step, above=0.0, at_most=1.0)
-    size = np.sort(np.abs(orbit.multipliers))
-    if len(size) != 2 or not (0.0 < size[0] < 1.0 - HYPERBOLIC and size[1] > 1.0 + HYPERBOLIC):
-        raise ParameterError(f"only a saddle has such manifolds, and the multipliers of this orbit are {orbit.multipliers}")
-    frame = check_window(window, step)
-    system = orbit.system
-    moving = reversed_system(system) if stable else system
-    q = orbit.period
-    strobes = np.roll(section_states(system, np.array([orbit.state]), q)[0], 1, axis=0)
-    multiplier, directions = _directions(system, strobes, stable)
+    if not is_saddle(orbit):
+        raise ParameterError(f"only a saddle has such manifolds; this orbit has the multipliers {orbit.multipliers}", "orbit")
+    system, q = orbit.system, orbit.period
+    area, flow = check_window(window, system), _flow(reversed_system(system) if stable else system, stable)
+    states = np.roll(section_states(system, np.array([orbit.state]), q)[0], 1, axis=0)
+    multiplier, directions = _directions(system, states, stable)
     ratio = 1.0 / abs(multiplier) if stable else abs(multiplier)
-    curves: list[Curve] = []
+    branches: list[ManifoldBranch] = []
     for side in (1, -1):
-        levels, ends = grow(_segment(strobes[0], side * directions[0], ratio), _flow(moving, stable), periods, frame, points)
-        curves += _curves(levels, q, side, stable, multiplier < 0.0, ends)
-    return Manifold(orbit, stable, multiplier, strobes, directions, tuple(curves))
+        segment = _segment(states[0], side * directions[0], ratio)
+        levels, end = Growth(segment, flow, area, step, points).levels(periods)
+        branches += _branches(levels, q, side, stable, multiplier < 0.0, end)
+    return Manifold(orbit, stable, multiplier, states, directions, tuple(branches))
 
 
-def check_window(window: Any, step: float) -> Window:
-    """A window as two pairs of bounds."""
-    try:
-        bounds = np.asarray(window, dtype=float)
-    except (TypeError, ValueError):
-        bounds = np.empty(0)
-    if bounds.shape != (2, 2) or not np.isfinite(bounds).all() or not (bounds[:, 0] < bounds[:, 1]).all():
-        raise ParameterError(f"window must be ((least, largest coordinate), (least, largest velocity)), got {window!r}", "window")
-    return Window(bounds.mean(axis=1), 0.5 * np.diff(bounds, axis=1)[:, 0], step)
+def is_saddle(orbit: PeriodicOrbit) -> bool:
+    """Whether an orbit has one multiplier inside the unit circle and one outside."""
+    size = np.sort(np.abs(orbit.multipliers))
+    return len(size) == 2 and bool(0.0 < size[0] < 1.0 - HYPERBOLIC and 1.0 + HYPERBOLIC < size[1] < np.inf)
 
 
-def _directions(system: System, strobes: np.ndarray, stable: bool) -> tuple[float, np.ndarray]:
-    """The multiplier and the unit vector along the manifold at each point of the orbit, carried on by the map's derivative."""
-    name = system.model.coordinates[0]
+def _directions(system: System, states: np.ndarray, stable: bool) -> tuple[float, np.ndarray]:
+    """The multiplier and the unit vector along the manifold at each state of the orbit, carried on by the map's derivative."""
     maps = []
-    for theta, velocity in strobes:
-        start: dict[str, Any] = {name: float(theta), "velocity": float(velocity)}
-        found = sensitivities(system, **start, periods=1, tol=TOLERANCE, dense=False)
+    for state in states:
+        found = sensitivities(system, **start_at(system, state), periods=1, tol=TOLERANCE, dense=False)
         if found.undefined:
             raise MotionError(f"the orbit's map has no derivative at phase 0: {found.undefined}")
         maps.append(found.state)
-    whole = np.linalg.multi_dot([*reversed(maps)]) if len(maps) > 1 else maps[0]
-    values, vectors = np.linalg.eig(whole)
+    product = np.linalg.multi_dot([*reversed(maps)]) if len(maps) > 1 else maps[0]
+    values, vectors = np.linalg.eig(product)
     chosen = int(np.argmin(np.abs(values)) if stable else np.argmax(np.abs(values)))
     directions = [np.real(vectors[:, chosen])]
     for step in maps[:-1]:
@@ -160,24 +153,24 @@ def _directions(system: System, strobes: np.ndarray, stable: bool) -> tuple[floa
     return float(np.real(values[chosen])), unit
 
 
-def _segment(point: np.ndarray, direction: np.ndarray, ratio: float) -> Any:
+def _segment(point: np.ndarray, direction: np.ndarray, ratio: float) -> Segment:
     return lambda places: point + OFFSET * ratio ** np.asarray(places)[:, None] * direction
 
 
 def _flow(system: System, backward: bool) -> Any:
     """The stroboscopic map, or its inverse by the reversed system, whose velocities have the other sign."""
-    name, sign = system.model.coordinates[0], -1.0 if backward else 1.0
+    sign = np.array([1.0, -1.0 if backward else 1.0])
 
-    def flow(points: np.ndarray, periods: int) -> np.ndarray:
-        result = motions_from(system, points * np.array([1.0, sign]), periods=periods, sample=(), tol=TOLERANCE)
-        ends = np.stack([result[name].values, sign * result["velocity"].values], axis=1)
+    def flow(states: np.ndarray, periods: int) -> np.ndarray:
+        result = motions_from(system, states * sign, periods=periods, sample=(), tol=TOLERANCE)
+        ends = sign * last_states(system, result)
         ends[result["periods"].values < periods] = np.nan
         return ends
 
     return flow
 
 
-def _curves(levels: list[Level], q: int, side: int, stable: bool, turns: bool, ends: str) -> list[Curve]:
+def _branches(levels: list[Level], q: int, side: int, stable: bool, turns: bool, end: GrowthEnd) -> list[ManifoldBranch]:
     """The levels that belong to each point of the orbit, put together from the orbit on.
 
     Where mu < 0 a round of the orbit, from point 0 to point 0, turns the side.
@@ -193,5 +186,5 @@ def _curves(levels: list[Level], q: int, side: int, stable: bool, turns: bool, e
         for sign, chosen in parts.items():
             states = np.concatenate([level.points for level in chosen])
             place = np.concatenate([level.places + level.periods / q for level in chosen])
-            curves.append(Curve(point, sign, states, place, ends))
+            curves.append(ManifoldBranch(point, sign, states, place, end))
     return curves

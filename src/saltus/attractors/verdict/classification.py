@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from saltus.attractors.lyapunov.averages import BATCHES
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.attractors.verdict.nonsettling import STAGES, STROBES, wandering
-from saltus.attractors.verdict.verdict import DRIVEN_MAX_PERIOD, Case, Verdict, settled
+from saltus.attractors.verdict.nonsettling import SETTINGS, judge_unsettled
+from saltus.attractors.verdict.verdict import Case, Verdict, settled
 from saltus.checks import check_count, check_number
 from saltus.errors import ParameterError
+from saltus.flow import RECURRENCE
+from saltus.progress import Progress, silent
 from saltus.systems import System
 
 
@@ -22,10 +23,10 @@ def classify(
     velocity: float = 0.0,
     periods: int = 4000,
     transient: int = 500,
-    max_period: int = DRIVEN_MAX_PERIOD,
+    max_period: int = RECURRENCE.compiled_max_period,
     seed: int = 0,
     tol: float = 1e-12,
-    progress: Callable[[float], object] | None = None,
+    progress: Progress = silent,
     **coordinates: float,
 ) -> Verdict:
     """Where a motion ends: at rest, on a periodic orbit, on a torus, in chaos, or undecided, each with its evidence.
@@ -50,22 +51,19 @@ def classify(
         max_period: the longest period looked for, at least 16.
         seed: of the companions' states and the frequencies of the 0-1 test.
         tol: the error that one step may make.
-        progress: called with the fraction done.
+        progress: called with the fraction done and what is being done.
 
     Raises:
         ParameterError: an argument without meaning.
     """
     clock, start = with_clock(system), _start(system, velocity, coordinates)
-    for name, value, least in (
-        ("periods", periods, STAGES * 2 * BATCHES),
-        ("transient", transient, 0),
-        ("max_period", max_period, DRIVEN_MAX_PERIOD),
-    ):
-        check_count(name, value, least)
-    case = Case(system, clock, int(periods), int(max_period), int(seed), float(tol), progress or (lambda done: None))
-    ends = case.follow(start, int(transient + periods), max(STROBES, 4 * int(max_period)), (0.0, 0.1))
-    verdict = settled(case, ends, start[0]) or wandering(case, ends)
-    case.progress(1.0)
+    check_count("periods", periods, SETTINGS.thirds * 2 * BATCHES)
+    check_count("transient", transient, 0)
+    check_count("max_period", max_period, RECURRENCE.compiled_max_period)
+    case = Case(system, clock, int(periods), int(max_period), int(seed), float(tol), progress)
+    ends = case.follow(start, int(transient + periods), max(SETTINGS.states, 4 * int(max_period)), (0.0, 0.1))
+    verdict = settled(case, ends, start[0]) or judge_unsettled(case, ends)
+    progress(1.0, "verdict")
     return verdict
 
 

@@ -2,137 +2,183 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from saltus.attractors.kind import AttractorKind
 from saltus.attractors.lyapunov.spectrum import Exponents, lyapunov_spectrum
-from saltus.attractors.orbit_certificate import certify
+from saltus.attractors.orbit_certificate import certify, start_at
+from saltus.attractors.verdict.reason import Reason
 from saltus.attractors.verdict.tori import excludes_tori
-from saltus.attractors.verdict.verdict import Case, Verdict, on_cycle, settled
+from saltus.attractors.verdict.verdict import Case, Verdict, on_orbit, settled
 from saltus.attractors.verdict.zero_one_test import SHORTEST, ZeroOne, zero_one_test
 from saltus.flow import Recurrence
-
-STAGES = 3  # the first estimate of the exponents takes a third of `periods`, the second one the rest, twice as many
-STROBES = 2000  # states at phase 0 that the 0-1 test looks at
-CHAOS, ORDER = 0.8, 0.2  # values of K above and below which the 0-1 test has an opinion
-LEAST = 2000  # forcing periods that they are followed: an orbit that they reach is recognised hundreds of periods later
-COMPANIONS = 128  # motions from states beside the last one, to see whether the chaos has a way out
-ASIDE = 1e-6  # how far: a chaotic motion of exponent 0.03 forgets it within 500 units of time
+from saltus.progress import part_of
 
 
-def wandering(case: Case, ends: Recurrence) -> Verdict:
+@dataclass(frozen=True)
+class NonsettlingSettings:
+    """How motions are judged that do not settle."""
+
+    # The first estimate of the exponents takes a third of `periods`, the second one the rest, twice as many.
+    thirds: int = 3
+    # So many states at phase 0 are given to the 0-1 test.
+    states: int = 2000
+    # Above the first value of K the 0-1 test sees chaos, and below the second one order; between them it has no opinion.
+    chaos: float = 0.8
+    order: float = 0.2
+    # Companions are followed for so many forcing periods at least: an orbit is known hundreds of periods after it is reached.
+    least: int = 2000
+    # So many motions from states beside the last one show whether the chaos has a way out.
+    companions: int = 128
+    # They begin this far aside: a chaotic motion of exponent 0.03 forgets it within 500 units of time.
+    aside: float = 1e-6
+
+
+SETTINGS = NonsettlingSettings()
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """What is known of a motion that has not settled."""
+
+    case: Case
+    ends: Recurrence
+    last: Exponents  # of the last and longest run
+    opinion: ZeroOne | None
+    periods: int  # that it was followed in all
+    evidence: dict[str, Any]
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """What every verdict on it holds."""
+        return {
+            "exponents": self.last,
+            "zero_one": self.opinion,
+            "state": self.last.state,
+            "periods": self.periods,
+            "evidence": self.evidence,
+        }
+
+    @property
+    def ordered(self) -> bool:
+        """Whether the 0-1 test sees order."""
+        return self.opinion is not None and SETTINGS.order > self.opinion.K
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What the sentences of the reasons have places for."""
+        return {
+            "size": f"{self.last.values[0]:.4g} +- {self.last.errors[0]:.1g}",
+            "K": float("nan") if self.opinion is None else self.opinion.K,
+            "companions": SETTINGS.companions,
+            "left": self.evidence["companions_settled"],
+            "followed": max(self.case.periods, SETTINGS.least),
+            "note": self.last.note,
+        }
+
+
+def judge_unsettled(case: Case, ends: Recurrence) -> Verdict:
     """The verdict on a motion that has not settled."""
     if case.system.load.period is None:
-        text = "under constant loads it goes on moving: it has not lost its energy, or has none to lose"
-        return case.verdict("undecided", text, ends)
-    stages = _stages(case, ends.states[0, -1])
-    last, series = stages[-1], ends.states[0, :, 0]
+        return case.undecided(Reason.CONSERVATIVE, ends, {})
+    runs, series = _runs(case, ends.states[0, -1]), ends.states[0, :, 0]
     series = series[np.isfinite(series)]
     opinion = zero_one_test(series, seed=case.seed) if series.size >= SHORTEST else None
-    followed = round(float(ends.periods[0])) + sum(stage.periods for stage in stages if stage.note is None)
-    evidence = _numbers(stages, opinion)
-    given: dict[str, Any] = {"exponents": last, "zero_one": opinion, "state": last.state}
-    given |= {"periods": followed, "evidence": evidence}
-    later = _beside(case, last.state)
-    evidence |= {"companions": COMPANIONS, "companions_settled": int((~later.unsettled[1:]).sum())}
-    verdict = settled(case, later.only(slice(1)), _row(case, last.state))
+    periods = round(float(ends.periods[0])) + sum(run.periods for run in runs if run.note is None)
+    later = _beside(case, runs[-1].state)
+    evidence = _evidence(runs, opinion) | {"companions_settled": int((~later.unsettled[1:]).sum())}
+    judged = _Judged(case, ends, runs[-1], opinion, periods, evidence)
+    verdict = settled(case, later.only(slice(1)), _row(case, runs[-1].state))
     if verdict is not None:
-        return _after_all(verdict, given)
-    if last.note is not None:
-        return case.verdict("undecided", f"after {followed} forcing periods {last.note}", ends, **given)
-    if all(stage.positive for stage in stages):
-        return _chaotic(case, ends, last, opinion, given)
-    return _regular(case, ends, last, opinion, given)
+        return _after_all(verdict, judged)
+    if runs[-1].note is not None:
+        return case.undecided(Reason.NO_EXPONENTS, ends, judged.numbers | {"periods": periods}, **judged.given)
+    return _chaotic(judged) if all(run.positive for run in runs) else _regular(judged)
 
 
-def _stages(case: Case, state: np.ndarray) -> list[Exponents]:
+def _runs(case: Case, state: np.ndarray) -> list[Exponents]:
     """Exponents of a run and of one twice as long that goes on from there."""
-    spans = [case.periods // STAGES, 2 * (case.periods // STAGES)]
-    stages: list[Exponents] = []
-    at: dict[str, Any] = {case.system.model.coordinates[0]: float(state[0]), "velocity": float(state[1])}
-    for i, span in enumerate(spans):
-        done = sum(spans[:i]) / sum(spans)
-        part = case.part(0.1 + 0.8 * done, 0.1 + 0.8 * (done + span / sum(spans)))
-        stages.append(lyapunov_spectrum(case.system, **at, periods=span, transient=0, tol=case.tol, shadow=i == 0, progress=part))
-        at = stages[-1].state
-        if stages[-1].note is not None:
+    third, at = case.periods // SETTINGS.thirds, start_at(case.system, state)
+    runs: list[Exponents] = []
+    for span, part in ((third, (0.1, 0.1 + 0.8 / 3)), (2 * third, (0.1 + 0.8 / 3, 0.9))):
+        progress = part_of(case.progress, *part)
+        runs.append(
+            lyapunov_spectrum(
+                case.system, **at, periods=span, transient=0, tol=case.tol, two_trajectories=not runs, progress=progress
+            )
+        )
+        at = runs[-1].state
+        if runs[-1].note is not None:
             break
-    return stages
+    return runs
 
 
-def _numbers(stages: list[Exponents], opinion: ZeroOne | None) -> dict[str, Any]:
-    last = stages[-1]
+def _evidence(runs: list[Exponents], opinion: ZeroOne | None) -> dict[str, Any]:
+    last = runs[-1]
     return {
         "largest_exponent": float(last.values[0]),
         "largest_exponent_error": float(last.errors[0]),
         "smallest_exponent": float(last.values[-1]),
         "mean_divergence": last.divergence,
         "exponent_resolution": last.resolution,
-        "stroboscopic_exponent": stages[0].stroboscopic,
-        "stroboscopic_exponent_error": stages[0].stroboscopic_error,
-        "runs": len(stages),
+        "stroboscopic_exponent": runs[0].stroboscopic,
+        "stroboscopic_exponent_error": runs[0].stroboscopic_error,
+        "runs": len(runs),
         "zero_one": float("nan") if opinion is None else opinion.K,
         "zero_one_spread": float("nan") if opinion is None else opinion.spread,
+        "companions": SETTINGS.companions,
     }
 
 
 def _beside(case: Case, state: dict[str, Any]) -> Recurrence:
     """How motions end that begin at a state, the first, and beside it."""
-    around = np.random.default_rng(case.seed).uniform(-ASIDE, ASIDE, (COMPANIONS, 2))
+    around = np.random.default_rng(case.seed).uniform(-SETTINGS.aside, SETTINGS.aside, (SETTINGS.companions, 2))
     states = _row(case, state) + np.concatenate([[[0.0, 0.0]], around])
-    return case.follow(states, max(case.periods, LEAST), 4 * case.max_period, (0.9, 1.0))
+    return case.follow(states, max(case.periods, SETTINGS.least), 4 * case.max_period, (0.9, 1.0))
 
 
 def _row(case: Case, state: dict[str, Any]) -> np.ndarray:
     return np.array([state[case.system.model.coordinates[0]], state["velocity"]])
 
 
-def _after_all(verdict: Verdict, given: dict[str, Any]) -> Verdict:
+def _after_all(verdict: Verdict, judged: _Judged) -> Verdict:
     """The verdict on a motion that has settled in the end, after the exponents of its transient were taken."""
-    before, exponents = given["periods"], given["exponents"]
-    chaos = f" of transient chaos with an exponent of {exponents.values[0]:.4g}" if exponents.positive else ""
-    reason = f"after more than {before} forcing periods{chaos}: {verdict.reason}"
+    last, before = judged.last, judged.periods
+    chaos = f" of transient chaos with an exponent of {last.values[0]:.4g}" if last.positive else ""
     return replace(
         verdict,
-        reason=reason,
+        reason=f"after more than {before} forcing periods{chaos}: {verdict.reason}",
         periods=before + verdict.periods,
-        evidence=given["evidence"] | {"transient": before} | verdict.evidence,
+        evidence=judged.evidence | {"transient": before} | verdict.evidence,
     )
 
 
-def _chaotic(case: Case, ends: Recurrence, last: Exponents, opinion: ZeroOne | None, given: dict[str, Any]) -> Verdict:
+def _chaotic(judged: _Judged) -> Verdict:
     """Chaos, unless it has a way out or the 0-1 test sees order."""
-    size = f"{last.values[0]:.4g} +- {last.errors[0]:.1g}"
-    left = given["evidence"]["companions_settled"]
-    if left:
-        text = (
-            f"{left} of {COMPANIONS} motions from beside its last state settle within {max(case.periods, LEAST)} forcing periods"
-        )
-        return case.verdict("undecided", f"its largest exponent is {size}, but {text}: the chaos is a transient", ends, **given)
-    if opinion is not None and opinion.K < ORDER:
-        text = f"its largest exponent is {size}, but the 0-1 test sees order (K = {opinion.K:.3g})"
-        return case.verdict("undecided", text, ends, **given)
-    second = "" if opinion is None else f"; the 0-1 test {'agrees' if opinion.K > CHAOS else 'is not sure'} (K = {opinion.K:.3g})"
-    text = f"its largest exponent is {size} over {last.periods} forcing periods"
-    text += f", and nothing near it settles in {max(case.periods, LEAST)} more{second}"
-    return case.verdict("chaotic", text, ends, **given)
+    case, ends, opinion = judged.case, judged.ends, judged.opinion
+    if judged.evidence["companions_settled"]:
+        return case.undecided(Reason.TRANSIENT, ends, judged.numbers, **judged.given)
+    if judged.ordered:
+        return case.undecided(Reason.CONTRADICTED, ends, judged.numbers, **judged.given)
+    second = ""
+    if opinion is not None:
+        second = f"; the 0-1 test {'agrees' if SETTINGS.chaos < opinion.K else 'is not sure'} (K = {opinion.K:.3g})"
+    numbers = judged.numbers | {"periods": judged.last.periods, "second": second}
+    return case.verdict(AttractorKind.CHAOTIC, Reason.CHAOS, ends, numbers, **judged.given)
 
 
-def _regular(case: Case, ends: Recurrence, last: Exponents, opinion: ZeroOne | None, given: dict[str, Any]) -> Verdict:
+def _regular(judged: _Judged) -> Verdict:
     """A motion that has not settled and whose largest exponent is not surely above 0."""
-    top, error = float(last.values[0]), float(last.errors[0] + last.resolution)
-    size = f"{top:.4g} +- {float(last.errors[0]):.1g}"
+    case, last, given = judged.case, judged.last, judged.given
     against = excludes_tori(case.system)
-    ordered = opinion is not None and opinion.K < ORDER
-    if against is None and abs(top) <= error and ordered:
-        assert opinion is not None
-        text = f"its exponents are 0 ({size}), it does not repeat itself, and the 0-1 test sees order (K = {opinion.K:.3g})"
-        return case.verdict("quasi-periodic", text, ends, **given)
+    if against is None and judged.ordered and abs(last.values[0]) <= float(last.errors[0] + last.resolution):
+        return case.verdict(AttractorKind.QUASI_PERIODIC, Reason.TORUS, judged.ends, judged.numbers, **given)
     found = certify(case.clock, _row(case, last.state), None, max_period=case.max_period)
     if found.sound:
-        return on_cycle(case, ends, found, "it approaches slowly", **given)
+        return on_orbit(case, judged.ends, found, "it approaches slowly", **given)
     given["evidence"] |= {} if against is None else {"no_tori": against}
-    text = f"it has not settled in {given['periods']} forcing periods, and an exponent of {size} is not surely above 0"
-    return case.verdict("undecided", text + ("; a torus is excluded" if against else ""), ends, **given)
+    numbers = judged.numbers | {"periods": judged.periods, "torus": "; a torus is excluded" if against else ""}
+    return case.undecided(Reason.NOT_SURE, judged.ends, numbers, **given)

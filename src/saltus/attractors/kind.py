@@ -1,0 +1,15 @@
+"""The kinds of motion on which motions end."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class AttractorKind(StrEnum):
+    """What an attractor is, or what one motion ends on."""
+
+    REST = "rest"
+    PERIODIC = "periodic"
+    QUASI_PERIODIC = "quasi-periodic"
+    CHAOTIC = "chaotic"
+    UNDECIDED = "undecided"  # of a motion only: the numbers support none of the others

@@ -1,0 +1,46 @@
+"""Ensembles of motions with the derivatives of their states beside them, advanced in spans of time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from saltus.flow import kernel_layout as k
+from saltus.flow.ensemble.compiled_lanes import load_advance, load_driver, load_helpers
+from saltus.flow.ensemble.ensemble import compiled_lanes
+from saltus.flow.ensemble.ensemble_dataset import Wanted
+from saltus.flow.ensemble.threads import Jobs
+from saltus.flow.simulation import limits_of, program
+from saltus.systems import System
+
+
+class Advanced(NamedTuple):
+    """Motions at the end of a span."""
+
+    states: np.ndarray  # (n, 6), as `TangentEnsemble.advance` takes them
+    sound: np.ndarray  # (n,): whether the motion came to the end with a known phase, and all numbers are finite
+
+
+class TangentEnsemble:
+    """Motions of a system with one coordinate, each with parameters and a forcing period of its own."""
+
+    def __init__(self, system: System, parameters: Mapping[str, np.ndarray], lengths: np.ndarray, tol: float) -> None:
+        limits, places = limits_of(system, ()), list(system.parameters)
+        wanted = Wanted(tol=tol, periods=None, limits=limits, sample=(), until=(), paths=())
+        self._lanes = compiled_lanes(system, program(system, limits, ()), wanted, 1)
+        self._columns = {places.index(path): values for path, values in parameters.items()}
+        self._lengths = lengths
+        load_driver(), load_helpers(), load_advance()  # compiled here, not by each thread that advances some of the motions
+
+    def advance(self, rows: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Advanced:
+        """Advance the motions of these numbers between two local times of a forcing period, (n,) each, on this thread.
+
+        A state holds coordinate, its two derivatives, velocity, its two: (n, 6).
+        """
+        numbers, labels = np.zeros((rows.size, 4)), np.zeros((rows.size, 4), dtype=np.int64)
+        numbers[:, 0], numbers[:, 1], numbers[:, 2] = begin, self._lengths[rows], end
+        ends = self._lanes.run(Jobs(states, numbers, labels, {c: values[rows] for c, values in self._columns.items()}), 1)
+        done = (ends.labels[:, 0] == k.DONE) & (ends.labels[:, 2] != k.CHATTER)
+        return Advanced(ends.states, done & np.isfinite(ends.states).all(axis=1))
