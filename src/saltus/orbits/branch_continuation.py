@@ -10,7 +10,6 @@ from saltus.continuation import STEPS, Continuation, End, both_ways
 from saltus.errors import ParameterError
 from saltus.orbits.branch import START, Branch
 from saltus.orbits.branch_events import BranchEvents
-from saltus.orbits.newton import solve
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitPoint, start
 from saltus.orbits.problem import Problem
@@ -108,11 +107,11 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
     system, signature = orbit.system, orbit.signature
     symmetric = keeps_symmetry(system, path)
     problem = Problem(system, signature, (path,))
-    found = solve(problem, orbit.solution.unknowns, problem.values)
+    found = PeriodicOrbit.near(problem, orbit.solution.unknowns, problem.values)
     if found is None:
         raise ParameterError(f"the orbit does not solve its own equations to be continued along {path}; find it again")
     if signature.symmetric and not symmetric:
-        problem, found = full_period(problem, found)
-    elif symmetric and not signature.symmetric:
-        problem, found = half(problem, found) or (problem, found)
-    return PeriodicOrbit(problem, found), symmetric
+        found = full_period(found)
+    elif symmetric:
+        found = half(found) or found
+    return found, symmetric

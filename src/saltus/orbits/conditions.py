@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from saltus.orbits.newton import Solution
+from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 
@@ -49,16 +50,14 @@ class Singular:
     problem: Problem
     closing: float
     border: tuple[np.ndarray, np.ndarray]
-    twice: (
-        Problem | None
-    )  # that of two (half) periods, in which perturbations of alternating sign are periodic; None without impacts
+    twice: Problem | None  # of two (half) periods, in which alternating perturbations are periodic; None without impacts
 
     @classmethod
-    def near(cls, problem: Problem, solution: Solution, closing: float) -> Singular:
-        """The condition bordered by the null vectors of a point at which it nearly holds."""
-        left, _, right = np.linalg.svd(solution.equations.jacobian(closing))
-        twice = _of_two_periods(problem) if closing < 0 and problem.signature.sides else None
-        return cls(problem, closing, (left[:, -1], right[-1]), twice)
+    def near(cls, orbit: PeriodicOrbit, closing: float) -> Singular:
+        """The condition bordered by the null vectors of an orbit at which it nearly holds."""
+        left, _, right = np.linalg.svd(orbit.solution.equations.jacobian(closing))
+        twice = _of_two_periods(orbit.problem) if closing < 0 and orbit.signature.sides else None
+        return cls(orbit.problem, closing, (left[:, -1], right[-1]), twice)
 
     def moved(self, at: ConditionValue) -> Singular:
         """The condition bordered by the null vectors of a later point."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -19,12 +18,12 @@ from saltus.flow import (
     return_period,
     simulate,
 )
-from saltus.orbits.newton import solve
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import resting_near
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import half, is_symmetric, keeps_symmetry
+from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import System, check_system
 
 LONGEST = 12  # forcing periods of an orbit that is looked for if none are named
@@ -176,10 +175,8 @@ def orbit_near(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOr
     if motion.side == 0 or len(motion.events.of(EventKind.REST)) or not motion.phase_known:
         return None
     problem, unknowns = guess(base, motion, _vector(system, state), periods)
-    found = solve(problem, unknowns, problem.values, iterations=25)
-    if found is None:
-        return None
-    return PeriodicOrbit(*simplest(problem, found))
+    found = PeriodicOrbit.near(problem, unknowns, problem.values, iterations=25)
+    return None if found is None else simplest(found)
 
 
 def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tuple[Problem, np.ndarray]:
@@ -195,30 +192,25 @@ def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tup
     return base.with_signature(Signature(sides, periods)), unknowns
 
 
-def simplest(problem: Problem, solution: Any) -> tuple[Problem, Any]:
+def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
     """An orbit by its least period and, where it is its own mirror image, by half of it."""
-    shorter = divide(problem, solution)
-    problem, solution = shorter or (problem, solution)
+    orbit = divide(orbit) or orbit
+    problem = orbit.problem
     symmetric = keeps_symmetry(problem.system, problem.paths[0]) if problem.paths else is_symmetric(problem.system)
-    return (half(problem, solution) if symmetric else None) or (problem, solution)
+    return (half(orbit) if symmetric else None) or orbit
 
 
-def divide(problem: Problem, solution: Any) -> tuple[Problem, Any] | None:
+def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
     """An orbit that repeats after a divisor of its period, as an orbit of that; None where it does not."""
-    signature, n = problem.signature, len(problem.signature.sides)
+    signature, unknowns, n = orbit.signature, orbit.solution.unknowns, len(orbit.signature.sides)
     for q in range(1, signature.period):
         if signature.period % q or (n * q) % signature.period:
             continue
         part = n * q // signature.period
         if signature.sides and (part == 0 or signature.sides[:part] != signature.sides[part : 2 * part]):
             continue
-        shorter = problem.with_signature(Signature(signature.sides[:part], q, False, signature.side))
-        found = solve(shorter, solution.unknowns[: shorter.size], solution.values)
-        if found is not None and np.abs(found.unknowns - solution.unknowns[: shorter.size]).max() < 1e-7:
-            return shorter, found
+        shorter = orbit.problem.with_signature(Signature(signature.sides[:part], q, False, signature.side))
+        found = PeriodicOrbit.near(shorter, unknowns[: shorter.size], orbit.solution.values)
+        if found is not None and np.abs(found.solution.unknowns - unknowns[: shorter.size]).max() < TOLERANCES.halves:
+            return found
     return None
-
-
-def is_near(a: float, b: float) -> bool:
-    """Whether two numbers agree as well as orbits are solved."""
-    return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9)

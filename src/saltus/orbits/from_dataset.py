@@ -8,7 +8,6 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow import load_releases
-from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import resting_orbit
@@ -64,13 +63,13 @@ def _signature(sides: np.ndarray, periods: Any, symmetric: Any, side: Any) -> Si
 
 
 def _orbit(problem: Problem, row: np.ndarray, value: np.ndarray) -> PeriodicOrbit:
-    unknowns, values = row[: problem.size].copy(), value.astype(float)
-    equations = problem.evaluate(unknowns, values, look=True)
-    if equations is None:
+    values = value.astype(float)
+    orbit = PeriodicOrbit.known(problem, row[: problem.size].copy(), values)
+    if orbit is None:
         raise ParameterError(
             f"the motion of the orbit at {problem.paths[0]} = {values[0]:g} cannot be followed: the file is damaged"
         )
-    return PeriodicOrbit(problem, Solution(unknowns, values, equations, 0))
+    return orbit
 
 
 def _resting_orbits(dataset: xarray.Dataset, system: System) -> list[PeriodicOrbit]:

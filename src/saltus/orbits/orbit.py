@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.flow import Motion, Validity, simulate
 from saltus.flow import segments as at
-from saltus.orbits.newton import Solution
+from saltus.orbits.newton import ITERATIONS, Solution, solve
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
@@ -27,6 +27,20 @@ class PeriodicOrbit:
 
     problem: Problem
     solution: Solution
+
+    @classmethod
+    def near(
+        cls, problem: Problem, unknowns: np.ndarray, values: np.ndarray, iterations: int = ITERATIONS
+    ) -> PeriodicOrbit | None:
+        """The orbit near a guess at fixed parameters, or None where Newton's method does not converge."""
+        found = solve(problem, unknowns, values, iterations)
+        return None if found is None else PeriodicOrbit(problem, found)
+
+    @classmethod
+    def known(cls, problem: Problem, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit | None:
+        """The orbit whose unknowns are known: nothing is solved. None where its motion cannot be followed."""
+        equations = problem.evaluate(unknowns, values, look=True)
+        return None if equations is None else PeriodicOrbit(problem, Solution(unknowns, values, equations, 0))
 
     @cached_property
     def system(self) -> System:

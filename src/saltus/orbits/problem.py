@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -74,6 +74,23 @@ class Equations:
                 except np.linalg.LinAlgError:
                     return np.full_like(chain, np.inf)
         return chain
+
+
+class Segments(NamedTuple):
+    """Smooth segments, as `fly_segments` of the flow takes them."""
+
+    spans: np.ndarray  # (n, 3): when each begins and ends, and the speed at which the gap closed before it
+    sides: np.ndarray  # (n, 2): the side before the impact with which it begins, 0 for none, and that along it
+    states: np.ndarray  # (n, 2 d): its first state, where it begins with no impact
+
+
+class Flown(NamedTuple):
+    """What `fly_segments` of the flow makes of them."""
+
+    ends: np.ndarray
+    columns: np.ndarray  # the derivatives of the ends
+    looks: np.ndarray
+    rates: np.ndarray  # the sign of the gap's rate on each side
 
 
 class Problem:
@@ -147,53 +164,46 @@ class Problem:
         frequency = self.frequency(values)
         if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
             return None
-        spans, sides, states = self._segments(unknowns, frequency)
-        flown = self.fly(spans, sides, states, values, look)
+        segments = self._segments(unknowns, frequency)
+        flown = self.fly(segments, values, look)
         if flown is None:
             return None
-        ends, columns, looks, rates = flown
         if not self.signature.sides:
-            return self._shooting(unknowns, frequency, ends, columns, looks)
-        return self._crossing(unknowns, frequency, rates, spans, ends, columns, looks)
+            return self._shooting(unknowns, frequency, flown)
+        return self._crossing(unknowns, frequency, segments, flown)
 
     def carried(self, state: np.ndarray, begin: float, end: float, values: np.ndarray) -> np.ndarray | None:
         """The state at phase `end` of the smooth motion without impacts from a state at phase `begin`."""
         frequency = self.frequency(values)
         spans, sides = np.array([[begin / frequency, end / frequency, 0.0]]), np.array([[0, self.signature.side]])
-        flown = self.fly(spans, sides, state.reshape(1, -1), values)
-        return None if flown is None else flown[0][0, at.KINDS : at.KINDS + 2 * self.own]
+        flown = self.fly(Segments(spans, sides, state.reshape(1, -1)), values)
+        return None if flown is None else flown.ends[0, at.KINDS : at.KINDS + 2 * self.own]
 
-    def fly(
-        self, spans: np.ndarray, sides: np.ndarray, states: np.ndarray, values: np.ndarray, look: bool = False
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-        """Smooth segments, as `fly_segments` takes them; None where one of them cannot be followed.
-
-        Returns its ends, columns and looks, and the signs of the gap's rate on the sides.
-        """
+    def fly(self, segments: Segments, values: np.ndarray, look: bool = False) -> Flown | None:
+        """The smooth motion along segments, with a look at each if asked for; None where one of them cannot be followed."""
         parameters = self._values.copy()
         parameters[self._places] = values
         env, model = self._run.structure.prepare(parameters, self._records)
-        n, own = len(spans), self.own
+        n, own = len(segments.spans), self.own
         ends, columns = np.zeros((n, at.KINDS + 6 * own)), np.zeros((n, 4 * own, self._where[k.COLUMNS]))
         looks = np.zeros((n if look else 0, at.LEAST_MARGIN + max(1, self._where[k.STOPS])))
-        done = load_segments()[0](self._where, self._settings, env, model, spans, sides, states, ends, columns, looks)
-        return None if done < n else (ends, columns, looks, np.sign(model[4][1:]))
+        done = load_segments()[0](self._where, self._settings, env, model, *segments, ends, columns, looks)
+        return None if done < n else Flown(ends, columns, looks, np.sign(model[4][1:]))
 
-    def _segments(self, unknowns: np.ndarray, frequency: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What `fly_segments` is given: spans, sides, states at the start."""
+    def _segments(self, unknowns: np.ndarray, frequency: float) -> Segments:
+        """The segments between the impacts."""
         sides, along = self.signature.sides, self.signature.along()
         if not sides:
             spans = np.array([[0.0, self.closing / frequency, 0.0]])
-            return spans, np.array([[0, along[0]]]), unknowns.reshape(1, -1).copy()
+            return Segments(spans, np.array([[0, along[0]]]), unknowns.reshape(1, -1).copy())
         phases, speeds = unknowns[::2], unknowns[1::2]
         ends = np.append(phases[1:], phases[0] + self.closing)
         spans = np.stack([phases / frequency, ends / frequency, speeds], axis=1)
-        return spans, np.stack([sides, along], axis=1).astype(np.int64), np.zeros((len(sides), 2))
+        return Segments(spans, np.stack([sides, along], axis=1).astype(np.int64), np.zeros((len(sides), 2)))
 
-    def _shooting(
-        self, unknowns: np.ndarray, frequency: float, ends: np.ndarray, columns: np.ndarray, looks: np.ndarray
-    ) -> Equations:
+    def _shooting(self, unknowns: np.ndarray, frequency: float, flown: Flown) -> Equations:
         own, sign = self.own, -1.0 if self.signature.symmetric else 1.0
+        ends, columns, looks, _ = flown
         state = ends[0, at.KINDS : at.KINDS + 2 * own]
         rates = ends[0, at.KINDS + own : at.KINDS + 3 * own]
         parameters = sign * columns[0, : 2 * own, 2 * own :]
@@ -202,16 +212,8 @@ class Problem:
         here, there = sign * columns[:, : 2 * own, : 2 * own], -np.eye(2 * own)[None]
         return Equations(sign * state - unknowns, here, there, parameters, ends, looks)
 
-    def _crossing(
-        self,
-        unknowns: np.ndarray,
-        frequency: float,
-        rates: np.ndarray,
-        spans: np.ndarray,
-        ends: np.ndarray,
-        columns: np.ndarray,
-        looks: np.ndarray,
-    ) -> Equations:
+    def _crossing(self, unknowns: np.ndarray, frequency: float, segments: Segments, flown: Flown) -> Equations:
+        spans, (ends, columns, looks, rates) = segments.spans, flown
         n, count = len(spans), len(self.paths)
         sign = np.where(np.array(self.signature.along()) > 0, rates[0], rates[1])
         residual, here, there = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))

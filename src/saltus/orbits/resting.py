@@ -18,7 +18,7 @@ from saltus.flow import EventKind, Motion, Release, load_releases, peak_near, si
 from saltus.flow import segments as at
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
+from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem, Segments
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import is_symmetric, keeps_symmetry
 from saltus.orbits.tolerances import TOLERANCES
@@ -229,7 +229,7 @@ def _between(problem: Problem, motion: Motion, excursions: np.ndarray) -> tuple[
     states[opened] = np.stack(motion.at(into), axis=1)
     spans = np.stack([begins, impacts.time, approach], axis=1)
     along = impacts.side.astype(np.int64)
-    flown = problem.fly(spans, np.stack([before, along], axis=1), states, problem.values, look=True)
+    flown = problem.fly(Segments(spans, np.stack([before, along], axis=1), states), problem.values, look=True)
     if flown is None:
         return None, np.empty(0)
     ends, _, looks, rates = flown

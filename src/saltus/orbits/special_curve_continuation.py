@@ -17,7 +17,7 @@ from saltus.orbits.codimension import curve_test, curve_tests, room
 from saltus.orbits.conditions import Condition, Singular, Slow
 from saltus.orbits.find import divide
 from saltus.orbits.grazing import inserted
-from saltus.orbits.newton import Solution
+from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.signature import Signature
@@ -121,10 +121,10 @@ def _limits(special: SpecialPoint, value: float, bounds: Any, first_bounds: Any)
 
 def _start(special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[float, float]]) -> SpecialCurvePoint:
     """The special point as a point of its curve."""
-    problem, solution, condition = _defined(special, paths)
+    orbit, condition = _defined(special, paths)
     scales = tuple((high - low) / 3.0 for low, high in limits)
-    curve = ConditionedCurve(problem, scales, condition=condition)
-    known = curve.known(solution.unknowns, solution.values)
+    curve = ConditionedCurve(orbit.problem, scales, condition=condition)
+    known = curve.known(orbit.solution.unknowns, orbit.solution.values)
     if known is None:
         raise ParameterError(f"the motion beside this {special.kind} cannot be followed, so its curve cannot; choose another")
     first = curve.along_kernel(known)
@@ -136,43 +136,39 @@ def _start(special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[flo
     return exact
 
 
-def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[Problem, Solution, Condition]:
-    """The problem along both parameters, the orbit as its solution, and the condition that singles it out."""
-    old, unknowns = special.orbit.problem, special.orbit.solution.unknowns
+def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrbit, Condition]:
+    """The orbit as a solution of the problem along both parameters, and the condition that singles it out."""
+    kind, old, unknowns = special.kind, special.orbit.problem, special.orbit.solution.unknowns
     system, values = special.orbit.system, np.array([special.parameter, special.orbit.system.parameters[paths[1]]])
     symmetric = keeps_symmetry(system, paths[0]) and keeps_symmetry(system, paths[1])
-    if old.signature.symmetric and not symmetric and special.kind != SpecialKind.LP:
+    if old.signature.symmetric and not symmetric and kind != SpecialKind.LP:
         raise ParameterError(
-            f"{paths[1]} takes away the mirror symmetry on which this {special.kind} rests; change it a little, follow the "
+            f"{paths[1]} takes away the mirror symmetry on which this {kind} rests; change it a little, follow the "
             "branch again, and continue the special points into which this one splits"
         )
-    if special.kind == SpecialKind.GR:
+    if kind == SpecialKind.GR:
         signature, unknowns = _touching(special)
-        problem = Problem(system, signature, paths)
-        solution = _evaluated(problem, unknowns, values)
-        return problem, solution, Slow(problem, _first_without_speed(problem, unknowns))
+        orbit = _evaluated(Problem(system, signature, paths), unknowns, values)
+        return orbit, Slow(orbit.problem, _first_without_speed(orbit.problem, unknowns))
     problem = Problem(system, old.signature, paths)
-    solution = _evaluated(problem, unknowns, values)
-    if special.kind == SpecialKind.LP:
-        if old.signature.symmetric and not symmetric:
-            problem, unknowns = over_full_period(problem, unknowns)
-            solution = _evaluated(problem, unknowns, values)
-        return problem, solution, Singular.near(problem, solution, 1.0)
-    if special.kind == SpecialKind.PD:
-        problem, solution = divide(problem, solution) or (problem, solution)
-    elif not old.signature.symmetric:
-        halved = half(problem, solution) if symmetric else None
+    if kind == SpecialKind.LP and old.signature.symmetric and not symmetric:
+        problem, unknowns = over_full_period(problem, unknowns)
+    orbit = _evaluated(problem, unknowns, values)
+    if kind == SpecialKind.PD:
+        orbit = divide(orbit) or orbit
+    elif kind == SpecialKind.BPC and not old.signature.symmetric:
+        halved = half(orbit) if symmetric else None
         if halved is None:
             raise ParameterError("this BPC is a crossing of branches that no symmetry keeps: it does not persist along a curve")
-        problem, solution = halved
-    return problem, solution, Singular.near(problem, solution, -1.0)
+        orbit = halved
+    return orbit, Singular.near(orbit, 1.0 if kind == SpecialKind.LP else -1.0)
 
 
-def _evaluated(problem: Problem, unknowns: np.ndarray, values: np.ndarray) -> Solution:
-    equations = problem.evaluate(unknowns, values, look=True)
-    if equations is None:
+def _evaluated(problem: Problem, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit:
+    orbit = PeriodicOrbit.known(problem, unknowns, values)
+    if orbit is None:
         raise ParameterError("the motion of the special point cannot be followed; locate it again on its branch")
-    return Solution(unknowns, values, equations, 0)
+    return orbit
 
 
 def _touching(special: SpecialPoint) -> tuple[Signature, np.ndarray]:

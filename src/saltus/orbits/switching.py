@@ -76,11 +76,11 @@ def _doubled(point: OrbitPoint) -> OrbitPoint | None:
 
 def _unsymmetric(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
     """The symmetric orbit over its full period, and the two directions in which its halves differ."""
-    problem, solution = full_period(point.orbit.problem, point.solution)
+    orbit = full_period(point.orbit)
     direction = _kernel(point.equations.jacobian(-1.0))
     if point.orbit.signature.sides:
         direction = np.concatenate([direction, -direction])
-    return tuple(_along(point, problem, solution.unknowns, sign * direction) for sign in (1.0, -1.0))
+    return tuple(_along(point, orbit.problem, orbit.solution.unknowns, sign * direction) for sign in (1.0, -1.0))
 
 
 def _along(point: OrbitPoint, problem: Problem, unknowns: np.ndarray, direction: np.ndarray) -> OrbitPoint | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.orbits.newton import Solution, solve
+from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
@@ -41,35 +41,22 @@ def keeps_symmetry(system: System, path: str) -> bool:
     return any(is_symmetric(system.with_({path: value * (1 + s) + s})) for s in (1e-3, -1e-3))
 
 
-def half(problem: Problem, solution: Solution) -> tuple[Problem, Solution] | None:
-    """An orbit that is its own mirror image, as a solution of the half problem; None where it is not."""
-    signature = problem.signature
-    if signature.symmetric or signature.period % 2 == 0:
+def half(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
+    """An orbit that is its own mirror image, as a solution of the equations of half its period; None where it is not."""
+    problem, signature, unknowns = orbit.problem, orbit.signature, orbit.solution.unknowns
+    n, odd = divmod(len(signature.sides), 2)
+    if signature.symmetric or signature.period % 2 == 0 or odd:
         return None
-    if not signature.sides:
-        return _half_shooting(problem, solution)
-    n = len(signature.sides) // 2
-    if n % 2 == 0 or len(signature.sides) % 2:
+    if n:
+        first, second = unknowns.reshape(2, n, 2)
+        if n % 2 == 0 or np.abs(second - first - [np.pi * signature.period, 0.0]).max() > TOLERANCES.halves:
+            return None
+    elif problem.system.model.sides:
         return None
-    first, second = solution.unknowns.reshape(2, n, 2)
-    if np.abs(second - first - [np.pi * signature.period, 0.0]).max() > TOLERANCES.halves:
-        return None
-    return _solved(
-        problem.with_signature(Signature(signature.sides[:n], signature.period, True)), solution.unknowns[: 2 * n], solution
-    )
-
-
-def _half_shooting(problem: Problem, solution: Solution) -> tuple[Problem, Solution] | None:
-    if problem.system.model.sides:
-        return None
-    other = problem.with_signature(Signature((), problem.signature.period, True, problem.signature.side))
-    found = _solved(other, solution.unknowns, solution)
-    return found if found and np.abs(found[1].unknowns - solution.unknowns).max() < TOLERANCES.halves else None
-
-
-def _solved(problem: Problem, unknowns: np.ndarray, solution: Solution) -> tuple[Problem, Solution] | None:
-    found = solve(problem, unknowns, solution.values)
-    return None if found is None else (problem, found)
+    short = problem.with_signature(Signature(signature.sides[:n], signature.period, True, signature.side))
+    found = PeriodicOrbit.near(short, unknowns[: short.size], orbit.solution.values)
+    moved = found is not None and not n and np.abs(found.solution.unknowns - unknowns).max() >= TOLERANCES.halves
+    return None if moved else found
 
 
 def over_full_period(problem: Problem, unknowns: np.ndarray) -> tuple[Problem, np.ndarray]:
@@ -80,11 +67,8 @@ def over_full_period(problem: Problem, unknowns: np.ndarray) -> tuple[Problem, n
     return other, problem.repeated(unknowns) if sides else unknowns
 
 
-def full_period(problem: Problem, solution: Solution) -> tuple[Problem, Solution]:
-    """A symmetric orbit as a solution of the problem of its full period."""
-    if not problem.signature.symmetric:
-        return problem, solution
-    other, unknowns = over_full_period(problem, solution.unknowns)
-    found = solve(other, unknowns, solution.values)
+def full_period(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """A symmetric orbit as a solution of the equations of its full period."""
+    found = PeriodicOrbit.near(*over_full_period(orbit.problem, orbit.solution.unknowns), orbit.solution.values)
     assert found is not None, "a symmetric orbit solves the equations of its full period"
-    return other, found
+    return found
