@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
 from saltus.errors import ParameterError
-
-DRAWN = {
-    "motion": "draw_motion",
-    "phase_portrait": "draw_plane",
-    "response_spectrum": "draw_diagram",
-    "bifurcation_diagram": "draw_diagram",
-    "attractors": "draw_attractors",
-    "basins": "draw_basins",
-    "stability_chart": "draw_stability_chart",
-}  # functions of `saltus.plots`
 
 
 def plot_store(path: Path, output: Path | None) -> None:
@@ -41,19 +32,34 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     Raises:
         ParameterError: it is of no kind that has a picture, or lacks what its kind has.
     """
-    from saltus import plots
     from saltus.files import write_figure
+    from saltus.plots import style
 
-    kind = kind_of(data)
-    if kind not in DRAWN:
+    kind, drawn = kind_of(data), drawings()
+    if kind not in drawn:
         what = f"its kind is {kind!r}" if kind else "it does not say of what kind it is"
-        raise ParameterError(f"{path} is no result that `saltus plot` draws: {what}; it draws {', '.join(DRAWN)}")
+        raise ParameterError(f"{path} is no result that `saltus plot` draws: {what}; it draws {', '.join(drawn)}")
     try:
-        figure = getattr(plots, DRAWN[kind])(data)
+        figure = drawn[kind](data)
     except (LookupError, AttributeError, StopIteration) as error:
         raise ParameterError(f"{path} says that it is of the kind {kind!r}, but lacks {error}; compute it again") from error
-    with plots.style():
+    with style():
         return write_figure(stem, figure)
+
+
+def drawings() -> dict[str, Callable[[Any], Any]]:
+    """The kinds of results that have a picture, with the functions that draw them."""
+    from saltus.plots import draw_attractors, draw_basins, draw_diagram, draw_motion, draw_plane, draw_stability_chart
+
+    return {
+        "motion": draw_motion,
+        "phase_portrait": draw_plane,
+        "response_spectrum": draw_diagram,
+        "bifurcation_diagram": draw_diagram,
+        "attractors": draw_attractors,
+        "basins": draw_basins,
+        "stability_chart": draw_stability_chart,
+    }
 
 
 def open_result(path: Path) -> Any:
