@@ -138,16 +138,16 @@ def test_the_kinds_of_special_points_are_all_there():
 
 
 def test_the_options_of_a_diagram_are_all_there():
-    from saltus.studies.diagram.diagram import bifurcation_diagram, orbit_diagram, response_spectrum
+    from saltus.studies import bifurcation_diagram, response_spectrum
 
-    options = set(inspect.signature(orbit_diagram).parameters) - {"system", "path"}
+    options = set(inspect.signature(bifurcation_diagram).parameters) - {"system", "path"}
     rows = dict(re.findall(r"^\| (`[^|]*)\|([^|]*)\|[^|]*\|$", orbits_section("Spectra and diagrams"), re.MULTILINE))
     named = {name: default.strip() for cell, default in rows.items() for name in re.findall(r"`(\w+)`", cell)}
     assert options <= set(named)
     bounds = [inspect.signature(f).parameters["bounds"].default for f in (response_spectrum, bifurcation_diagram)]
     assert named["bounds"] == ", ".join(f"({low:g}, {high:g})" for low, high in bounds)
     for name in ("max_period", "repelling", "step"):
-        assert named[name] == f"{inspect.signature(orbit_diagram).parameters[name].default:g}"
+        assert named[name] == f"{inspect.signature(bifurcation_diagram).parameters[name].default:g}"
 
 
 def test_the_nodes_and_variables_of_a_diagram_are_all_there():

@@ -12,9 +12,10 @@ from shared_systems import forced
 import saltus
 from saltus.errors import ParameterError
 from saltus.orbits import continue_orbit, continue_special, find_orbit, follow_stable
-from saltus.studies import Borders, bordered_chart, disagreements, exact_borders, stability_chart, with_borders
+from saltus.studies import Borders, bordered_chart, disagreements, stability_chart, with_borders
 from saltus.studies.chart import follow as chart_follow
 from saltus.studies.chart.border_curves import curve_dataset, explained
+from saltus.studies.chart.borders import first_borders
 from saltus.studies.chart.changes import changes_of, keys_of, read_chart
 from saltus.studies.chart.follow import ChangeOutcome, Follower, lost
 from saltus.systems import System, VelocityReduction
@@ -31,7 +32,7 @@ def chart():
 
 @functools.cache
 def borders():
-    return exact_borders(forced(1.0), chart(), curves=8)
+    return first_borders(forced(1.0), chart(), 8).borders
 
 
 def at(curve, vertical):
@@ -101,19 +102,20 @@ def test_a_motion_that_the_chart_lacks_is_a_disagreement():
 def test_the_onset_at_high_frequency_is_the_closed_form(W):
     system = forced(H=0.02, W=W)
     here = stability_chart(system, horizontal=[0.0005, 0.02], vertical=[-0.6, -0.5, -0.4], starts=6, least=1e-4)
-    onset = of("LP", 2, exact_borders(system, here, curves=1).curves)
+    onset = of("LP", 2, first_borders(system, here, 1).borders.curves)
     for horizontal, vertical in zip(onset["horizontal"].values, onset["vertical"].values, strict=True):
         closed = high_frequency_onset(W, beta0=np.deg2rad(80), vertical=float(vertical), damping=0.1, order=2)
         assert horizontal == pytest.approx(closed, rel=3 * W**-4)
 
 
-def test_borders_are_kept_whole(tmp_path):
-    again = Borders.from_xarray(borders().to_xarray())
-    xr.testing.assert_identical(again.to_xarray()["ends"].to_dataset(), borders().to_xarray()["ends"].to_dataset())
-    assert again.endings.keys() == borders().endings.keys()
-    for one, two in zip(borders().curves, again.curves, strict=True):
-        xr.testing.assert_identical(one, two)
-    assert disagreements(chart(), again).identical(disagreements(chart(), borders()))
+def test_borders_are_kept_as_they_are():
+    tree = borders().to_xarray()
+    kept = tree["ends"].to_dataset()
+    assert [tuple(key) for key in kept["key"].values] == list(borders().endings)
+    assert kept["outcome"].values.tolist() == [str(ending.outcome) for ending in borders().endings.values()]
+    np.testing.assert_array_equal(kept["amplitude"], [ending.amplitude for ending in borders().endings.values()])
+    for i, curve in enumerate(borders().curves):
+        xr.testing.assert_identical(tree[f"curve_{i:02d}"].to_dataset(), curve)
 
 
 def towards_the_onset():
@@ -251,7 +253,7 @@ def test_a_chart_read_lazily_gets_its_motions_too():
 @pytest.mark.parametrize("curves", [-1, 2.5])
 def test_a_number_of_curves_without_meaning_is_refused(curves):
     with pytest.raises(ParameterError, match="curves must"):
-        exact_borders(forced(1.0), chart(), curves=curves)
+        with_borders(forced(1.0), chart(), curves=curves)
 
 
 @pytest.mark.parametrize(

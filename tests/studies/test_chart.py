@@ -12,7 +12,7 @@ from saltus.errors import ParameterError
 from saltus.orbits import find_orbit, search_orbits
 from saltus.studies import stability_chart
 from saltus.studies.chart.cells import beyond_limits, joined, seeds, starts
-from saltus.studies.chart.chart import monostable
+from saltus.studies.chart.changes import monostable
 from saltus.studies.chart.motions import MOTION, distinct, has_alike
 from saltus.systems import Harmonic, Load, TwoLayer
 from saltus.theory import equilibria, unloaded_fold

@@ -17,8 +17,8 @@ from saltus.systems import System
 
 QUESTIONS: dict[str, tuple[str, ...]] = {
     "phase_portrait": ("studies:phase_portrait",),
-    "response_spectrum": ("studies:response_spectrum", "studies:orbit_diagram"),
-    "bifurcation_diagram": ("studies:bifurcation_diagram", "studies:orbit_diagram"),
+    "response_spectrum": ("studies:response_spectrum", "studies:bifurcation_diagram"),
+    "bifurcation_diagram": ("studies:bifurcation_diagram",),
     "attractors": ("attractors:find_attractors",),
     "basins": ("attractors:basins_of_attraction",),
     "stability_chart": ("studies:stability_chart", "studies:bordered_chart"),

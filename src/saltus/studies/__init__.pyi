@@ -1,8 +1,8 @@
-from .chart.borders import Borders, exact_borders, with_borders
+from .chart.borders import Borders, with_borders
 from .chart.chart import bordered_chart, stability_chart
 from .chart.disagreements import disagreements
 from .diagram.chaos_search import chaotic_bands
-from .diagram.diagram import bifurcation_diagram, orbit_diagram, response_spectrum
+from .diagram.diagram import bifurcation_diagram, response_spectrum
 from .portrait import phase_portrait
 
 __all__ = [
@@ -11,8 +11,6 @@ __all__ = [
     "bordered_chart",
     "chaotic_bands",
     "disagreements",
-    "exact_borders",
-    "orbit_diagram",
     "phase_portrait",
     "response_spectrum",
     "stability_chart",

@@ -3,31 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.attractors import Equilibrium, Separatrix, equilibria, separatrices
-from saltus.checks import check_count, check_number, checked_by
+from saltus.checks import Rectangle, check_count, check_number, check_states, check_window, checked_by
 from saltus.errors import ParameterError
 from saltus.flow import simulate
 from saltus.orbits import EVEN
 from saltus.progress import Progress, silent
+from saltus.provenance import provenance
 from saltus.systems import System, VelocityReduction
 
 if TYPE_CHECKING:
     import xarray
 
-Bounds = tuple[tuple[float, float], tuple[float, float]]
+WINDOW: Rectangle = ((-3.0, 3.0), (-3.0, 3.0))
 
-WINDOW: Bounds = ((-3.0, 3.0), (-3.0, 3.0))
-MOTIONS = 24  # from states spread evenly over the window, unless they are given
-BESIDE = (0.35, 0.75)  # and from beside each stable equilibrium, at these shares of the way to the next one
-TRIED = 100  # times as many places are tried where a wall takes a part of the window
+
+@dataclass(frozen=True)
+class StartSettings:
+    """Where motions begin unless their states are given."""
+
+    # From so many states spread evenly over the window.
+    spread: int = 24
+    # Of so many times as many places, as a wall may take a part of the window.
+    tried: int = 100
+    # From beside each stable equilibrium, at these shares of the way to the next one.
+    beside: tuple[float, ...] = (0.35, 0.75)
+
+
+STARTS = StartSettings()
 
 
 def _check(
-    system: System, window: Bounds, starts: Any, duration: float, samples: int, seed: int, progress: object = None
+    system: System, window: Rectangle, starts: Any, duration: float, samples: int, seed: int, progress: object = None
 ) -> None:
     check_number("duration", duration, above=0.0)
     check_count("samples", samples, 2)
@@ -40,7 +52,7 @@ def _check(
 def phase_portrait(
     system: System,
     *,
-    window: Bounds = WINDOW,
+    window: Rectangle = WINDOW,
     starts: Iterable[tuple[float, float]] | None = None,
     duration: float = 30.0,
     samples: int = 1500,
@@ -78,26 +90,24 @@ def phase_portrait(
         rows.append(_sampled(system, state, duration, samples))
     progress(0.8, "separatrices")
     why = _no_inverse(system)
-    parting = () if why else separatrices(system, window)
-    said: dict[str, Any] = {"window": [float(x) for pair in window for x in pair], "duration": float(duration)}
-    said |= {"starts": "spread" if starts is None else "given", **({"no_separatrices": why} if why else {})}
+    curves = () if why else separatrices(system, window)
     progress(1.0, "done")
-    return _dataset(system, rows, points, parting, said)
+    facts = {"window": np.ravel(window).astype(float).tolist(), "duration": float(duration)}
+    begun = "spread" if starts is None else "given"
+    return _dataset(system, rows, points, curves, starts=begun, **facts, **({"no_separatrices": why} if why else {}))
 
 
-def _spread(system: System, window: Bounds, points: tuple[Equilibrium, ...], seed: int) -> np.ndarray:
+def _spread(system: System, window: Rectangle, points: tuple[Equilibrium, ...], seed: int) -> np.ndarray:
     """States (n, 2) beside the stable equilibria, and spread evenly over the part of the window in which the system can be."""
-    middle, half = np.mean(window, axis=1), 0.5 * np.diff(window, axis=1)[:, 0]
-    shifts = np.arange(1, TRIED * MOTIONS + 1)[:, None] * EVEN
-    shares = 2.0 * ((np.random.default_rng(seed).random(2) + shifts) % 1.0) - 1.0
-    states = middle + half * shares
-    states = states[_possible(system, states[:, 0])][:MOTIONS]
+    area, shifts = check_window(window, system), np.arange(1, STARTS.tried * STARTS.spread + 1)[:, None] * EVEN
+    states = area.centre + area.half * (2.0 * ((np.random.default_rng(seed).random(2) + shifts) % 1.0) - 1.0)
+    states = states[_possible(system, states[:, 0])][: STARTS.spread]
     if not len(states):
         raise ParameterError(
             f"window must reach to where the system can be, got {window!r}: all of it is beyond the contact", "window"
         )
-    ends = [*(point.place for point in points), *window[0]]
-    near = [(_beside(point.place, ends, share), 0.0) for point in points if point.stable for share in BESIDE]
+    ends = [*(point.place for point in points), *area.coordinate]
+    near = [(_beside(point.place, ends, share), 0.0) for point in points if point.stable for share in STARTS.beside]
     return np.concatenate([np.array(near).reshape(-1, 2), states])
 
 
@@ -116,12 +126,9 @@ def _possible(system: System, places: np.ndarray) -> np.ndarray:
 
 def _states(system: System, starts: Any) -> np.ndarray:
     """Given states (n, 2)."""
-    try:
-        states = np.array([[float(x) for x in state] for state in starts])
-    except (TypeError, ValueError):
-        states = np.empty(0)
-    if states.ndim != 2 or states.shape[1] != 2 or not len(states) or not np.isfinite(states).all():
-        raise ParameterError(f"starts must be states (coordinate, velocity), such as [[0.3, 0.0]], got {starts!r:.80}", "starts")
+    states = check_states("starts", starts)
+    if not len(states):
+        raise ParameterError("starts must be states (coordinate, velocity), such as [[0.3, 0.0]], and there is none", "starts")
     beyond = states[~(_possible(system, states[:, 0]) | (states[:, 0] == float(system.model.contact)))]
     if len(beyond):
         raise ParameterError(f"starts must lie where the system can be, and {beyond[0].tolist()} is beyond the contact", "starts")
@@ -151,40 +158,33 @@ def _sampled(system: System, state: np.ndarray, duration: float, samples: int) -
 
 
 def _dataset(
-    system: System,
-    rows: list[np.ndarray],
-    points: tuple[Equilibrium, ...],
-    parting: tuple[Separatrix, ...],
-    said: dict[str, Any],
+    system: System, rows: list[np.ndarray], points: tuple[Equilibrium, ...], curves: tuple[Separatrix, ...], **facts: Any
 ) -> xarray.Dataset:
+    """The motions, equilibria and separatrices as a Dataset; `facts` are further attributes."""
     import xarray
 
-    from saltus import __version__
-
     name = system.model.coordinates[0]
-    unit, motions = "rad" if name.startswith("theta") else "1", _padded(rows)
-    curves = _padded([np.stack([s.theta, s.velocity]) for s in parting]) if parting else np.empty((0, 2, 0))
-    roots = np.array([p.eigenvalues or (complex(np.nan, np.nan),) * 2 for p in points], dtype=complex).reshape(-1, 2)
-
-    def column(dims: tuple[str, ...], values: Any, units: str, text: str) -> Any:
-        return dims, values, {"units": units, "long_name": text}
-
+    unit, motions = system.model.unit_of(name), _padded(rows)
+    lines = _padded([np.stack([curve.theta, curve.velocity]) for curve in curves]) if curves else np.empty((0, 2, 0))
+    roots = np.array([point.eigenvalues or (complex(np.nan, np.nan),) * 2 for point in points], dtype=complex).reshape(-1, 2)
+    stable, places = np.array([point.stable for point in points], dtype=bool), np.array([point.place for point in points])
     over, curve, each = ("motion", "sample"), ("separatrix", "point"), ("equilibrium", "root")
     columns = {
-        "time": column(over, motions[:, 0], "1", "dimensionless time"),
-        name: column(over, motions[:, 1], unit, name),
-        "velocity": column(over, motions[:, 2], "1", f"d {name} / d tau"),
-        "stable": column(("equilibrium",), np.array([p.stable for p in points], dtype=bool), "1", "no disturbance grows"),
-        "eigenvalue_real": column(each, roots.real, "1", "real part of the eigenvalues, nan at the contact"),
-        "eigenvalue_imaginary": column(each, roots.imag, "1", "their imaginary part"),
-        f"separatrix_{name}": column(curve, curves[:, 0], unit, "stable manifolds of the saddles"),
-        "separatrix_velocity": column(curve, curves[:, 1], "1", "velocity on them"),
+        "time": (over, motions[:, 0], "1", "dimensionless time"),
+        name: (over, motions[:, 1], unit, name),
+        "velocity": (over, motions[:, 2], unit, f"d {name} / d tau"),
+        "stable": (("equilibrium",), stable, "1", "no disturbance grows"),
+        "eigenvalue_real": (each, roots.real, "1", "real part of the eigenvalues, nan at the contact"),
+        "eigenvalue_imaginary": (each, roots.imag, "1", "their imaginary part"),
+        f"separatrix_{name}": (curve, lines[:, 0], unit, "stable manifolds of the saddles"),
+        "separatrix_velocity": (curve, lines[:, 1], unit, "velocity on them"),
+        "equilibrium": (("equilibrium",), places.astype(float), unit, f"{name} of the equilibria"),
     }
-    places = column(("equilibrium",), np.array([p.place for p in points], dtype=float), unit, f"{name} of the equilibria")
-    attributes: dict[str, Any] = {"title": "phase portrait computed by saltus", "kind": "phase_portrait", "coordinate": name}
-    attributes |= {"system": system.to_json(), "saltus_version": __version__}
-    attributes |= {"contact": float(system.model.contact)} if system.model.sides else {}
-    return xarray.Dataset(columns, {"equilibrium": places}, attributes | said)
+    contact: dict[str, Any] = {"contact": float(system.model.contact)} if system.model.sides else {}
+    title = "phase portrait computed by saltus"
+    attributes = provenance(system, title=title, kind="phase_portrait", coordinate=name, **contact, **facts)
+    data = {key: (dims, values, {"units": units, "long_name": text}) for key, (dims, values, units, text) in columns.items()}
+    return xarray.Dataset(data, attrs=attributes)
 
 
 def _padded(rows: list[np.ndarray]) -> np.ndarray:

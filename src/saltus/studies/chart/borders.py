@@ -64,61 +64,47 @@ class Borders:
         groups = {f"curve_{i:02d}": curve for i, curve in enumerate(self.curves)}
         return xr.DataTree.from_dict({"ends": xr.Dataset(ends), **groups})
 
-    @classmethod
-    def from_xarray(cls, tree: xarray.DataTree) -> Borders:
-        """What `to_xarray` has made, read back."""
-        names = sorted(name for name in tree.children if name.startswith("curve_"))
-        ends = tree["ends"].to_dataset()
-        keys = [tuple(map(int, key)) for key in np.asarray(ends["key"])]
-        rows = zip(*(ends[column.name].values.tolist() for column in fields(Ending)), strict=True)
-        endings = {key: Ending(ChangeOutcome(outcome), *row) for key, (outcome, *row) in zip(keys, rows, strict=True)}
-        return cls([tree[name].to_dataset() for name in names], endings)
-
-
-def exact_borders(system: System, chart: xarray.Dataset, *, curves: int = CURVES, progress: Progress = silent) -> Borders:
-    """The curves of LP, PD, BPC and GR on which the motions of a chart end, and its other ends cell by cell.
-
-    Where a cell has a motion and its neighbour none alike, the orbit is solved for and followed towards the neighbour to the
-    special point at which it is lost. The points of the widest families, above all where rest alone is beside them, are followed
-    as curves through the plane of the chart; the changes that a curve explains are passed over, and at most 2000 are looked into.
-
-    Args:
-        system: that of the chart.
-        chart: as `stability_chart` returns it.
-        curves: how many curves at most.
-        progress: called with the share of the changes that are explained.
-    """
-    return _searched(system, chart, curves, progress).borders
-
 
 def with_borders(
     system: System, chart: xarray.Dataset, *, curves: int = CURVES, progress: Progress = silent
 ) -> tuple[xarray.Dataset, Borders]:
     """A chart with the stable motions that go on into a cell where no start has led to them, and the exact borders of it.
 
-    Arguments as of `exact_borders`. The chart's attribute `added_by_continuation` is the number of motions added.
+    Where a cell has a motion and its neighbour none alike, the orbit is solved for and followed towards the neighbour to the
+    special point at which it is lost. The points of the widest families, above all where rest alone is beside them, are followed
+    as curves of LP, PD, BPC and GR through the plane of the chart; the changes that a curve explains are passed over, and at most
+    2000 are looked into.
+
+    Args:
+        system: that of the chart.
+        chart: as `stability_chart` returns it.
+        curves: how many curves at most.
+        progress: called with the share of the changes that are explained.
+
+    Returns:
+        The chart, whose attribute `added_by_continuation` is the number of motions added, and its borders.
     """
-    search = _searched(system, chart, curves, progress)
+    check_count("curves", curves, 0)
+    search = first_borders(system, chart, curves, progress)
     chart, borders = chart.assign_attrs({ADDED: 0}), search.borders
     while search.missed:
         before, chart = chart, with_motions(chart, system, search.missed)
         if chart.attrs[ADDED] == before.attrs[ADDED]:
             break
-        search = _BorderSearch(system, chart, borders, progress)
+        search = BorderSearch(system, chart, borders, progress)
         search.look_into(search.renewed())
     return chart, borders
 
 
-def _searched(system: System, chart: xarray.Dataset, curves: int, progress: Progress) -> _BorderSearch:
-    """Everything that is known of the changes of a chart as it is."""
-    check_count("curves", curves, 0)
-    search = _BorderSearch(system, chart, Borders(), progress)
+def first_borders(system: System, chart: xarray.Dataset, curves: int, progress: Progress = silent) -> BorderSearch:
+    """The borders of a chart as it is, in a search that also holds the motions that it lacks."""
+    search = BorderSearch(system, chart, Borders(), progress)
     search.follow_curves(curves)
     search.look_into(search.waiting)
     return search
 
 
-class _BorderSearch:
+class BorderSearch:
     """The changes of a chart that are still to be explained, and what is known of the others."""
 
     def __init__(self, system: System, chart: xarray.Dataset, borders: Borders, progress: Progress) -> None:

@@ -64,12 +64,17 @@ def read_chart(chart: xarray.Dataset) -> ChartMotions:
     from scipy.sparse.csgraph import connected_components
 
     chart, motions = chart.transpose("vertical", "horizontal", ...), read_motions(chart)
-    rest_alone = ((chart["count"] == 0) & (chart["unsettled"] == 0)).values
+    rest_alone = monostable(chart).values
     pairs = np.concatenate([np.empty((0, 2), dtype=int), *(_counterparts(motions, rest_alone.shape, side)[0] for side in SIDES)])
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(motions), len(motions)))
     family = connected_components(graph, directed=False)[1] if len(motions) else np.zeros(0, dtype=int)
     axes = chart["horizontal"].values, chart["vertical"].values
     return ChartMotions(*axes, motions, family, float(chart.attrs["least"]), rest_alone)
+
+
+def monostable(chart: xarray.Dataset) -> xarray.DataArray:
+    """Where no motion counts and every start that settles comes to rest: the white region of the paper's charts."""
+    return (chart["count"] == 0) & (chart["unsettled"] == 0)
 
 
 def _counterparts(motions: np.ndarray, shape: tuple[int, ...], side: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:

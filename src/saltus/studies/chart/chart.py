@@ -122,8 +122,3 @@ def bordered_chart(system: System, *, curves: int = 12, progress: Progress = sil
     if static is not None:
         groups["static"] = static.to_xarray()
     return xr.DataTree.from_dict(groups).assign({"borders": borders.to_xarray()})
-
-
-def monostable(chart: xarray.Dataset) -> xarray.DataArray:
-    """Where no motion counts and every start that settles comes to rest: the white region of the paper's charts."""
-    return (chart["count"] == 0) & (chart["unsettled"] == 0)

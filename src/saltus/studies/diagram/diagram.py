@@ -50,10 +50,10 @@ def _check(
 
 
 @checked_by(_check)
-def orbit_diagram(
+def bifurcation_diagram(
     system: System,
-    path: str,
-    bounds: tuple[float, float],
+    path: str = "load.horizontal.amplitude",
+    bounds: tuple[float, float] = (0.0, 3.0),
     *,
     max_period: int = 6,
     values: Iterable[float] | None = None,
@@ -66,20 +66,18 @@ def orbit_diagram(
     bands: int = 121,
     progress: Progress = silent,
 ) -> xarray.DataTree:
-    """Search, follow, switch and confirm.
+    """All branches of periodic orbits along a parameter that a search finds, and bands of chaos (the paper's Figs. 11 to 13).
 
-    At each of `values` (25 by default) motions from `starts` states settle; every orbit on which they do, and those of up to
-    `repelling` forcing periods that repel, is followed along the parameter unless a branch goes through it already. At every
-    PD and BPC the new branch is followed too, up to `max_period` forcing periods. Families of more than one forcing period are
-    followed beyond the bounds, to where they close or end. Every orbit is confirmed by the event-driven flow over a period, the
-    stable ones over 20.
+    At each of `values` motions from `starts` states settle; every orbit on which they do, and those of up to `repelling` forcing
+    periods that repel, is followed along the parameter unless a branch goes through it already. At every PD and BPC the new
+    branch is followed too. Families of more than one forcing period are followed beyond the bounds, to where they close or end.
+    Every orbit is confirmed by the event-driven flow over a period, the stable ones over 20.
 
     Args:
         system: what moves.
-        path: dotted path of the parameter.
-        bounds: its range.
+        path, bounds: dotted path of the parameter, and its range.
         max_period: the longest period, in forcing periods.
-        values, starts, window, seed: where is searched, see `search_orbits`; values within the bounds.
+        values, starts, window, seed: where is searched, see `search_orbits`; by default 25 values within the bounds.
         repelling: up to which period repelling orbits are searched for.
         switch: whether branches are followed that are born at special points.
         step: the longest step along a branch.
@@ -87,12 +85,9 @@ def orbit_diagram(
         progress: called with the fraction done and what is being done.
 
     Returns:
-        A DataTree: the search in the attributes and in `search`; `branch_000`, ... (see `branch_dataset.py`, with `defect` after
-        a period and, for stable orbits, `kept` after 20); `attractors`, what simulation settled on; `bands` of chaos with
-        brackets of their edges and the special points there, `exponents` and `stroboscopic` (the states at phase 0 of what was
-        simulated to find them). The attribute `left` counts the special points at which a family is born that was not followed,
-        see `BranchSettings`. An orbit that its multipliers call stable, but that does not stay where it is for 20 periods, is not
-        called so; `unconfirmed` counts these on each branch.
+        A DataTree: `branch_000`, ..., `attractors` (what simulation settled on), `bands`, `exponents` and `stroboscopic` (see
+        `Bands`), and `search`; docs/orbits.md lists their variables. The attribute `left` counts the special points at which a
+        family is born that was not followed, see `BranchSettings`.
 
     Raises:
         ParameterError: an argument without meaning.
@@ -123,32 +118,12 @@ def orbit_diagram(
     return tree
 
 
-@checked_by(orbit_diagram.check)
+@checked_by(bifurcation_diagram.check)
 def response_spectrum(
-    system: System,
-    path: str = "load.frequency",
-    bounds: tuple[float, float] = (0.1, 3.0),
-    **options: Any,
+    system: System, path: str = "load.frequency", bounds: tuple[float, float] = (0.1, 3.0), **options: Any
 ) -> xarray.DataTree:
-    """All branches of periodic orbits along the forcing frequency that a search finds: `orbit_diagram` says how.
-
-    The paper's Figs. 9 and 10. Options are those of `orbit_diagram`.
-    """
-    return orbit_diagram(system, path, bounds, **options)
-
-
-@checked_by(orbit_diagram.check)
-def bifurcation_diagram(
-    system: System,
-    path: str = "load.horizontal.amplitude",
-    bounds: tuple[float, float] = (0.0, 3.0),
-    **options: Any,
-) -> xarray.DataTree:
-    """All branches of periodic orbits along a load's amplitude that a search finds: `orbit_diagram` says how.
-
-    The paper's Figs. 11 to 13. Options are those of `orbit_diagram`.
-    """
-    return orbit_diagram(system, path, bounds, **options)
+    """`bifurcation_diagram` along the forcing frequency, with the same options (the paper's Figs. 9 and 10)."""
+    return bifurcation_diagram(system, path, bounds, **options)
 
 
 def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.ndarray:

@@ -22,7 +22,7 @@ INSTANTS = 64  # of a period at which an orbit that rests is compared with itsel
 def diagram_tree(
     system: System, branches: list[Branch], found: Search, bounds: tuple[float, float], chaos: Bands | None, **facts: Any
 ) -> xarray.DataTree:
-    """The DataTree that `orbit_diagram` returns; `facts` are further attributes."""
+    """The DataTree that `bifurcation_diagram` returns; `facts` are further attributes."""
     import xarray
 
     attributes = provenance(
@@ -56,7 +56,10 @@ def turning_points(branches: list[Branch]) -> list[tuple[str, float]]:
 
 
 def confirmed(branch: Branch) -> xarray.Dataset:
-    """A branch's dataset with its orbits' distances from themselves by direct simulation (`kept`: 20 periods, if stable)."""
+    """A branch's dataset with its orbits' distances from themselves by direct simulation (`kept`: 20 periods, if stable).
+
+    An orbit that its multipliers call stable, but that does not stay where it is, is not called so; `unconfirmed` counts these.
+    """
     data, orbits = branch.to_xarray(), branch.orbits
     stable = np.flatnonzero(data["stable"].values)
     kept = np.full(len(orbits), np.nan)
