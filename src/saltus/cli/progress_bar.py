@@ -23,12 +23,12 @@ def progress_bar(title: str) -> Iterator[Progress]:
     with Bar(*columns, console=messages, transient=True, disable=not messages.is_terminal) as bar:
         task = bar.add_task(title, total=1.0)
 
-        def show(fraction: float, what: str = "computing") -> None:
+        def show(fraction: float, what: str) -> None:
             nonlocal step
             bar.update(task, completed=fraction, description=f"{title}: {what}")
             if not messages.is_terminal and what.split(",")[0] != step:
                 step = what.split(",")[0]
                 print(f"{title}: {step}", file=messages.file, flush=True)
 
-        show(0.0)
+        show(0.0, "computing")
         yield show

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ from saltus.orbits.find import orbit_from
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
+from saltus.progress import Progress, silent
 from saltus.systems import System
 
 SETTLE = 200  # forcing periods before the motion is taken to have settled
@@ -75,7 +76,7 @@ def search_orbits(
     window: Rectangle | None = None,
     seed: int = 0,
     repelling: int | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Progress = silent,
 ) -> Search:
     """Periodic orbits of up to `max_period` forcing periods at several values of a parameter, each once for each value.
 
@@ -115,8 +116,7 @@ def search_orbits(
         if reach > 0:
             here += _repelling(base, np.concatenate([early.states[moving], late.states[moving]]), reach, here)
         found += here
-        if progress is not None:
-            progress((i + 1) / len(grid))
+        progress((i + 1) / len(grid), "searching")
     columns = np.array(settled, dtype=float).reshape(-1, 4).T
     dots = Settled(columns[0], columns[1].astype(int), columns[2], columns[3])
     return Search(path, tuple(found), grid, starts, max_period, area, seed, unsettled, at_rest, dots)

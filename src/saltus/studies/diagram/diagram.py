@@ -103,7 +103,7 @@ def bifurcation_diagram(
         window=window,
         seed=seed,
         repelling=repelling,
-        progress=lambda share: progress(SHARES.search * share, "searching"),
+        progress=part_of(progress, 0.0, SHARES.search),
     )
     branches = BranchSet(path, (low, high), max_period, step, switch)
     following = part_of(progress, SHARES.search, SHARES.branches)
