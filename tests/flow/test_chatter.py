@@ -15,8 +15,9 @@ from scipy.integrate import quad
 from shared_systems import BETA80, forced
 
 from saltus.flow import EventKind, simulate
-from saltus.flow import kernel_layout as k
 from saltus.flow.compiled import load_kernel
+from saltus.flow.kernel_layout import Mode, Status, Where
+from saltus.flow.memory_layout import State
 from saltus.flow.simulation import _prepare, program
 from saltus.systems import EnergyRestitution, Harmonic, Load, System, WallOscillator
 
@@ -49,11 +50,11 @@ def averaged_speed(system, v0, duration, contact=0.0):
     """The speed of the kernel's CHATTER mode after a time, from its own state (a motion at contact reports 0)."""
     run = program(system)
     where, state, settings = _prepare(system, run, np.array([contact]), np.array([v0]), None, duration, 0.0, 1e-14)
-    steps = (np.empty((64, 2), dtype=np.int64), np.empty((64, 2)), np.empty((64, 1, where[k.ORDER] + 2)))
+    steps = (np.empty((64, 2), dtype=np.int64), np.empty((64, 2)), np.empty((64, 1, where[Where.ORDER] + 2)))
     events = (np.empty((64, 4), dtype=np.int64), np.empty((64, 3)))
-    assert load_kernel()(where, state, settings, run.env, run.model, steps, events) == k.DONE
-    assert where[k.MODE] == k.CHATTER
-    return state[k.SPEED]
+    assert load_kernel()(where, state, settings, run.env, run.model, steps, events) == Status.DONE
+    assert where[Where.MODE] == Mode.CHATTER
+    return state[State.CHATTER_SPEED]
 
 
 SYMMETRIC = {"C": 0.1, "V": -0.5, "H": 0.05, "W": 0.3}

@@ -1,11 +1,15 @@
 """The roots of the lanes: exact to rounding from any first guess, with the velocity there; and the rough functions they use."""
 
+import math
+
 import numpy as np
 import pytest
 from numba import njit, types
 
-from saltus.flow.ensemble.lane_layout import HIGHEST_ORDER, LOWEST_ORDER, POSITIONS, STRIDE, VELOCITIES
-from saltus.flow.ensemble.lane_steps import motion_at, only_root
+from saltus.flow import kernel_layout
+from saltus.flow.ensemble import lane_layout, lane_steps
+from saltus.flow.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, SERIES_LENGTH, LanePart
+from saltus.taylor import compiled_part, lane_vectors, private_numba
 from saltus.taylor.lane_vectors import (
     ALL,
     load,
@@ -21,17 +25,21 @@ from saltus.taylor.vectors import WIDTH
 EPS = 2.0**-52
 H = 0.7  # the step
 PLACES = np.zeros(16, dtype=np.int64)  # of a memory with the two series of one coordinate, and slots for what goes in and out
-PLACES[POSITIONS], PLACES[VELOCITIES] = 0, STRIDE
-STEP, SIGN, TIME, SPEED, SIZE = 2 * STRIDE, 2 * STRIDE + 1, 2 * STRIDE + 2, 2 * STRIDE + 3, 2 * STRIDE + 4
+PLACES[LanePart.POSITIONS], PLACES[LanePart.VELOCITIES] = 0, SERIES_LENGTH
+STEP, SIGN, TIME, SPEED, SIZE = range(2 * SERIES_LENGTH, 2 * SERIES_LENGTH + 5)
+COMPILED = {"np": np, "math": math, "SERIES_LENGTH": SERIES_LENGTH} | vars(lane_vectors) | vars(private_numba)
+for part in (kernel_layout, lane_layout, lane_steps):
+    exec(compiled_part(part), COMPILED)
+motion_at, only_root = COMPILED["motion_at"], COMPILED["only_root"]
 
 
 @njit(types.void(types.float64[::1], types.int64[::1], types.int64), **OPTIONS)
 def find(m, at, order):
-    h, sign, start = load(m, STEP), load(m, SIGN), load(m, at[POSITIONS])
+    h, sign, start = load(m, STEP), load(m, SIGN), load(m, 0)
     x, v, a, _ = motion_at(m, at, order, start, h)
-    g1, g2 = sign * load(m, at[POSITIONS] + 1) * h, sign * load(m, at[POSITIONS] + 2) * (h * h)
-    g3 = sign * load(m, at[POSITIONS] + 3) * (h * h * h)
-    time, speed = only_root(m, at, order, h, start, sign, sign * start, g1, g2, g3, x, v, a, ALL)
+    g1, g2 = sign * load(m, 1) * h, sign * load(m, 2) * (h * h)
+    g3 = sign * load(m, 3) * (h * h * h)
+    time, speed = only_root(m, at, order, h, start, sign, (sign * start, g1, g2, g3), (x, v, a), ALL)
     store(m, TIME, time)
     store(m, SPEED, speed)
 
@@ -82,7 +90,7 @@ def test_roots_and_velocities_are_exact_to_rounding(kind, order):
         c, memory = positions_of(kind, order, rng), np.zeros((SIZE, WIDTH))
         sign = rng.choice([-1.0, 1.0], WIDTH)
         memory[: order + 1], memory[STEP], memory[SIGN] = (sign[:, None] * c).T, H, sign
-        memory[STRIDE : STRIDE + order] = (sign[:, None] * c[:, 1:] * np.arange(1, order + 1)).T
+        memory[SERIES_LENGTH : SERIES_LENGTH + order] = (sign[:, None] * c[:, 1:] * np.arange(1, order + 1)).T
         find(memory.reshape(-1), PLACES, order)
         for lane in range(WIDTH):
             root, slope = root_of(c[lane])

@@ -6,6 +6,7 @@ from .ensemble.ensemble_dataset import Wanted
 from .ensemble.inputs import Inputs, read_inputs
 from .ensemble.tangent_ensemble import TangentEnsemble
 from .ensemble.threads import Jobs, Lanes, available_cores
+from .kernel_layout import STRUCTURE_SIZES, Where
 from .load_release import Release, contact_pull, load_releases, peak_near
 from .motion import DenseOutput, Event, EventKind, Impacts, Motion
 from .recurrence import (
@@ -27,6 +28,7 @@ from .validity import Validity
 
 __all__ = [
     "RECURRENCE",
+    "STRUCTURE_SIZES",
     "DenseOutput",
     "Event",
     "EventKind",
@@ -44,6 +46,7 @@ __all__ = [
     "TangentEnsemble",
     "Validity",
     "Wanted",
+    "Where",
     "available_cores",
     "compiled_lanes",
     "contact_pull",

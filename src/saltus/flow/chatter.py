@@ -11,38 +11,41 @@ from __future__ import annotations
 import math
 
 from saltus.flow.contact import contact_accelerations, rate_of
-from saltus.flow.kernel_layout import GAUSS_NODES, GAUSS_WEIGHTS, ORDER, PIECE, SIDE, SIDES, SPEED, TIME
+from saltus.flow.kernel_layout import GAUSS_NODES, GAUSS_WEIGHTS, Function, Where, Work
+from saltus.flow.memory_layout import State
 from saltus.flow.roots import horner
-from saltus.taylor import jit
+from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 
-@jit
+@lean_jit
 def chatter_sums(where, env, model, work, h, x, factor, t, origin):
     """The sums over the sides of g v / abs(a) and v / abs(a), g the damping, for unit speed, at x of a step."""
-    b, order = work[7], where[ORDER]
+    b, order = work[Work.CONTACT], where[Where.ORDER]
     damping, duration = 0.0, 0.0
-    for i in range(where[SIDES]):
+    for i in range(where[Where.SIDES]):
         side = 1.0 - 2.0 * i
         pull = abs(horner(b[i], order, x * h))
-        share = (1.0 if side == where[SIDE] else factor) / pull
-        damping += share * model[3](t + x * h, origin, side, env, where[PIECE])
+        share = (1.0 if side == where[Where.SIDE] else factor) / pull
+        damping += share * model[Function.CONTACT_DAMPING](t + x * h, origin, side, env, where[Where.PIECE])
         duration += share
     return damping, duration
 
 
-@jit
+@lean_jit
 def chatter_decay(where, state, env, model, work, h, origin):
     """Advance the chatter speed over a step: the action, v^2 times the duration sum v_s/abs(a_s), decays as the mean damping."""
-    t, side = state[TIME], float(where[SIDE])
+    t, side = state[State.TIME], float(where[Where.SIDE])
     contact_accelerations(where, env, model, work, t, origin)
-    next_side, after = model[2](t, origin, -state[SPEED] / rate_of(model, side), side, env, where[PIECE])
-    factor = rate_of(model, next_side) * after / state[SPEED]
+    next_side, after = model[Function.RESET](
+        t, origin, -state[State.CHATTER_SPEED] / rate_of(model, side), side, env, where[Where.PIECE]
+    )
+    factor = rate_of(model, next_side) * after / state[State.CHATTER_SPEED]
     decay = 0.0
     for j in range(GAUSS_NODES.size):
         damping, duration = chatter_sums(where, env, model, work, h, GAUSS_NODES[j], factor, t, origin)
         decay += GAUSS_WEIGHTS[j] * h * damping / duration
     _, before = chatter_sums(where, env, model, work, h, 0.0, factor, t, origin)
     _, after_step = chatter_sums(where, env, model, work, h, 1.0, factor, t, origin)
-    state[SPEED] *= (math.exp(-decay) * before / after_step) ** (1.0 / 3.0)
+    state[State.CHATTER_SPEED] *= (math.exp(-decay) * before / after_step) ** (1.0 / 3.0)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from saltus.flow import chatter, contact, event_derivatives, function_types, kernel, kernel_layout, roots, segments, steps
-from saltus.flow.memory_layout import StatePlace
+from saltus.flow.memory_layout import State
 from saltus.taylor import (
     Case,
     Expr,
@@ -39,7 +39,7 @@ _SIGNATURES = f"""import math
 import numpy as np
 
 from saltus.flow.function_types import *
-from saltus.taylor.private_numba import cached_jit, jit
+from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit
 # types of {digest(inspect.getsource(function_types))}
 """
 ENV = {"parameter": ("parameters", 0), "constant": ("constants", 0), "record": ("table", 0)}
@@ -182,8 +182,8 @@ def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: 
 
 
 def _tangent(trace: Trace, known: dict[Expr, int]) -> str:
-    """What each event makes of the tangent's columns, in the kernel's state: `StatePlace` says where they are there."""
-    count, first = len(trace.acceleration), StatePlace.COORDINATES.value
+    """What each event makes of the tangent's columns, in the kernel's state: `State` says where they are there."""
+    count, first = len(trace.acceleration), State.COORDINATES.value
     starts = {"coordinate": first, "velocity": first + count, "shift": first + 2 * count}
     state = {op: ("state", start) for op, start in starts.items()}
     cases = []

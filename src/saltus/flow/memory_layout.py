@@ -36,7 +36,7 @@ class ReleaseDetail(IntEnum):
     AT_NONE = 2  # neither, so that the release has no derivative
 
 
-class StatePlace(IntEnum):
+class State(IntEnum):
     """Places in the array `state` of the scalar kernel.
 
     From COORDINATES on it holds all coordinates, those of the tangent's columns included, then their velocities, then for each
@@ -77,6 +77,8 @@ class LanePart(IntEnum):
     ACCELERATIONS = 13
     MARGINS = 14
 
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
 
 FIRST_PART = 32  # slot: those before it do not depend on the structure
 LOWEST_ORDER, HIGHEST_ORDER = 14, 22  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs

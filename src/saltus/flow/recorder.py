@@ -8,8 +8,8 @@ from typing import Any, overload
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow import kernel_layout as k
 from saltus.flow.dense_output import DenseOutput
+from saltus.flow.kernel_layout import Where
 from saltus.flow.motion import Event, EventKind, Impacts, Samples
 from saltus.flow.validity import Validity, ValidityCheck
 from saltus.systems import System
@@ -91,12 +91,12 @@ class Recorder:
 
     def take(self, where: np.ndarray) -> None:
         """Empty the buffers."""
-        labels, spans, series = (a[: where[k.STEPS]].copy() for a in self.steps)
+        labels, spans, series = (a[: where[Where.STEPS]].copy() for a in self.steps)
         if labels.size:
             self._add(DenseOutput(labels[:, 0] * self._length + spans[:, 0], spans[:, 1], labels[:, 1], series))
-        self._events.append(tuple(a[: where[k.EVENTS]].copy() for a in self.events))
-        self.total += int(where[k.EVENTS])
-        where[k.STEPS] = where[k.EVENTS] = 0
+        self._events.append(tuple(a[: where[Where.EVENTS]].copy() for a in self.events))
+        self.total += int(where[Where.EVENTS])
+        where[Where.STEPS] = where[Where.EVENTS] = 0
 
     def _add(self, piece: DenseOutput) -> None:
         if self._times is None:

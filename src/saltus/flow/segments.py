@@ -11,12 +11,13 @@ import math
 
 import numpy as np
 
-from saltus.flow.contact import rate_of
+from saltus.flow.contact import rate_of, set_state
 from saltus.flow.function_types import IMPACT_EQUATIONS, SEGMENTS
-from saltus.flow.kernel_layout import COLUMNS, DOF, ORDER, OWN, RESET_SLOPES, ROUGHER, ROWS, SIDES, STATE, STEEP, STOPS, TOLERANCE
+from saltus.flow.kernel_layout import ROUGHER, Function, Geometry, Setting, Where, Work
+from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.roots import DEPTH, NARROW, NOISE, horner, newton, scale_gap, split, to_bernstein, variations
-from saltus.flow.steps import column_step, leaps, step_size
-from saltus.taylor import jit
+from saltus.flow.steps import column_step, expand, leaps, move, step_size, work_arrays
+from saltus.taylor import jit, lean_jit
 from saltus.taylor import not_here as cached_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -67,26 +68,26 @@ def roots_within(p, n, roots, noise):
     return found
 
 
-@jit
+@lean_jit
 def look(where, model, work, side, t, h, order, roots, seen):
     """Take in what a step of a segment shows: turning points of the coordinate, minima of the gap and of the margins."""
-    q, v, m, poly = work[0], work[1], work[4], work[6]
+    q, v, m, poly = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.MARGINS], work[Work.POLYNOMIAL]
     seen[TOP], seen[BOTTOM] = max(seen[TOP], q[0, 0]), min(seen[BOTTOM], q[0, 0])
     scale_gap(v[0], 0, order, h, poly)
-    rate = rate_of(model, side) if where[SIDES] > 0 else 1.0
+    rate = rate_of(model, side) if where[Where.SIDES] > 0 else 1.0
     size = 0.0
     for k in range(order + 1):
         size += abs(poly[k])
     for i in range(roots_within(poly, order, roots, NOISE * size)):
         x = horner(q[0], order, roots[i] * h)
         seen[TOP], seen[BOTTOM] = max(seen[TOP], x), min(seen[BOTTOM], x)
-        gap = rate * (x - model[4][0])
+        gap = rate * (x - model[Function.GEOMETRY][Geometry.CONTACT])
         turn = 0.0
         for k in range(order, 0, -1):
             turn = turn * roots[i] + k * poly[k]
-        if where[SIDES] > 0 and rate * turn > 0.0 and gap < seen[HUMP]:
+        if where[Where.SIDES] > 0 and rate * turn > 0.0 and gap < seen[HUMP]:
             seen[HUMP], seen[HUMP_TIME] = gap, t + roots[i] * h
-    for j in range(where[STOPS]):
+    for j in range(where[Where.MARGINS]):
         least, size = min(m[j, 0], horner(m[j], order, h)), abs(m[j, 0])
         for k in range(1, order + 1):
             poly[k - 1] = k * m[j, k] * h**k
@@ -96,51 +97,59 @@ def look(where, model, work, side, t, h, order, roots, seen):
         seen[LEAST_MARGIN + j] = min(seen[LEAST_MARGIN + j], least)
 
 
-@jit
-def start_by_impact(where, state, env, model, t, side, speed):
-    """The state, and the columns for d/d(speed), d/d(start) and the parameters, just after an impact; returns (side, dv+/dt).
-
-    The column of the start lacks what the equation of motion adds to it, see `start_columns`.
-    """
+@lean_jit
+def start_by_impact(where, state, env, model, work, t, side, speed):
+    """The state just after an impact, with the columns for d/d(speed), d/d(start) and the parameters; returns (side, dv+/dt)."""
     inward = -math.copysign(1.0, rate_of(model, side))
-    before = inward * speed
-    for j in range(where[DOF]):
-        state[STATE + j] = state[STATE + where[DOF] + j] = 0.0
-    state[STATE + where[DOF]] = before
-    state[STATE + where[DOF] + 1] = inward
-    next_side, after = model[2](t, 0.0, before, side, env, 0)
-    model[5](RESET_SLOPES, 0, t, 0.0, side, env, 0, state)
-    state[STATE], state[STATE + where[DOF]] = model[4][0], after
-    return next_side, state[STATE + 2 * where[DOF] + 1]
+    coordinates, velocities = State.COORDINATES, State.COORDINATES + where[Where.DOF]
+    for j in range(2 * where[Where.DOF]):
+        state[coordinates + j] = 0.0
+    state[velocities], state[velocities + 1] = inward * speed, inward
+    next_side, after = model[Function.RESET](t, 0.0, inward * speed, side, env, 0)
+    model[Function.TANGENT](EventCode.RESET_SLOPES, 0, t, 0.0, side, env, 0, state)
+    set_state(where, state, model[Function.GEOMETRY][Geometry.CONTACT], after)
+    drift = state[velocities + where[Where.DOF] + 1]
+    expand(where, state, env, model, work, t, 0.0, next_side, 0)
+    state[coordinates + 2] = -state[velocities]  # the column of the start: what the equation of motion adds to it
+    state[velocities + 2] = drift - work[Work.ACCELERATIONS][0, 0]
+    return next_side, drift
 
 
-@jit
-def expand(where, state, env, model, work, t, side, order):
-    """The series of a state at an instant; returns the size of the model's own part."""
-    q, v, a, g, m, w, _, _, _ = work
-    size = 0.0
-    for i in range(where[DOF]):
-        q[i, 0], v[i, 0] = state[STATE + i], state[STATE + where[DOF] + i]
-        if i < where[OWN]:
-            size = max(size, abs(q[i, 0]), abs(v[i, 0]))
-    model[0](t, 0.0, side, env, 0, q, v, a, g, m, w, order)
-    return size
+@lean_jit
+def start_from_state(where, state, env, model, work, t, side, given):
+    """A given state, coordinates first, with the unit columns of its own derivatives."""
+    own, coordinates, velocities = where[Where.OWN], State.COORDINATES, State.COORDINATES + where[Where.DOF]
+    for j in range(2 * where[Where.DOF]):
+        state[coordinates + j] = 0.0
+    for i in range(own):
+        state[coordinates + i], state[velocities + i] = given[i], given[own + i]
+        state[coordinates + own * (1 + i) + i] = state[velocities + own * (1 + own + i) + i] = 1.0
+    expand(where, state, env, model, work, t, 0.0, side, 0)
 
 
-@jit
+@lean_jit
+def segment_step(where, settings, env, model, work, t, end, side, size):
+    """The step, without its sign, that the series of a segment allow."""
+    q, v, a = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.ACCELERATIONS]
+    order, tol = where[Where.ORDER], settings[Setting.TOLERANCE]
+    natural = step_size(v[: where[Where.OWN]], order, size, tol)
+    natural = min(natural, column_step(where, q, v, a, order, ROUGHER * tol))
+    while where[Where.CHECKED] > 0 and end >= t:
+        if not leaps(where, env, model, work, t, 0.0, side, min(natural, end - t), size, tol):
+            break
+        natural = 0.5 * min(natural, end - t)
+    return natural
+
+
+@lean_jit
 def follow(where, state, settings, env, model, work, begin, end, side, looking, roots, seen):
     """Follow one segment. Returns the quotient (x - contact) / duration of its first coordinate, or nan where it fails."""
-    q, v, a = work[0], work[1], work[2]
-    order, t, forwards = where[ORDER], begin, end >= begin
+    q, v = work[Work.POSITIONS], work[Work.VELOCITIES]
+    order, t, forwards = where[Where.ORDER], begin, end >= begin
     quotient = math.nan
     for count in range(MOST_STEPS):
-        size = expand(where, state, env, model, work, t, side, order)
-        natural = step_size(v[: where[OWN]], order, size, settings[TOLERANCE])
-        natural = min(natural, column_step(where, q, v, a, order, ROUGHER * settings[TOLERANCE]))
-        while where[STEEP] > 0 and forwards:
-            if not leaps(where, env, model, work, t, 0.0, min(natural, end - t), size, settings[TOLERANCE]):
-                break
-            natural = 0.5 * min(natural, end - t)
+        size = expand(where, state, env, model, work, t, 0.0, side, order)
+        natural = segment_step(where, settings, env, model, work, t, end, side, size)
         if not natural > 0.0:
             return math.nan
         last = natural >= abs(end - t)
@@ -149,24 +158,26 @@ def follow(where, state, settings, env, model, work, begin, end, side, looking, 
             look(where, model, work, side, t, h, order, roots, seen)
         if count == 0 and last:  # without the cancellation of x - contact where the segment is short
             quotient = horner(q[0, 1:], order - 1, h)
-        for i in range(where[DOF]):
-            state[STATE + i], state[STATE + where[DOF] + i] = horner(q[i], order, h), horner(v[i], order, h)
+        move(where, state, q, v, h)
         if last:
+            x = state[State.COORDINATES]
             if looking:
-                seen[TOP], seen[BOTTOM] = max(seen[TOP], state[STATE]), min(seen[BOTTOM], state[STATE])
-            return quotient if count == 0 else (state[STATE] - model[4][0]) / (end - begin)
+                seen[TOP], seen[BOTTOM] = max(seen[TOP], x), min(seen[BOTTOM], x)
+            return quotient if count == 0 else (x - model[Function.GEOMETRY][Geometry.CONTACT]) / (end - begin)
         t += h
     return math.nan
 
 
-@jit
-def copy_columns(where, state, target, first):
-    """Put the columns of a state into the rows of `target` from `first` on: those of the coordinates, then of the velocities."""
-    own, dof = where[OWN], where[DOF]
-    for j in range(where[COLUMNS]):
-        for i in range(own):
-            target[first + i, j] = state[STATE + own * (1 + j) + i]
-            target[first + own + i, j] = state[STATE + dof + own * (1 + j) + i]
+@lean_jit
+def copy_state(where, state, work, ends, columns, first):
+    """Put coordinates, velocities and accelerations into `ends` from `first` on, and into `columns` the tangent's columns."""
+    own, coordinates, velocities = where[Where.OWN], State.COORDINATES, State.COORDINATES + where[Where.DOF]
+    for i in range(own):
+        ends[first + i], ends[first + own + i] = state[coordinates + i], state[velocities + i]
+        ends[first + 2 * own + i] = work[Work.ACCELERATIONS][i, 0]
+        for j in range(where[Where.COLUMNS]):
+            columns[i, j] = state[coordinates + own * (1 + j) + i]
+            columns[own + i, j] = state[velocities + own * (1 + j) + i]
 
 
 @cached_jit(SEGMENTS)
@@ -174,51 +185,28 @@ def fly_segments(where, settings, env, model, spans, sides, states, ends, column
     """Follow all segments; returns how many of them have succeeded.
 
     A segment's columns are d/d(speed before its impact), d/d(its start) and the parameters, or, started from a state (its
-    coordinates and velocities in `states`), those of `tangent.py`. They stand in `columns` at the end (first the coordinates,
-    then the velocities) and then at the start. With `looks` empty nothing is looked at between the ends.
+    coordinates and velocities in `states`), its derivatives to that state and to the parameters. They stand in `columns` at the
+    end (first the coordinates, then the velocities) and then at the start. With `looks` empty nothing is recorded between.
     """
-    order, dof, own = where[ORDER], where[DOF], where[OWN]
-    work = (
-        np.zeros((dof, order + 2)),
-        np.zeros((dof, order + 2)),
-        np.zeros((dof, order + 2)),
-        np.zeros(order + 2),
-        np.zeros((max(where[STOPS], 1), order + 2)),
-        np.zeros((where[ROWS], order + 6)),
-        np.zeros(order + 2),
-        np.zeros((2, order + 2)),
-        (np.zeros((dof, 2)), np.zeros((dof, 2)), np.zeros((dof, 2)), np.zeros(2), np.zeros((max(where[STOPS], 1), 2))),
-    )
-    state, roots, nothing = np.zeros(STATE + 2 * dof + where[COLUMNS]), np.zeros(order + 2), np.zeros(1)
+    dof, own = where[Where.DOF], where[Where.OWN]
+    work, roots, nothing = work_arrays(where), np.zeros(where[Where.ORDER] + 2), np.zeros(1)
+    state = np.zeros(State.COORDINATES + 2 * dof + where[Where.COLUMNS])
     looking = looks.shape[0] > 0
     for s in range(spans.shape[0]):
         begin, end, side, drift = spans[s, SEGMENT_START], spans[s, SEGMENT_END], float(sides[s, ALONG]), 0.0
         if sides[s, BEFORE] != 0:
-            side, drift = start_by_impact(where, state, env, model, begin, float(sides[s, BEFORE]), spans[s, APPROACH])
-            expand(where, state, env, model, work, begin, side, 0)
-            state[STATE + 2], state[STATE + dof + 2] = -state[STATE + dof], drift - work[2][0, 0]
+            side, drift = start_by_impact(where, state, env, model, work, begin, float(sides[s, BEFORE]), spans[s, APPROACH])
         else:
-            for j in range(2 * dof):
-                state[STATE + j] = 0.0
-            for i in range(own):
-                state[STATE + i], state[STATE + dof + i] = states[s, i], states[s, own + i]
-                state[STATE + own * (1 + i) + i] = state[STATE + dof + own * (1 + own + i) + i] = 1.0
-            expand(where, state, env, model, work, begin, side, 0)
-        for i in range(own):
-            ends[s, KINDS + 3 * own + i], ends[s, KINDS + 4 * own + i] = state[STATE + i], state[STATE + dof + i]
-            ends[s, KINDS + 5 * own + i] = work[2][i, 0]
-        copy_columns(where, state, columns[s], 2 * own)
+            start_from_state(where, state, env, model, work, begin, side, states[s])
+        copy_state(where, state, work, ends[s], columns[s, 2 * own :], KINDS + 3 * own)
         if looking:
             looks[s] = np.inf
             looks[s, TOP] = -np.inf
         seen = looks[s] if looking else nothing
         ends[s, QUOTIENT] = follow(where, state, settings, env, model, work, begin, end, side, looking, roots, seen)
         ends[s, RESET_DRIFT] = drift
-        expand(where, state, env, model, work, end, side, 0)
-        for i in range(own):
-            ends[s, KINDS + i], ends[s, KINDS + own + i] = state[STATE + i], state[STATE + dof + i]
-            ends[s, KINDS + 2 * own + i] = work[2][i, 0]
-        copy_columns(where, state, columns[s], 0)
+        expand(where, state, env, model, work, end, 0.0, side, 0)
+        copy_state(where, state, work, ends[s], columns[s], KINDS)
         if not math.isfinite(ends[s, QUOTIENT]) or not math.isfinite(ends[s, KINDS + 2 * own]):
             return s
     return spans.shape[0]

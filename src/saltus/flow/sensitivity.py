@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.flow import kernel_layout as k
+from saltus.flow.kernel_layout import GrazingDetail
+from saltus.flow.memory_layout import RestDetail
 from saltus.flow.motion import EventKind, Motion
 from saltus.flow.simulation import Followed, follow
 from saltus.flow.stops import Stop
@@ -153,9 +154,9 @@ def _undefined(motion: Motion, columns: np.ndarray) -> str | None:
     for event, detail in zip(reversed(motion.events), motion.events.details[::-1], strict=True):
         if event.kind is EventKind.CHATTER:
             return f"at time {event.time:.9g} impacts without loss became too small to be followed, and their phase is lost"
-        if event.kind is EventKind.GRAZING and detail == k.TRIPLE:
+        if event.kind is EventKind.GRAZING and detail == GrazingDetail.TRIPLE:
             return f"at time {event.time:.9g} the motion meets the contact without speed, where it has no derivative"
-        if event.kind is EventKind.REST and detail == k.NEVER_AGAIN:
+        if event.kind is EventKind.REST and detail == RestDetail.NEVER_AGAIN:
             return (
                 f"from time {event.time:.9g} on it rests at contact and impacts lose nothing, so that a motion from a state "
                 "beside it never comes to rest: there is no derivative to what moves it off the contact"

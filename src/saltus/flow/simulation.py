@@ -11,9 +11,10 @@ import numpy as np
 
 from saltus.checks import check_number
 from saltus.errors import MotionError, ParameterError, near
-from saltus.flow import kernel_layout as k
 from saltus.flow.compiled import Structure, load_kernel, load_structure
 from saltus.flow.forcing_time import clock
+from saltus.flow.kernel_layout import STRUCTURE_SIZES, Mode, Setting, Status, Where
+from saltus.flow.memory_layout import State
 from saltus.flow.motion import Motion
 from saltus.flow.recorder import Recorder
 from saltus.flow.stops import Stop
@@ -155,16 +156,18 @@ def follow(
     run = program(system, limits, sensitivities)
     where, state, settings = _prepare(system, run, position, speeds, periods, duration, float(time), tol)
     sample_times = None if samples is None else _sample_times(samples, float(time))
-    recorder = Recorder(system, int(where[k.ORDER]), float(settings[k.LENGTH]), dense, sample_times, int(where[k.COLUMNS]))
-    where[k.FORCED], where[k.DENSE] = side or 0, int(dense or samples is not None)
+    recorder = Recorder(
+        system, int(where[Where.ORDER]), float(settings[Setting.LENGTH]), dense, sample_times, int(where[Where.COLUMNS])
+    )
+    where[Where.LEAVE_BY], where[Where.DENSE] = side or 0, int(dense or samples is not None)
     status = _advance(system, run, where, state, settings, recorder, progress)
     motion = _collect(system, run, where, state, settings, float(time), status, recorder)
     return Followed(motion, _columns(where, state), recorder.event_shifts())
 
 
 def _columns(where: np.ndarray, state: np.ndarray) -> np.ndarray:
-    own, shape = where[k.OWN], (2, 1 + where[k.COLUMNS], where[k.OWN])
-    both = state[k.STATE : k.STATE + 2 * where[k.DOF]].reshape(shape)
+    own, shape = where[Where.OWN], (2, 1 + where[Where.COLUMNS], where[Where.OWN])
+    both = state[State.COORDINATES : State.COORDINATES + 2 * where[Where.DOF]].reshape(shape)
     columns: np.ndarray = both[:, 1:].transpose(0, 2, 1).reshape(2 * own, -1)
     return columns
 
@@ -225,12 +228,12 @@ def _prepare(
     tol: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The kernel's state at the start: counters, numbers and settings (see `kernel.py`)."""
-    where, state = np.zeros(k.WHERE, dtype=np.int64), _first_state(run, position, speeds)
+    where, state = np.zeros(len(Where), dtype=np.int64), _first_state(run, position, speeds)
     at = clock(time, system.load.period, periods, duration)
-    state[k.TIME] = at.local
-    where[k.PERIOD], where[k.LAST], where[k.ORDER] = int(at.first), int(at.last), taylor_order(tol)
-    where[k.PIECE] = np.searchsorted(run.env[2], time, side="right")
-    where[[k.DOF, k.STOPS, k.ROWS, k.SIDES, k.STEEP, k.OWN, k.COLUMNS]] = run.structure.sizes
+    state[State.TIME] = at.local
+    where[Where.PERIOD], where[Where.LAST_PERIOD], where[Where.ORDER] = int(at.first), int(at.last), taylor_order(tol)
+    where[Where.PIECE] = np.searchsorted(run.env[2], time, side="right")
+    where[STRUCTURE_SIZES] = run.structure.sizes
     _choose_side(system, where, position, speeds)
     return where, state, np.array([at.length, at.end, tol])
 
@@ -263,23 +266,23 @@ def check_gap(model: Model) -> None:
 def _choose_side(system: System, where: np.ndarray, position: np.ndarray, speeds: np.ndarray) -> None:
     """The mode and the side of a state: by the gap, at contact by the velocity, and at rest there by the accelerations."""
     model = system.model
-    where[k.MODE], where[k.SIDE] = k.ARC, 1
+    where[Where.MODE], where[Where.SIDE] = Mode.ARC, 1
     if not model.sides:
         return
     check_gap(model)
     gaps = {s: float(model.gap(position[0], s)) for s in model.sides}
     inside = [s for s, gap in gaps.items() if gap > 0]
     if inside:
-        where[k.SIDE] = inside[0]
+        where[Where.SIDE] = inside[0]
     elif min(gaps.values()) < 0:
         name = model.coordinates[0]
         raise ParameterError(f"{name} = {position[0]:g} lies beyond the contact at {name} = {float(model.contact):g}", name)
     elif speeds[0] == 0.0:
-        where[k.MODE] = k.CONTACT
+        where[Where.MODE] = Mode.CONTACT
     else:
         into = [s for s in model.sides if model.gap(position[0] + np.sign(speeds[0]), s) > 0]
-        where[k.SIDE] = (into or list(model.sides))[0]
-        where[k.MODE] = k.CONTACT if into else k.ARC  # an arc that starts outward at contact begins with its impact
+        where[Where.SIDE] = (into or list(model.sides))[0]
+        where[Where.MODE] = Mode.CONTACT if into else Mode.ARC  # an arc that starts outward at contact begins with its impact
 
 
 def _advance(
@@ -293,8 +296,8 @@ def _advance(
 ) -> int:
     """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended."""
     advance, begin = load_kernel(), _global_time(where, state, settings)
-    end = where[k.LAST] * settings[k.LENGTH] + settings[k.END]
-    looked_at, counted, unit = begin, 0, min(settings[k.LENGTH] or 1.0, 1.0)
+    end = where[Where.LAST_PERIOD] * settings[Setting.LENGTH] + settings[Setting.END]
+    looked_at, counted, unit = begin, 0, min(settings[Setting.LENGTH] or 1.0, 1.0)
     progress(0.0, WHAT)
     while True:
         status = advance(where, state, settings, run.env, run.model, recorder.steps, recorder.events)
@@ -302,7 +305,7 @@ def _advance(
         time = _global_time(where, state, settings)
         if end > begin:
             progress((time - begin) / (end - begin), WHAT)
-        if status not in (k.FULL, k.PAUSED):
+        if status not in (Status.FULL, Status.PAUSED):
             _refuse(system, status, where, state, settings)
             return status
         if recorder.total > counted + MOST_IMPACTS:
@@ -320,30 +323,30 @@ def _advance(
 
 
 def _global_time(where: np.ndarray, state: np.ndarray, settings: np.ndarray) -> float:
-    return float(where[k.PERIOD] * settings[k.LENGTH] + state[k.TIME])
+    return float(where[Where.PERIOD] * settings[Setting.LENGTH] + state[State.TIME])
 
 
 def _refuse(system: System, status: int, where: np.ndarray, state: np.ndarray, settings: np.ndarray) -> None:
     """Turn a status that is not an end into a sentence."""
     at = f"at time {_global_time(where, state, settings):.9g}"
-    velocity = state[k.STATE + where[k.DOF]]
-    if status == k.NOT_UNIQUE:
+    velocity = state[State.COORDINATES + where[Where.DOF]]
+    if status == Status.NOT_UNIQUE:
         raise MotionError(
             f"the motion from rest at contact {at} is not unique: the accelerations of both sides point away from it; "
             "choose one with side=+1 or side=-1"
         )
-    if status == k.NO_IMPACT:
+    if status == Status.NO_IMPACT:
         raise MotionError(
             f"{system.impact!r} has no velocity after the impact {at} with velocity {velocity:.6g} before it: no value of the "
             "sign that leads on meets the law (errata 26; VelocityReduction always has one), or the model's reset leads "
             "back into the contact"
         )
-    if status == k.NOT_FINITE:
+    if status == Status.NOT_FINITE:
         raise MotionError(
             f"the motion leaves the range of numbers {at}; its velocity was last "
             f"{velocity:.6g}; a power or root of the model may have no Taylor series there, such as abs(x)**1.5 at x = 0"
         )
-    if status == k.STALLED:
+    if status == Status.STALLED:
         raise MotionError(f"the steps shrink to nothing {at}: the acceleration is singular there")
 
 
@@ -359,17 +362,17 @@ def _collect(
 ) -> Motion:
     """The motion from the kernel's last state and its records."""
     events, time = recorder.all_events(), _global_time(where, state, settings)
-    held = where[k.MODE] in (k.REST, k.CHATTER)
-    stop, limit = (Stop.REST if where[k.MODE] == k.REST else Stop.HORIZON), None
-    if status == k.LIMITED:
+    held = where[Where.MODE] in (Mode.REST, Mode.CHATTER)
+    stop, limit = (Stop.REST if where[Where.MODE] == Mode.REST else Stop.HORIZON), None
+    if status == Status.LIMITED:
         stop, limit = Stop.LIMIT, run.limits[events.details[-1]]
     dof = len(system.model.coordinates)
-    position, velocity = (state[start : start + dof] for start in (k.STATE, k.STATE + where[k.DOF]))
-    side = 0 if held else int(where[k.SIDE])
+    position, velocity = (state[start : start + dof] for start in (State.COORDINATES, State.COORDINATES + where[Where.DOF]))
+    side = 0 if held else int(where[Where.SIDE])
     samples = recorder.samples(time, position, velocity, side)
     return Motion(
         system=system,
-        tol=float(settings[k.TOLERANCE]),
+        tol=float(settings[Setting.TOLERANCE]),
         start=start,
         time=time,
         position=float(position[0]) if dof == 1 else tuple(position.tolist()),
@@ -377,8 +380,8 @@ def _collect(
         side=side,
         stop=stop,
         limit=limit,
-        chatter_speed=float(state[k.SPEED]) if where[k.MODE] == k.CHATTER else None,
-        periods=int(where[k.PERIOD]),
+        chatter_speed=float(state[State.CHATTER_SPEED]) if where[Where.MODE] == Mode.CHATTER else None,
+        periods=int(where[Where.PERIOD]),
         events=events,
         impacts=events.impacts(),
         dense=recorder.dense(),

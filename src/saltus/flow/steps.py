@@ -9,30 +9,45 @@ import math
 
 import numpy as np
 
-from saltus.flow.kernel_layout import (
-    COLUMNS,
-    DEFECT,
-    DENSE,
-    DOF,
-    EVENTS,
-    GAP,
-    ORDER,
-    OWN,
-    PERIOD,
-    PIECE,
-    SAFETY,
-    SIDE,
-    SMALLEST,
-    STATE,
-    STEPS,
-)
+from saltus.flow.kernel_layout import DEFECT, GAP, SAFETY, SMALLEST, Function, Where
+from saltus.flow.memory_layout import State
 from saltus.flow.roots import horner
-from saltus.taylor import jit
+from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 
 @jit
+def work_arrays(where):
+    """The arrays of a step, in the places of `Work`."""
+    dof, order, margins = where[Where.DOF], where[Where.ORDER], max(where[Where.MARGINS], 1)
+    return (
+        np.zeros((dof, order + 2)),
+        np.zeros((dof, order + 2)),
+        np.zeros((dof, order + 2)),
+        np.zeros(order + 2),
+        np.zeros((margins, order + 2)),
+        np.zeros((where[Where.ROWS], order + 6)),
+        np.zeros(order + 2),
+        np.zeros((2, order + 2)),
+        (np.zeros((dof, 2)), np.zeros((dof, 2)), np.zeros((dof, 2)), np.zeros(2), np.zeros((margins, 2))),
+    )
+
+
+@lean_jit
+def expand(where, state, env, model, work, t, origin, side, order):
+    """Expand the state in its Taylor series at time `t`; returns the size of the model's own part of the state."""
+    q, v, a, g, m, w, _, _, _ = work
+    first_q, first_v, size = State.COORDINATES, State.COORDINATES + where[Where.DOF], 0.0
+    for i in range(where[Where.DOF]):
+        q[i, 0], v[i, 0] = state[first_q + i], state[first_v + i]
+        if i < where[Where.OWN]:
+            size = max(size, abs(q[i, 0]), abs(v[i, 0]))
+    model[Function.SERIES](t, origin, side, env, where[Where.PIECE], q, v, a, g, m, w, order)
+    return size
+
+
+@lean_jit
 def growth(coefficients, first, last, size):
     """The largest log(abs(c_k) / size) / k for first <= k <= last: minus the log of the radius that these terms tell of."""
     largest = -np.inf
@@ -43,7 +58,7 @@ def growth(coefficients, first, last, size):
     return largest
 
 
-@jit
+@lean_jit
 def step_size(coefficients, order, size, tol):
     """h such that the last two terms of the series are below tol, relative to `size`.
 
@@ -59,56 +74,68 @@ def step_size(coefficients, order, size, tol):
     return SAFETY * math.exp(step) if step < 700.0 else np.inf
 
 
-@jit
-def leaps(where, env, model, work, t, origin, h, size, tol):
+@lean_jit
+def leaps(where, env, model, work, t, origin, side, h, size, tol):
     """Whether a step goes past what its series cannot see, such as the bend of a saturated tanh, below rounding from afar.
 
     The acceleration at the end of the step is then not the one that the series gives there.
     """
     q, v, a, _, _, w, _, _, (q_end, v_end, a_end, g_end, m_end) = work
-    order = where[ORDER]
-    for i in range(where[DOF]):
+    order = where[Where.ORDER]
+    for i in range(where[Where.DOF]):
         q_end[i, 0], v_end[i, 0] = horner(q[i], order, h), horner(v[i], order, h)
-    model[0](t + h, origin, float(where[SIDE]), env, where[PIECE], q_end, v_end, a_end, g_end, m_end, w, 0)
+    model[Function.SERIES](t + h, origin, side, env, where[Where.PIECE], q_end, v_end, a_end, g_end, m_end, w, 0)
     defect = 0.0
-    for i in range(where[OWN]):
+    for i in range(where[Where.OWN]):
         defect = max(defect, abs(a_end[i, 0] - horner(a[i], order, h)))
     return defect > DEFECT * tol * max(size, SMALLEST) / h
 
 
-@jit
+@lean_jit
+def move(where, state, q, v, tau):
+    """Take the state at `tau` from the series of a step; returns whether the model's own part of it is finite."""
+    first_q, first_v, order, finite = State.COORDINATES, State.COORDINATES + where[Where.DOF], where[Where.ORDER], True
+    for i in range(where[Where.DOF]):
+        state[first_q + i], state[first_v + i] = horner(q[i], order, tau), horner(v[i], order, tau)
+        if i < where[Where.OWN]:
+            finite = finite and math.isfinite(state[first_q + i]) and math.isfinite(state[first_v + i])
+    return finite
+
+
+@lean_jit
 def record_event(where, events, kind, side, detail, t, before, after):
     """Append an event: (period, kind, side, detail) and (local time, velocity before, velocity after, shifts)."""
     labels, values = events
-    i = where[EVENTS]
-    labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = where[PERIOD], kind, side, detail
+    i = where[Where.EVENTS]
+    labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = where[Where.PERIOD], kind, side, detail
     values[i, 0], values[i, 1], values[i, 2] = t, before, after
-    for j in range(where[COLUMNS]):
+    for j in range(where[Where.COLUMNS]):
         values[i, 3 + j] = math.nan  # unless `record_shift` knows better
-    where[EVENTS] = i + 1
+    where[Where.EVENTS] = i + 1
 
 
-@jit
+@lean_jit
 def record_shift(where, state, events):
     """Note with the last event how its time moves with each column of the tangent, as `tangent` has left it in the state."""
-    for j in range(where[COLUMNS]):
-        events[1][where[EVENTS] - 1, 3 + j] = state[STATE + 2 * where[DOF] + j]
+    for j in range(where[Where.COLUMNS]):
+        events[1][where[Where.EVENTS] - 1, 3 + j] = state[State.COORDINATES + 2 * where[Where.DOF] + j]
 
 
-@jit
+@lean_jit
 def forget(where, state):
     """There is no tangent from here on."""
-    for i in range(where[OWN], where[DOF]):
-        state[STATE + i] = state[STATE + where[DOF] + i] = math.nan
-    for j in range(where[COLUMNS]):
-        state[STATE + 2 * where[DOF] + j] = math.nan
+    coordinates, velocities = State.COORDINATES, State.COORDINATES + where[Where.DOF]
+    for i in range(where[Where.OWN], where[Where.DOF]):
+        state[coordinates + i] = state[velocities + i] = math.nan
+    for j in range(where[Where.COLUMNS]):
+        state[velocities + where[Where.DOF] + j] = math.nan
 
 
-@jit
+@lean_jit
 def column_step(where, q, v, a, order, tol):
     """The longest step that the series of the tangent's columns allow, each relative to its own size."""
-    step, own = np.inf, where[OWN]
-    for first in range(own, where[DOF], own):
+    step, own = np.inf, where[Where.OWN]
+    for first in range(own, where[Where.DOF], own):
         size = 0.0
         for i in range(first, first + own):
             size = max(size, abs(q[i, 0]), abs(v[i, 0]), abs(a[i, 0]))
@@ -117,16 +144,16 @@ def column_step(where, q, v, a, order, tol):
     return step
 
 
-@jit
+@lean_jit
 def record_step(where, steps, side, t, h, q):
     """Append a step of the dense output: where it starts, how long it is, and the coordinates' series."""
-    if where[DENSE] == 0:
+    if where[Where.DENSE] == 0:
         return
     labels, spans, coefficients = steps
-    i = where[STEPS]
-    labels[i, 0], labels[i, 1] = where[PERIOD], side
+    i = where[Where.STEPS]
+    labels[i, 0], labels[i, 1] = where[Where.PERIOD], side
     spans[i, 0], spans[i, 1] = t, h
-    for d in range(where[OWN]):
-        for k in range(where[ORDER] + 2):
+    for d in range(where[Where.OWN]):
+        for k in range(where[Where.ORDER] + 2):
             coefficients[i, d, k] = q[d, k]
-    where[STEPS] = i + 1
+    where[Where.STEPS] = i + 1

@@ -20,8 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.flow import kernel_layout as k
-from saltus.flow import load_segments, program, taylor_order
+from saltus.flow import STRUCTURE_SIZES, Where, load_segments, program, taylor_order
 from saltus.flow import segments as at
 from saltus.orbits.signature import Signature
 from saltus.systems import System, numbers
@@ -107,9 +106,9 @@ class Problem:
         self._values = np.array([value for _, value in numbers(system)])
         self._places = [names.index(path) for path in paths]
         self._frequency = names.index(FREQUENCY)
-        self._where = np.zeros(k.WHERE, dtype=np.int64)
-        self._where[k.ORDER] = taylor_order(tol)
-        self._where[[k.DOF, k.STOPS, k.ROWS, k.SIDES, k.STEEP, k.OWN, k.COLUMNS]] = self._run.structure.sizes
+        self._where = np.zeros(len(Where), dtype=np.int64)
+        self._where[Where.ORDER] = taylor_order(tol)
+        self._where[STRUCTURE_SIZES] = self._run.structure.sizes
         self._settings, self._records = np.array([0.0, 0.0, tol]), record_table(system, [])
 
     @property
@@ -120,7 +119,7 @@ class Problem:
     @property
     def own(self) -> int:
         """Degrees of freedom."""
-        return int(self._where[k.OWN])
+        return int(self._where[Where.OWN])
 
     @property
     def size(self) -> int:
@@ -185,8 +184,8 @@ class Problem:
         parameters[self._places] = values
         env, model = self._run.structure.prepare(parameters, self._records)
         n, own = len(segments.spans), self.own
-        ends, columns = np.zeros((n, at.KINDS + 6 * own)), np.zeros((n, 4 * own, self._where[k.COLUMNS]))
-        looks = np.zeros((n if look else 0, at.LEAST_MARGIN + max(1, self._where[k.STOPS])))
+        ends, columns = np.zeros((n, at.KINDS + 6 * own)), np.zeros((n, 4 * own, self._where[Where.COLUMNS]))
+        looks = np.zeros((n if look else 0, at.LEAST_MARGIN + max(1, self._where[Where.MARGINS])))
         done = load_segments()[0](self._where, self._settings, env, model, *segments, ends, columns, looks)
         return None if done < n else Flown(ends, columns, looks, np.sign(model[4][1:]))
 

@@ -136,6 +136,24 @@ def _store(builder: Any, kinds: Any, array: Array, slot: Any, value: Any) -> Non
     builder.store(value, _slot(builder, array, slot)).align = 8
 
 
+def _lane(builder: Any, array: Array, slot: Any, lane: Any) -> Any:
+    """LLVM's pointer to the number of one lane in a slot."""
+    return builder.gep(array.data, [builder.add(builder.mul(slot, LONG(WIDTH)), lane)])
+
+
+def _get(builder: Any, kinds: Any, array: Array, slot: Any, lane: Any) -> Any:
+    return builder.load(_lane(builder, array, slot, lane))
+
+
+def _put(builder: Any, kinds: Any, array: Array, slot: Any, lane: Any, number: Any) -> None:
+    builder.store(number, _lane(builder, array, slot, lane))
+
+
+def _replace(builder: Any, kinds: Any, array: Array, slot: Any, chosen: Any, value: Any) -> None:
+    new, old = Vec(builder, value, LANES), Vec(builder, _load(builder, kinds, array, slot), LANES)
+    _store(builder, kinds, array, slot, new.select(chosen, old).value)
+
+
 def _select(builder: Any, kinds: Any, chosen: Any, yes: Any, no: Any) -> Any:
     return _lift(builder, kinds[1], yes).select(chosen, _lift(builder, kinds[2], no)).value
 
@@ -158,6 +176,9 @@ def _with_lane(builder: Any, kinds: Any, vector: Any, lane: Any, number: Any) ->
 
 load = inlined(vector_type, _load, 2)  # the vector in a slot of an array
 store = inlined(types.void, _store, 3)  # put a vector into a slot of an array
+replace = inlined(types.void, _replace, 4)  # put a vector into a slot of an array, in the lanes whose mask is set
+get = inlined(types.float64, _get, 3)  # the number of one lane in a slot of an array
+put = inlined(types.void, _put, 4)  # set the number of one lane in a slot of an array
 select = inlined(vector_type, _select, 3)  # of a mask and two vectors: the first where the mask is set, the other one elsewhere
 bits = inlined(types.int64, _bits, 1)  # a mask as an integer: lane i is bit i
 mask = inlined(mask_type, _mask, 1)  # the mask of an integer's bits

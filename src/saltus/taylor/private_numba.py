@@ -190,7 +190,9 @@ def inlined(result: Any, write: Callable[..., Any], count: int) -> Any:
         return intrinsic(lambda typing, a: (result(a), code))
     if count == 2:
         return intrinsic(lambda typing, a, b: (result(a, b), code))
-    return intrinsic(lambda typing, a, b, c: (result(a, b, c), code))
+    if count == 3:
+        return intrinsic(lambda typing, a, b, c: (result(a, b, c), code))
+    return intrinsic(lambda typing, a, b, c, d: (result(a, b, c, d), code))
 
 
 def register_type(kind: type, llvm: Any) -> None:

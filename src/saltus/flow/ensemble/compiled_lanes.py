@@ -10,8 +10,8 @@ from functools import cache
 from types import ModuleType
 from typing import Any
 
+from saltus.flow import contact_side, kernel_layout, memory_layout, roots
 from saltus.flow import function_types as scalar_types
-from saltus.flow import kernel_layout, roots
 from saltus.flow.compiled import kernel_module
 from saltus.flow.ensemble import (
     driver,
@@ -53,7 +53,7 @@ def load_driver() -> Callable[..., None]:
 
 
 def _driver_text() -> str:
-    return _text(kernel_layout, lane_layout, records, lane_steps, sampling, forcing_periods, driver)
+    return _text(memory_layout, kernel_layout, lane_layout, contact_side, records, lane_steps, sampling, forcing_periods, driver)
 
 
 def _text(*modules: ModuleType) -> str:
@@ -74,9 +74,9 @@ def compile_driver_aside() -> subprocess.Popen[bytes] | None:
 
 @cache
 def load_helpers() -> tuple[Any, ...]:
-    """What the driver calls for one lane: `lane_root`, `turning_range` and `visit`."""
+    """What the driver calls for one lane: `lane_root`, `turning_range` and `scalar_motion`."""
     module = load_module("visits", _text(kernel_layout, lane_layout, roots, scalar_fallback, scalar_handoff))
-    return tuple(pointer(getattr(module, name)) for name in ("lane_root", "turning_range", "visit"))
+    return tuple(pointer(getattr(module, name)) for name in ("lane_root", "turning_range", "scalar_motion"))
 
 
 def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
@@ -89,3 +89,17 @@ def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
 def load_advance() -> Any:
     """The scalar kernel, which the driver calls for one lane."""
     return pointer(kernel_module().advance)
+
+
+def compile_everything() -> None:
+    """Compile the driver, its helpers and the scalar kernel, or load them where they are on disk."""
+    load_driver()
+    load_helpers()
+    load_advance()
+
+
+def compile_beside(driver: subprocess.Popen[bytes]) -> None:
+    """Compile what the driver needs while another process compiles the driver, and wait for that."""
+    load_helpers()
+    load_advance()
+    driver.wait()

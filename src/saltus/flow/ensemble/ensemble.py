@@ -10,9 +10,10 @@ import numpy as np
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError, near
-from saltus.flow.ensemble.compiled_lanes import compile_driver_aside, load_advance, load_helpers, load_lane_functions
+from saltus.flow.ensemble.compiled_lanes import compile_beside, compile_driver_aside, load_lane_functions
 from saltus.flow.ensemble.ensemble_dataset import KEPT, Wanted, to_dataset
 from saltus.flow.ensemble.inputs import Inputs, read_inputs
+from saltus.flow.ensemble.lane_layout import JobLabel, JobNumber
 from saltus.flow.ensemble.threads import Jobs, Lanes, available_cores
 from saltus.flow.forcing_time import Clock, clock
 from saltus.flow.simulation import Program, check_gap, limits_of, program
@@ -100,13 +101,12 @@ def simulate_many(
         check_gap(system.model)
     jobs = _jobs(system, run, inputs, periods, duration, side)
     if "rest" in wanted.until:
-        jobs.numbers[:, 3] = _capture(system, inputs.parameters, wanted.limits)
-    spans = jobs.labels[:, 1] - jobs.labels[:, 0]
-    legs = int(np.max(spans + (jobs.numbers[:, 2] > jobs.numbers[:, 0]), initial=1))
-    lanes = compiled_lanes(system, run, wanted, _kept(last, legs))
+        jobs.numbers[:, JobNumber.CAPTURE_SPEED] = _capture(system, inputs.parameters, wanted.limits)
+    spans = jobs.labels[:, JobLabel.LAST_PERIOD] - jobs.labels[:, JobLabel.FIRST_PERIOD]
+    begun = jobs.numbers[:, JobNumber.END_TIME] > jobs.numbers[:, JobNumber.START_TIME]
+    lanes = compiled_lanes(system, run, wanted, _kept(last, int(np.max(spans + begun, initial=1))))
     if aside is not None:
-        load_helpers(), load_advance()
-        aside.wait()
+        compile_beside(aside)
     ends = lanes.run(jobs, threads, progress, total=float(np.sum(spans + 1)))
     return to_dataset(system, inputs, wanted, jobs, ends)
 
@@ -157,12 +157,12 @@ def _names(argument: str, given: Any, known: tuple[str, ...] | None) -> tuple[st
     return names
 
 
-def _kept(last: Any, legs: int) -> int:
+def _kept(last: Any, periods: int) -> int:
     if isinstance(last, str) and last == "all":
-        return legs
+        return periods
     if isinstance(last, bool) or not isinstance(last, (int, np.integer)) or last < 1:
         raise ParameterError(f'last must be a whole number of forcing periods from 1 on, or "all", got {last!r}', "last")
-    return max(1, min(int(last), legs))
+    return max(1, min(int(last), periods))
 
 
 def _side(side: Any) -> int:
@@ -194,7 +194,7 @@ def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> L
         tol=wanted.tol,
         kept=kept if wanted.sample else 1,
         sampled=[c for name in KEPT if name in wanted.sample for c in KEPT[name](own)],
-        watch="extrema" in wanted.sample,
+        extrema="extrema" in wanted.sample,
         settle="settled" in wanted.until,
     )
 
@@ -207,15 +207,16 @@ def _jobs(system: System, run: Program, inputs: Inputs, periods: float | None, d
     known = [path for path, _ in numbers(system)]
     columns = {known.index(path): np.broadcast_to(a, inputs.size) for path, a in inputs.parameters.items()}
     states = _first_states(inputs, len(system.model.coordinates), run.structure.module.COLUMNS)
-    jobs = Jobs(states, np.zeros((inputs.size, 4)), np.zeros((inputs.size, 4), dtype=np.int64), columns)
+    numbers_of, labels = np.zeros((inputs.size, len(JobNumber))), np.zeros((inputs.size, len(JobLabel)), dtype=np.int64)
     time, frequency = inputs.values["time"], inputs.values.get("load.frequency", system.load.frequency)
     length = None if frequency is None else 2.0 * math.pi / np.asarray(frequency, dtype=float)
     at = clock(time, length, periods, duration)
     last, end = _from_the_start(at)
-    jobs.numbers[:, 0], jobs.numbers[:, 1], jobs.numbers[:, 2] = at.local, at.length, end
-    jobs.labels[:, 0], jobs.labels[:, 1], jobs.labels[:, 2] = at.first, last, side
-    jobs.labels[:, 3] = np.searchsorted(run.env[2], time, side="right")
-    return jobs
+    numbers_of[:, JobNumber.START_TIME], numbers_of[:, JobNumber.PERIOD_LENGTH] = at.local, at.length
+    numbers_of[:, JobNumber.END_TIME] = end
+    labels[:, JobLabel.FIRST_PERIOD], labels[:, JobLabel.LAST_PERIOD], labels[:, JobLabel.LEAVE_BY] = at.first, last, side
+    labels[:, JobLabel.PIECE] = np.searchsorted(run.env[2], time, side="right")
+    return Jobs(states, numbers_of, labels, columns)
 
 
 def _from_the_start(at: Clock) -> tuple[Any, Any]:

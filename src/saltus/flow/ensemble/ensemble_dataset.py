@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.flow import kernel_layout as k
-from saltus.flow.ensemble import lane_layout as at
+from saltus.flow.ensemble.lane_layout import EndLabel, EndNumber, JobLabel, JobNumber
+from saltus.flow.kernel_layout import Mode, Status
 from saltus.flow.stops import Stop
 from saltus.provenance import provenance
 from saltus.taylor import FREQUENCY
@@ -29,16 +29,16 @@ KEPT: dict[str, Callable[[int], list[int]]] = {
     "impact_count": lambda own: [2 * own + 3],
 }
 STOPS = {
-    k.DONE: Stop.HORIZON,
-    k.LIMITED: Stop.LIMIT,
-    at.CAPTURED: Stop.CAPTURED,
-    at.SETTLED: Stop.SETTLED,
-    k.NOT_UNIQUE: Stop.NOT_UNIQUE,
-    k.NO_IMPACT: Stop.NO_IMPACT,
-    k.NOT_FINITE: Stop.NOT_FINITE,
-    k.STALLED: Stop.STALLED,
-    at.OUTSIDE: Stop.OUTSIDE,
-    at.UNRESOLVED: Stop.UNRESOLVED,
+    Status.DONE: Stop.HORIZON,
+    Status.LIMITED: Stop.LIMIT,
+    Status.CAPTURED: Stop.CAPTURED,
+    Status.SETTLED: Stop.SETTLED,
+    Status.NOT_UNIQUE: Stop.NOT_UNIQUE,
+    Status.NO_IMPACT: Stop.NO_IMPACT,
+    Status.NOT_FINITE: Stop.NOT_FINITE,
+    Status.STALLED: Stop.STALLED,
+    Status.OUTSIDE: Stop.OUTSIDE,
+    Status.UNRESOLVED: Stop.UNRESOLVED,
 }  # by the driver's reason; a motion that is DONE at rest ends with Stop.REST
 
 # What a dataset has besides the coordinates and velocities of the model and what is called after those.
@@ -118,20 +118,25 @@ def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends) -> None:
     """The states at the end, and what happened until then."""
     rows = jobs.states.shape[1] // 2
     for i, (name, rate) in enumerate(zip(writer.names, writer.rates, strict=True)):
-        unit = writer.units[name]
-        writer.add(name, ends.states[:, i], unit, f"{name} at the end")
-        writer.add(rate, ends.states[:, rows + i], unit, f"d {name} / d tau at the end")
-    lengths, legs = jobs.numbers[:, 1], ends.labels[:, 4] - jobs.labels[:, 0]  # legs that were ended
-    writer.add("time", ends.labels[:, 4] * lengths + ends.numbers[:, 0], "1", "dimensionless time tau at the end")
-    held = (ends.labels[:, 2] == k.REST) | (ends.labels[:, 2] == k.CHATTER)
-    writer.add("side", np.where(held, 0, ends.labels[:, 3]).astype(np.int8), "1", "side at the end, 0 at rest")
-    writer.add("impact_count", ends.labels[:, 5], "1", "impacts")
-    writer.add("grazings", ends.labels[:, 6], "1", "touches of the contact without an impact")
-    if (lengths > 0).all():
-        done = legs + (ends.numbers[:, 0] - jobs.numbers[:, 0]) / lengths
-        writer.add("periods", done, "1", "forcing periods from the start to the end")
+        writer.add(name, ends.states[:, i], writer.units[name], f"{name} at the end")
+        writer.add(rate, ends.states[:, rows + i], writer.units[rate], f"d {name} / d tau at the end")
+    length, local = jobs.numbers[:, JobNumber.PERIOD_LENGTH], ends.numbers[:, EndNumber.TIME]
+    writer.add("time", ends.of(EndLabel.PERIOD) * length + local, "1", "dimensionless time tau at the end")
+    held = np.isin(ends.of(EndLabel.MODE), (Mode.REST, Mode.CHATTER))
+    writer.add("side", np.where(held, 0, ends.of(EndLabel.SIDE)).astype(np.int8), "1", "side at the end, 0 at rest")
+    writer.add("impact_count", ends.of(EndLabel.IMPACTS), "1", "impacts")
+    writer.add("grazings", ends.of(EndLabel.GRAZINGS), "1", "touches of the contact without an impact")
+    if (length > 0).all():
+        part = (local - jobs.numbers[:, JobNumber.START_TIME]) / length
+        writer.add("periods", _periods(jobs, ends) + part, "1", "forcing periods from the start to the end")
     text = "speed of the gap after impacts too small to be followed, else 0"
-    writer.add("chatter_speed", ends.numbers[:, 1], "1", text)
+    writer.add("chatter_speed", ends.numbers[:, EndNumber.CHATTER_SPEED], "1", text)
+
+
+def _periods(jobs: Jobs, ends: Ends) -> np.ndarray:
+    """How many forcing periods later a trajectory ended than it began, by their numbers; (n,)."""
+    periods: np.ndarray = ends.of(EndLabel.PERIOD) - jobs.labels[:, JobLabel.FIRST_PERIOD]
+    return periods
 
 
 def _add_inputs(writer: _Writer, inputs: Inputs) -> dict[str, float]:
@@ -157,18 +162,18 @@ def _is_coordinate(name: str, values: np.ndarray, inputs: Inputs) -> bool:
 
 def _add_stops(writer: _Writer, ends: Ends, wanted: Wanted) -> None:
     """Why each trajectory ended."""
-    reasons, members = ends.labels[:, 0], tuple(Stop)
+    reasons, members = ends.of(EndLabel.STATUS), tuple(Stop)
     codes = np.full(reasons.shape, -1, dtype=np.int8)
     for reason, stop in STOPS.items():
         codes[reasons == reason] = members.index(stop)
-    codes[(reasons == k.DONE) & (ends.labels[:, 2] == k.REST)] = members.index(Stop.REST)
+    codes[(reasons == Status.DONE) & (ends.of(EndLabel.MODE) == Mode.REST)] = members.index(Stop.REST)
     comment = "; ".join(f"{stop}: {stop.meaning}" for stop in Stop)
     writer.add("stop", codes, "1", "why it ended", **_flags(members), comment=comment)
     if wanted.limits:
-        which = np.where(reasons == k.LIMITED, ends.labels[:, 1], -1).astype(np.int8)
+        which = np.where(reasons == Status.LIMITED, ends.of(EndLabel.DETAIL), -1).astype(np.int8)
         writer.add("limit", which, "1", "the margin that ended it, -1 for none", **_flags(wanted.limits))
     if "settled" in wanted.until:
-        period = np.where(reasons == at.SETTLED, ends.labels[:, 1], 0)
+        period = np.where(reasons == Status.SETTLED, ends.of(EndLabel.DETAIL), 0)
         writer.add("recurrence_period", period, "1", "forcing periods after which it repeats itself, 0 where it has not settled")
 
 
@@ -179,8 +184,8 @@ def _flags(names: tuple[str, ...]) -> dict[str, Any]:
 
 def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
     """What was kept of the last forcing periods, in the order of time, nan where there were fewer; and of the whole motion."""
-    kept, done = ends.samples.shape[1], ends.labels[:, 7]
-    order = (done[:, None] + np.arange(kept)) % kept  # the ring's oldest first
+    kept, done = ends.samples.shape[1], ends.of(EndLabel.PERIODS_DONE)
+    order = (done[:, None] + np.arange(kept)) % kept  # the oldest first
     missing = np.arange(kept)[None, :] < (kept - done)[:, None]
     samples = np.take_along_axis(ends.samples, order[:, :, None], axis=1)
     samples[missing] = np.nan
@@ -205,9 +210,9 @@ def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
     if "extrema" in sample:
         for i, which in enumerate(("largest", "smallest")):
             text = f"the {which} {first} from the start to the end"
-            writer.add(f"overall_{which}_{first}", ends.numbers[:, 2 + i], unit, text)
+            writer.add(f"overall_{which}_{first}", ends.numbers[:, EndNumber.HIGHEST + i], unit, text)
     if "speed" in sample:
-        writer.add("overall_least_speed", ends.numbers[:, 4], unit, f"{slowest}, from the start to the end")
+        writer.add("overall_least_speed", ends.numbers[:, EndNumber.LEAST_SPEED], unit, f"{slowest}, from the start to the end")
 
 
 def _add_derivatives(writer: _Writer, jobs: Jobs, ends: Ends, paths: tuple[str, ...], periods: float | None) -> None:
@@ -221,14 +226,18 @@ def _add_derivatives(writer: _Writer, jobs: Jobs, ends: Ends, paths: tuple[str, 
     q = ends.states[:, own:rows].reshape(-1, len(columns), own)
     v = ends.states[:, rows + own :].reshape(-1, len(columns), own)
     derivative = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
-    slope = np.concatenate([ends.states[:, rows : rows + own], ends.numbers[:, 5 : 5 + own]], axis=1)
-    limited = ends.labels[:, 0] == k.LIMITED
+    rates = ends.numbers[:, EndNumber.RATES : EndNumber.RATES + own]
+    shifts = ends.numbers[:, EndNumber.RATES + own :]
+    slope = np.concatenate([ends.states[:, rows : rows + own], rates], axis=1)
+    limited = ends.of(EndLabel.STATUS) == Status.LIMITED
     with np.errstate(invalid="ignore"):  # the instant of a margin met without speed has no derivative
-        derivative[limited] += slope[limited, :, None] * ends.numbers[limited, None, 5 + own :]
+        derivative[limited] += slope[limited, :, None] * shifts[limited, None, :]
     if periods is not None and FREQUENCY in paths:
-        moving = np.isin(ends.labels[:, 0], (k.DONE, at.SETTLED)) & (ends.labels[:, 2] == k.ARC)
-        length = jobs.numbers[:, 1]
-        span = (ends.labels[:, 4] - jobs.labels[:, 0]) * length + (ends.numbers[:, 0] - jobs.numbers[:, 0])
+        at_period_end = np.isin(ends.of(EndLabel.STATUS), (Status.DONE, Status.SETTLED))
+        moving = at_period_end & (ends.of(EndLabel.MODE) == Mode.ARC)
+        length = jobs.numbers[:, JobNumber.PERIOD_LENGTH]
+        local = ends.numbers[:, EndNumber.TIME] - jobs.numbers[:, JobNumber.START_TIME]
+        span = _periods(jobs, ends) * length + local
         shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # of the end, -span / W
         derivative[:, :, columns.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)
     writer.coords |= {"state": ("state", states), "column": ("column", columns)}

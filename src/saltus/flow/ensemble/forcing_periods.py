@@ -1,80 +1,32 @@
 """A trajectory in its lane: how it gets there, goes from one forcing period to the next, and leaves.
 
-`lanes` = (lane, gauge, constants, geometry, ring, streak): for each lane counters and numbers (see `layout.py`), the structure's
-constants and contact, its last states, and how long each cycle has lasted. This text is compiled together with the lanes (see
-`driver.py`).
+This text is compiled together with the lanes (see `driver.py`).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from saltus.flow.contact_side import side_of_state
 from saltus.flow.ensemble.lane_layout import (
-    AFTER_POSITION,
-    AFTER_VELOCITY,
-    AT_CONTACT,
-    AWAKE,
-    BEYOND,
-    BOTTOM,
-    CAPTURE,
-    CHATTER_NOW,
-    COLUMN_COUNT,
-    CONSTANTS_AT,
-    CONSTANTS_CODE,
-    COUNT,
-    END_TIME,
-    ENDED_HIGHEST,
-    ENDED_POSITION,
-    ENDED_SIDE,
-    ENDED_VELOCITY,
-    EVERY_END,
-    FIELD_CODE,
-    FORCED_SIDE,
-    FREE_LEGS,
-    GEOMETRY_CODE,
-    HELD_NOW,
-    HIGHEST,
-    IDENT,
-    IMPACT_COUNT,
-    LAST_KEPT,
-    LAST_LEG,
-    LAST_LOOK,
-    LEAST,
-    LEG,
-    LEG_LENGTH,
-    LEG_START,
-    LEGS_DONE,
-    LOWEST,
-    MODE_NOW,
-    MODEL_ROWS,
     MOST_IMPACTS,
-    NEW_POSITION,
-    NEW_TIME,
-    NEXT_LOOK,
-    NOW,
-    ORIGIN,
-    OUTSIDE,
-    PARAMETERS,
-    PARKED,
-    PIECE_NOW,
-    POINT,
-    POSITION,
-    SETTLE,
-    SETTLED,
-    SIDE_NOW,
-    SIDED,
-    SKIP_NOW,
-    SLOWEST,
-    TARGET,
-    TOP,
-    TOUCHES,
-    VELOCITY,
-    WALL,
+    Code,
+    EndLabel,
+    EndNumber,
+    Flag,
+    JobLabel,
+    JobNumber,
+    LaneArray,
+    LaneLabel,
+    LaneNumber,
+    Size,
+    Slot,
 )
-from saltus.flow.ensemble.lane_steps import sizes_rows
-from saltus.flow.ensemble.sampling import LONGEST_CYCLE, cycle_length
-from saltus.flow.kernel_layout import ARC, CHATTER, CONTACT, DONE, PAUSED
-from saltus.taylor import WIDTH, inline_jit, lean_jit, load, store
+from saltus.flow.ensemble.lane_steps import row_count
+from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE, recurrence_period
+from saltus.flow.kernel_layout import Mode, Status
+from saltus.flow.memory_layout import LanePart
+from saltus.taylor import get, inline_jit, lean_jit, load, put, store
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -83,238 +35,248 @@ from saltus.taylor import WIDTH, inline_jit, lean_jit, load, store
 def fill(lane, i, code, sizes, at, m, flags, lanes, jobs, tables):
     """Put trajectory i into a lane."""
     state, numbers, labels, parameters = jobs
-    where, gauge, constants, geometry, _, streak = lanes
-    where[lane, IDENT], where[lane, LAST_LEG] = i, labels[i, 1]
-    where[lane, FORCED_SIDE], where[lane, PIECE_NOW] = labels[i, 2], labels[i, 3]
-    where[lane, HELD_NOW] = where[lane, SKIP_NOW] = where[lane, TOUCHES] = 0
-    gauge[lane, END_TIME], gauge[lane, CHATTER_NOW] = numbers[i, 2], 0.0
-    streak[lane, :] = 0
+    label, number, constants, geometry, _, agreements = lanes
+    label[lane, LaneLabel.TRAJECTORY], label[lane, LaneLabel.LAST_PERIOD] = i, labels[i, JobLabel.LAST_PERIOD]
+    label[lane, LaneLabel.LEAVE_BY], label[lane, LaneLabel.PIECE] = labels[i, JobLabel.LEAVE_BY], labels[i, JobLabel.PIECE]
+    label[lane, LaneLabel.HELD] = label[lane, LaneLabel.SKIP] = label[lane, LaneLabel.GRAZINGS] = 0
+    number[lane, LaneNumber.END_TIME], number[lane, LaneNumber.CHATTER_SPEED] = numbers[i, JobNumber.END_TIME], 0.0
+    agreements[lane, :] = 0
     env = (parameters[i], constants[lane], tables[0], tables[1])
-    code[CONSTANTS_CODE](parameters[i], constants[lane])
-    code[GEOMETRY_CODE](env, geometry[lane])
+    code[Code.CONSTANTS](parameters[i], constants[lane])
+    code[Code.GEOMETRY](env, geometry[lane])
     half = state.shape[1] // 2
-    for row in range(half):
-        m[(at[POSITION] + row) * WIDTH + lane], m[(at[VELOCITY] + row) * WIDTH + lane] = state[i, row], state[i, half + row]
-    for j in range(parameters.shape[1]):
-        m[(at[PARAMETERS] + j) * WIDTH + lane] = parameters[i, j]
-    for j in range(constants.shape[1]):
-        m[(at[CONSTANTS_AT] + j) * WIDTH + lane] = constants[lane, j]
-    for j in range(3):
-        m[(POINT + j) * WIDTH + lane] = geometry[lane, j]
-    m[NOW * WIDTH + lane] = m[LEG_START * WIDTH + lane] = numbers[i, 0]
-    m[LEG_LENGTH * WIDTH + lane], m[CAPTURE * WIDTH + lane] = numbers[i, 1], numbers[i, 3]
-    m[LEG * WIDTH + lane], m[LEGS_DONE * WIDTH + lane] = float(labels[i, 0]), 0.0
-    m[TOP * WIDTH + lane], m[BOTTOM * WIDTH + lane], m[SLOWEST * WIDTH + lane], m[COUNT * WIDTH + lane] = (
-        -np.inf,
-        np.inf,
-        np.inf,
-        0.0,
-    )
-    m[NEXT_LOOK * WIDTH + lane], m[LAST_LOOK * WIDTH + lane] = MOST_IMPACTS, numbers[i, 0]
+    put_all(m, at[LanePart.POSITION], lane, state[i, :half])
+    put_all(m, at[LanePart.VELOCITY], lane, state[i, half:])
+    put_all(m, at[LanePart.PARAMETERS], lane, parameters[i])
+    put_all(m, at[LanePart.CONSTANTS], lane, constants[lane])
+    put_all(m, Slot.CONTACT, lane, geometry[lane])
+    begin_time(lane, m, numbers[i], labels[i])
+    begin_overall(lane, m)
     begin_records(lane, at, m)
+    mode, side = side_of_state(sizes[Size.SIDES], state[i, 0], state[i, half], geometry[lane])
+    label[lane, LaneLabel.MODE] = mode
+    put(m, Slot.SIDE, lane, float(side))
     bit = 1 << lane
-    flags[AWAKE] |= bit
-    flags[AT_CONTACT] &= ~bit
-    where[lane, MODE_NOW], side = begin_mode(sizes[SIDED], state[i, 0], state[i, half], geometry[lane])
-    m[SIDE_NOW * WIDTH + lane] = float(side)
-    flags[PARKED] = flags[PARKED] & ~bit if where[lane, MODE_NOW] == ARC else flags[PARKED] | bit
-    begin_leg(lane, sizes, m, lanes, tables)
+    flags[Flag.BUSY] |= bit
+    flags[Flag.AT_CONTACT] &= ~bit
+    flags[Flag.SCALAR] = flags[Flag.SCALAR] & ~bit if mode == Mode.ARC else flags[Flag.SCALAR] | bit
+    begin_period(lane, sizes, m, lanes, tables)
 
 
 @lean_jit
-def begin_mode(sides, position, velocity, geometry):
-    """The mode and the side of a state, as `simulation.py` chooses them; the mode BEYOND is no state of the model."""
-    if sides == 0:
-        return ARC, 1
-    into, open_side, pressed = 0, 0, False
-    for i in range(sides):
-        side, rate = 1 - 2 * i, geometry[1 + i]
-        gap = rate * (position - geometry[0])
-        if gap > 0.0 and open_side == 0:
-            open_side = side
-        pressed = pressed or gap < 0.0
-        if rate * velocity > 0.0 and into == 0:
-            into = side
-    if open_side != 0:
-        return ARC, open_side
-    if pressed:
-        return BEYOND, 1
-    if velocity == 0.0:
-        return CONTACT, 1
-    return (CONTACT, into) if into != 0 else (ARC, 1)
-
-
-@lean_jit
-def unresolved(lane, m):
-    """Whether the last MOST_IMPACTS impacts took less than a unit of time, or than a shorter forcing period."""
-    now, length = m[NOW * WIDTH + lane], m[LEG_LENGTH * WIDTH + lane]
-    since, m[LAST_LOOK * WIDTH + lane] = m[LAST_LOOK * WIDTH + lane], now
-    m[NEXT_LOOK * WIDTH + lane] += MOST_IMPACTS
-    return now - since < (min(length, 1.0) if length > 0.0 else 1.0)
+def put_all(m, first, lane, values):
+    """Put numbers into the slots of one lane from `first` on."""
+    for j in range(values.size):
+        put(m, first + j, lane, values[j])
 
 
 @inline_jit
-def leg_end(lane, m, lanes):
-    """The local time at which a leg ends: a forcing period after it began, or with the motion."""
-    where, gauge = lanes[0], lanes[1]
-    if int(m[LEG * WIDTH + lane]) == where[lane, LAST_LEG]:
-        return gauge[lane, END_TIME]
-    return m[LEG_START * WIDTH + lane] + m[LEG_LENGTH * WIDTH + lane]
+def begin_time(lane, m, numbers, labels):
+    """Set the forcing period and the time at which a trajectory starts."""
+    start = numbers[JobNumber.START_TIME]
+    put(m, Slot.NOW, lane, start)
+    put(m, Slot.PERIOD_START, lane, start)
+    put(m, Slot.PERIOD_LENGTH, lane, numbers[JobNumber.PERIOD_LENGTH])
+    put(m, Slot.CAPTURE_SPEED, lane, numbers[JobNumber.CAPTURE_SPEED])
+    put(m, Slot.PERIOD, lane, float(labels[JobLabel.FIRST_PERIOD]))
+    put(m, Slot.PERIODS_DONE, lane, 0.0)
+    put(m, Slot.NEXT_CHECK, lane, MOST_IMPACTS)
+    put(m, Slot.LAST_CHECK, lane, start)
 
 
 @inline_jit
-def begin_leg(lane, sizes, m, lanes, tables):
-    """Set where a lane's leg ends and where a step must: there, only if the motion ends in this leg or the next one.
-
-    The records' breakpoints end both. A step may go one leg further, not two.
-    """
-    where, breaks = lanes[0], tables[0]
-    leg, last, length = int(m[LEG * WIDTH + lane]), where[lane, LAST_LEG], m[LEG_LENGTH * WIDTH + lane]
-    origin, target = leg * length, leg_end(lane, m, lanes)
-    wall = target + length if leg + 1 < last else target
-    piece = where[lane, PIECE_NOW]
-    while piece < breaks.size and breaks[piece] - origin <= m[NOW * WIDTH + lane]:
-        piece += 1
-    where[lane, PIECE_NOW] = piece
-    m[FREE_LEGS * WIDTH + lane] = -np.inf if piece < breaks.size or sizes[EVERY_END] > 0 else float(last - 2)
-    if piece < breaks.size:
-        wall = min(wall, breaks[piece] - origin)
-    m[ORIGIN * WIDTH + lane], m[TARGET * WIDTH + lane], m[WALL * WIDTH + lane] = origin, min(target, wall), wall
+def begin_overall(lane, m):
+    """Start what is recorded of the whole trajectory."""
+    put(m, Slot.OVERALL_HIGHEST, lane, -np.inf)
+    put(m, Slot.OVERALL_LOWEST, lane, np.inf)
+    put(m, Slot.OVERALL_LEAST_SPEED, lane, np.inf)
+    put(m, Slot.OVERALL_IMPACTS, lane, 0.0)
 
 
 @inline_jit
 def begin_records(lane, at, m):
     """Start what is recorded of a forcing period, with the position at its beginning."""
-    x = m[at[POSITION] * WIDTH + lane]
-    m[HIGHEST * WIDTH + lane], m[LOWEST * WIDTH + lane] = x, x
-    m[LEAST * WIDTH + lane], m[IMPACT_COUNT * WIDTH + lane] = np.inf, 0.0
+    x = get(m, at[LanePart.POSITION], lane)
+    put(m, Slot.HIGHEST, lane, x)
+    put(m, Slot.LOWEST, lane, x)
+    put(m, Slot.LEAST_SPEED, lane, np.inf)
+    put(m, Slot.IMPACTS, lane, 0.0)
+
+
+@lean_jit
+def unresolved(lane, m):
+    """Whether the last MOST_IMPACTS impacts took less than a unit of time, or than a shorter forcing period."""
+    now, length = get(m, Slot.NOW, lane), get(m, Slot.PERIOD_LENGTH, lane)
+    since = get(m, Slot.LAST_CHECK, lane)
+    put(m, Slot.LAST_CHECK, lane, now)
+    put(m, Slot.NEXT_CHECK, lane, get(m, Slot.NEXT_CHECK, lane) + MOST_IMPACTS)
+    return now - since < (min(length, 1.0) if length > 0.0 else 1.0)
+
+
+@inline_jit
+def period_end(lane, m, lanes):
+    """The local time at which a forcing period of a trajectory ends: one period after it began, or with the motion."""
+    if int(get(m, Slot.PERIOD, lane)) == lanes[LaneArray.LABELS][lane, LaneLabel.LAST_PERIOD]:
+        return lanes[LaneArray.NUMBERS][lane, LaneNumber.END_TIME]
+    return get(m, Slot.PERIOD_START, lane) + get(m, Slot.PERIOD_LENGTH, lane)
+
+
+@inline_jit
+def begin_period(lane, sizes, m, lanes, tables):
+    """Set where the forcing period of a lane ends, and beyond which time no step goes.
+
+    That is one period later, so that a step may go past the end of the period, or the end of the motion if that comes earlier.
+    The records' breakpoints end both.
+    """
+    labels, breaks = lanes[LaneArray.LABELS], tables[0]
+    period, last, length = int(get(m, Slot.PERIOD, lane)), labels[lane, LaneLabel.LAST_PERIOD], get(m, Slot.PERIOD_LENGTH, lane)
+    origin, end = period * length, period_end(lane, m, lanes)
+    limit = end + length if period + 1 < last else end
+    piece = labels[lane, LaneLabel.PIECE]
+    while piece < breaks.size and breaks[piece] - origin <= get(m, Slot.NOW, lane):
+        piece += 1
+    labels[lane, LaneLabel.PIECE] = piece
+    each = piece < breaks.size or sizes[Size.EVERY_END] > 0
+    put(m, Slot.PASSED_TOGETHER, lane, -np.inf if each else float(last - 2))
+    if piece < breaks.size:
+        limit = min(limit, breaks[piece] - origin)
+    put(m, Slot.ORIGIN, lane, origin)
+    put(m, Slot.PERIOD_END, lane, min(end, limit))
+    put(m, Slot.STEP_LIMIT, lane, limit)
 
 
 @inline_jit
 def end_here(lane, at, m):
-    """Take what a lane is now for the end of its leg (compare `observe.pass_ends`)."""
-    count = sizes_rows(at)
-    for row in range(2 * count):  # positions, then velocities, lie one behind the other
-        m[(at[ENDED_POSITION] + row) * WIDTH + lane] = m[(at[POSITION] + row) * WIDTH + lane]
-    m[ENDED_SIDE * WIDTH + lane] = m[SIDE_NOW * WIDTH + lane]
+    """Take the state of a lane for that at the end of its forcing period (compare `sampling.pass_ends`)."""
+    for row in range(2 * row_count(at)):  # positions, then velocities, lie one behind the other
+        put(m, at[LanePart.ENDED_POSITION] + row, lane, get(m, at[LanePart.POSITION] + row, lane))
+    put(m, Slot.ENDED_SIDE, lane, get(m, Slot.SIDE, lane))
     for j in range(4):
-        m[(ENDED_HIGHEST + j) * WIDTH + lane] = m[(HIGHEST + j) * WIDTH + lane]
+        put(m, Slot.ENDED_HIGHEST + j, lane, get(m, Slot.HIGHEST + j, lane))
     total_up(lane, m)
-    m[NEXT_LOOK * WIDTH + lane] -= m[IMPACT_COUNT * WIDTH + lane]
-    m[LEGS_DONE * WIDTH + lane] += 1.0
+    put(m, Slot.NEXT_CHECK, lane, get(m, Slot.NEXT_CHECK, lane) - get(m, Slot.IMPACTS, lane))
+    put(m, Slot.PERIODS_DONE, lane, get(m, Slot.PERIODS_DONE, lane) + 1.0)
     begin_records(lane, at, m)
 
 
 @inline_jit
 def go_back(lane, at, m, t):
-    """Have a lane be what it was at the end of its leg, at time t."""
-    count = sizes_rows(at)
-    for row in range(2 * count):
-        m[(at[POSITION] + row) * WIDTH + lane] = m[(at[ENDED_POSITION] + row) * WIDTH + lane]
-    m[SIDE_NOW * WIDTH + lane], m[NOW * WIDTH + lane] = m[ENDED_SIDE * WIDTH + lane], t
+    """Put a lane back to the end of its last forcing period, at time t."""
+    for row in range(2 * row_count(at)):
+        put(m, at[LanePart.POSITION] + row, lane, get(m, at[LanePart.ENDED_POSITION] + row, lane))
+    put(m, Slot.SIDE, lane, get(m, Slot.ENDED_SIDE, lane))
+    put(m, Slot.NOW, lane, t)
     begin_records(lane, at, m)
 
 
 @inline_jit
 def keep_sample(lane, sizes, at, m, lanes, results):
-    """Keep the state at the end of the last leg and what happened in it, in the ring of the last samples."""
-    own, done = sizes[MODEL_ROWS], int(m[LEGS_DONE * WIDTH + lane])
-    row = results[3][lanes[0][lane, IDENT], (done - 1) % sizes[LAST_KEPT]]
+    """Keep the state at the end of the last forcing period and what happened in it, in place of the oldest sample."""
+    own, done = sizes[Size.OWN], int(get(m, Slot.PERIODS_DONE, lane))
+    row = results[3][lanes[LaneArray.LABELS][lane, LaneLabel.TRAJECTORY], (done - 1) % sizes[Size.KEPT]]
     for d in range(own):
-        row[d], row[own + d] = m[(at[ENDED_POSITION] + d) * WIDTH + lane], m[(at[ENDED_VELOCITY] + d) * WIDTH + lane]
+        row[d], row[own + d] = get(m, at[LanePart.ENDED_POSITION] + d, lane), get(m, at[LanePart.ENDED_VELOCITY] + d, lane)
     for j in range(4):
-        row[2 * own + j] = m[(ENDED_HIGHEST + j) * WIDTH + lane]
+        row[2 * own + j] = get(m, Slot.ENDED_HIGHEST + j, lane)
 
 
 @inline_jit
-def end_leg(lane, sizes, at, m, lanes, results):
-    """Keep a leg that is over; the length of the cycle that the trajectory has settled on, or 0."""
-    where, gauge, _, _, ring, streak = lanes
-    if sizes[EVERY_END] > 0:
+def end_period(lane, sizes, at, m, lanes, results):
+    """Keep a forcing period that is over; returns the period with which the trajectory repeats itself, or 0."""
+    labels, numbers, _, _, states, agreements = lanes
+    if sizes[Size.EVERY_END] > 0:
         keep_sample(lane, sizes, at, m, lanes, results)
-    if sizes[SETTLE] == 0:
+    if sizes[Size.SETTLE] == 0:
         return 0
-    legs, own = int(m[LEGS_DONE * WIDTH + lane]), sizes[MODEL_ROWS]
-    here = legs % (2 * LONGEST_CYCLE)
+    done, own = int(get(m, Slot.PERIODS_DONE, lane)), sizes[Size.OWN]
+    state = states[lane, done % (2 * LONGEST_RECURRENCE)]
     for d in range(own):
-        ring[lane, here, d], ring[lane, here, own + d] = (
-            m[(at[ENDED_POSITION] + d) * WIDTH + lane],
-            m[(at[ENDED_VELOCITY] + d) * WIDTH + lane],
-        )
-    if where[lane, MODE_NOW] == CHATTER:
-        ring[lane, here, own] = gauge[lane, CHATTER_NOW]
-    return cycle_length(ring[lane], streak[lane], legs, own)
+        state[d] = get(m, at[LanePart.ENDED_POSITION] + d, lane)
+        state[own + d] = get(m, at[LanePart.ENDED_VELOCITY] + d, lane)
+    if labels[lane, LaneLabel.MODE] == Mode.CHATTER:
+        state[own] = numbers[lane, LaneNumber.CHATTER_SPEED]
+    return recurrence_period(states[lane], agreements[lane], done, own)
 
 
 @inline_jit
 def total_up(lane, m):
-    """Add what was recorded of a leg to what is recorded of the trajectory."""
-    m[COUNT * WIDTH + lane] += m[IMPACT_COUNT * WIDTH + lane]
-    m[TOP * WIDTH + lane] = max(m[TOP * WIDTH + lane], m[HIGHEST * WIDTH + lane])
-    m[BOTTOM * WIDTH + lane] = min(m[BOTTOM * WIDTH + lane], m[LOWEST * WIDTH + lane])
-    m[SLOWEST * WIDTH + lane] = min(m[SLOWEST * WIDTH + lane], m[LEAST * WIDTH + lane])
+    """Add what was recorded of a forcing period to what is recorded of the trajectory."""
+    put(m, Slot.OVERALL_IMPACTS, lane, get(m, Slot.OVERALL_IMPACTS, lane) + get(m, Slot.IMPACTS, lane))
+    put(m, Slot.OVERALL_HIGHEST, lane, max(get(m, Slot.OVERALL_HIGHEST, lane), get(m, Slot.HIGHEST, lane)))
+    put(m, Slot.OVERALL_LOWEST, lane, min(get(m, Slot.OVERALL_LOWEST, lane), get(m, Slot.LOWEST, lane)))
+    put(m, Slot.OVERALL_LEAST_SPEED, lane, min(get(m, Slot.OVERALL_LEAST_SPEED, lane), get(m, Slot.LEAST_SPEED, lane)))
 
 
 @inline_jit
 def arrive(lane, past, sizes, at, m, lanes, tables, results):
-    """At the end of a leg, or `past` it, or at a breakpoint: go on.
+    """At the end of a forcing period, or `past` it, or at a breakpoint: go on.
 
-    Returns DONE, SETTLED, or PAUSED, and the length of the cycle.
+    Returns DONE, SETTLED, or PAUSED, and the period with which the trajectory repeats itself.
     """
-    where = lanes[0]
-    leg, now, start = int(m[LEG * WIDTH + lane]), m[NOW * WIDTH + lane], m[LEG_START * WIDTH + lane]
-    last, t_end = leg == where[lane, LAST_LEG], leg_end(lane, m, lanes)
+    period, now, start = int(get(m, Slot.PERIOD, lane)), get(m, Slot.NOW, lane), get(m, Slot.PERIOD_START, lane)
+    last, t_end = period == lanes[LaneArray.LABELS][lane, LaneLabel.LAST_PERIOD], period_end(lane, m, lanes)
     if now >= t_end:
-        if last and t_end <= start and m[LEGS_DONE * WIDTH + lane] > 0.0:  # the end of whole periods: there is nothing to record
-            return DONE, 0
+        done = get(m, Slot.PERIODS_DONE, lane)
+        if last and t_end <= start and done > 0.0:  # the last period has no length, so there is nothing to record
+            return Status.DONE, 0
         if past:
-            m[LEGS_DONE * WIDTH + lane] += 1.0
+            put(m, Slot.PERIODS_DONE, lane, done + 1.0)
         else:
             end_here(lane, at, m)
-        cycle = end_leg(lane, sizes, at, m, lanes, results)
+        recurrence = end_period(lane, sizes, at, m, lanes, results)
         if last:
-            return DONE, 0
-        if cycle > 0:
+            return Status.DONE, 0
+        if recurrence > 0:
             go_back(lane, at, m, t_end)
-            return SETTLED, cycle
-        m[LEG * WIDTH + lane] = leg + 1.0
-        m[NOW * WIDTH + lane] = start + (now - t_end)
-        m[LAST_LOOK * WIDTH + lane] += start - t_end
-    begin_leg(lane, sizes, m, lanes, tables)
-    return PAUSED, 0
+            return Status.SETTLED, recurrence
+        put(m, Slot.PERIOD, lane, period + 1.0)
+        put(m, Slot.NOW, lane, start + (now - t_end))
+        put(m, Slot.LAST_CHECK, lane, get(m, Slot.LAST_CHECK, lane) + (start - t_end))
+    begin_period(lane, sizes, m, lanes, tables)
+    return Status.PAUSED, 0
 
 
 @lean_jit
-def finish(lane, reason, detail, code, sizes, at, m, flags, lanes, results):
+def finish(lane, status, detail, code, sizes, at, m, flags, lanes, results):
     """Write the end of a lane's trajectory; the lane is free."""
-    where, gauge = lanes[0], lanes[1]
-    state, numbers, labels, _ = results
-    i, half = where[lane, IDENT], state.shape[1] // 2
-    none = m[LEGS_DONE * WIDTH + lane] == 0.0
-    part = m[NOW * WIDTH + lane] > m[LEG_START * WIDTH + lane] or m[IMPACT_COUNT * WIDTH + lane] > 0.0 or none
-    if part and reason != DONE and reason != SETTLED and reason != OUTSIDE:  # it ends within a leg
+    labels = lanes[LaneArray.LABELS]
+    state, numbers, ends, _ = results
+    i, half = labels[lane, LaneLabel.TRAJECTORY], state.shape[1] // 2
+    none = get(m, Slot.PERIODS_DONE, lane) == 0.0
+    part = get(m, Slot.NOW, lane) > get(m, Slot.PERIOD_START, lane) or get(m, Slot.IMPACTS, lane) > 0.0 or none
+    if part and status != Status.DONE and status != Status.SETTLED and status != Status.OUTSIDE:  # within a forcing period
         end_here(lane, at, m)
     else:
         total_up(lane, m)
-    if m[LEGS_DONE * WIDTH + lane] > 0.0:
+    if get(m, Slot.PERIODS_DONE, lane) > 0.0:
         keep_sample(lane, sizes, at, m, lanes, results)
     for row in range(half):
-        state[i, row], state[i, half + row] = m[(at[POSITION] + row) * WIDTH + lane], m[(at[VELOCITY] + row) * WIDTH + lane]
-    numbers[i, 0], numbers[i, 1] = m[NOW * WIDTH + lane], gauge[lane, CHATTER_NOW]
+        state[i, row] = get(m, at[LanePart.POSITION] + row, lane)
+        state[i, half + row] = get(m, at[LanePart.VELOCITY] + row, lane)
+    numbers[i, EndNumber.TIME] = get(m, Slot.NOW, lane)
+    numbers[i, EndNumber.CHATTER_SPEED] = lanes[LaneArray.NUMBERS][lane, LaneNumber.CHATTER_SPEED]
     for j in range(3):
-        numbers[i, 2 + j] = m[(TOP + j) * WIDTH + lane]
-    if sizes[COLUMN_COUNT] > 0 and where[lane, MODE_NOW] == ARC:  # how fast the state changes at the end
-        store(m, NEW_TIME, load(m, NOW))
-        for row in range(2 * sizes_rows(at)):
-            store(m, at[NEW_POSITION] + row, load(m, at[POSITION] + row))
-        code[FIELD_CODE](m)
-        for row in range(sizes[MODEL_ROWS]):
-            numbers[i, 5 + row] = m[(at[AFTER_VELOCITY] + row) * WIDTH + lane]
-        for j in range(sizes[COLUMN_COUNT]):
-            numbers[i, 5 + sizes[MODEL_ROWS] + j] = m[(at[AFTER_POSITION] + j) * WIDTH + lane]
-    labels[i, 0], labels[i, 1], labels[i, 2] = reason, detail, where[lane, MODE_NOW]
-    labels[i, 3], labels[i, 4] = int(m[SIDE_NOW * WIDTH + lane]), int(m[LEG * WIDTH + lane])
-    labels[i, 5], labels[i, 6] = int(m[COUNT * WIDTH + lane]), where[lane, TOUCHES]
-    labels[i, 7] = int(m[LEGS_DONE * WIDTH + lane])
-    flags[AWAKE] &= ~(1 << lane)
-    flags[PARKED] &= ~(1 << lane)
+        numbers[i, EndNumber.HIGHEST + j] = get(m, Slot.OVERALL_HIGHEST + j, lane)
+    if sizes[Size.COLUMNS] > 0 and labels[lane, LaneLabel.MODE] == Mode.ARC:
+        write_rates(lane, i, code, sizes, at, m, numbers)
+    ends[i, EndLabel.STATUS], ends[i, EndLabel.DETAIL], ends[i, EndLabel.MODE] = status, detail, labels[lane, LaneLabel.MODE]
+    ends[i, EndLabel.SIDE], ends[i, EndLabel.PERIOD] = int(get(m, Slot.SIDE, lane)), int(get(m, Slot.PERIOD, lane))
+    ends[i, EndLabel.IMPACTS] = int(get(m, Slot.OVERALL_IMPACTS, lane))
+    ends[i, EndLabel.GRAZINGS] = labels[lane, LaneLabel.GRAZINGS]
+    ends[i, EndLabel.PERIODS_DONE] = int(get(m, Slot.PERIODS_DONE, lane))
+    flags[Flag.BUSY] &= ~(1 << lane)
+    flags[Flag.SCALAR] &= ~(1 << lane)
+
+
+@lean_jit
+def write_rates(lane, i, code, sizes, at, m, numbers):
+    """Write how fast the velocities change at the end, and how the time of the last event moves with each column."""
+    store(m, Slot.NEW_TIME, load(m, Slot.NOW))
+    for row in range(2 * row_count(at)):
+        store(m, at[LanePart.NEW_POSITION] + row, load(m, at[LanePart.POSITION] + row))
+    code[Code.FIELD](m)
+    own = sizes[Size.OWN]
+    for row in range(own):
+        numbers[i, EndNumber.RATES + row] = get(m, at[LanePart.AFTER_VELOCITY] + row, lane)
+    for j in range(sizes[Size.COLUMNS]):
+        numbers[i, EndNumber.RATES + own + j] = get(m, at[LanePart.AFTER_POSITION] + j, lane)

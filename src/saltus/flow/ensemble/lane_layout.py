@@ -1,50 +1,189 @@
 """Where things lie in the memory of a group of lanes, and in the arrays that come with it.
 
-This text is compiled together with the lanes (see `driver.py`).
+The memory `m` consists of slots of one vector, with a number for each lane. Its first slots are those of `Slot`; behind them come
+the parts of `LanePart`, as many slots as the structure needs, each part from the slot on that the array `at` lists. Members of
+the enumerations become plain numbers in the compiled text (see `compiled_part`).
 """
 
 from __future__ import annotations
 
+from enum import IntEnum
+
+from saltus.flow.memory_layout import LaneSlot
+
+
+class Slot(IntEnum):
+    """The slots that every structure has."""
+
+    NOW = LaneSlot.NOW
+    ORIGIN = LaneSlot.ORIGIN
+    SIDE = LaneSlot.SIDE
+    NEW_TIME = LaneSlot.NEW_TIME
+    NEW_SIDE = LaneSlot.NEW_SIDE
+    PERIOD_END = 5  # the time at which the forcing period, or the motion, ends
+    CONTACT = 6  # the coordinate there; this slot and the next two are those of `Geometry`
+    RATE_UP = 7
+    RATE_DOWN = 8
+    CAPTURE_SPEED = 9  # a lower speed of the gap after an impact is proved to be captured
+    HIGHEST = 10  # coordinate since the forcing period began, and so on to IMPACTS
+    LOWEST = 11
+    LEAST_SPEED = 12  # before an impact
+    IMPACTS = 13
+    ENDED_HIGHEST = 14  # the same four for the last forcing period that has ended, and the side at its end
+    ENDED_LOWEST = 15
+    ENDED_LEAST_SPEED = 16
+    ENDED_IMPACTS = 17
+    ENDED_SIDE = 18
+    OVERALL_HIGHEST = 19  # the same four from the start to the end of the last forcing period that has ended
+    OVERALL_LOWEST = 20
+    OVERALL_LEAST_SPEED = 21
+    OVERALL_IMPACTS = 22
+    STEP_LIMIT = 23  # the time that no step goes beyond; it may lie beyond PERIOD_END
+    PERIOD = 24  # number of the forcing period
+    PERIOD_START = 25  # time at which the trajectory began within its first forcing period: all of its periods begin there
+    PERIOD_LENGTH = 26
+    PERIODS_DONE = 27
+    PASSED_TOGETHER = 28  # forcing periods below this number are ended for all lanes at once
+    NEXT_CHECK = 29  # the number of impacts at which it is checked next that they do not accumulate without end
+    LAST_CHECK = 30  # the time at which that was last checked
+
+
+class Size(IntEnum):
+    """Places in the array `sizes`: numbers of a structure and of a call."""
+
+    OWN = 0  # the model's own coordinates
+    COLUMNS = 1  # of the tangent
+    MARGINS = 2
+    SIDES = 3
+    CHECKED = 4  # whether steps are checked, as in `Where.CHECKED`
+    RECORDS = 5
+    ORDER = 6  # of the lanes' series
+    SCALAR_ORDER = 7
+    WORKSPACE = 8  # rows, of the scalar kernel
+    KEPT = 9  # of how many of the last forcing periods something is kept
+    EXTREMA = 10  # whether they are recorded
+    SETTLE = 11  # whether a trajectory ends when it repeats itself
+    ENDS_ASKED = 12  # whether the ends of forcing periods are asked for at all
+    EVERY_END = 13  # whether each of them is looked at
+
+
+class LaneSetting(IntEnum):
+    """Places in the array `settings` of the lanes."""
+
+    TOLERANCE = 0
+    SHORTEST_STEP = 1
+    SLOWEST_IMPACT = 2  # of the gap: what is slower is left to the scalar kernel
+
+
+class LaneArray(IntEnum):
+    """Places in the tuple `lanes` of arrays that have a row for each lane."""
+
+    LABELS = 0  # see `LaneLabel`
+    NUMBERS = 1  # see `LaneNumber`
+    CONSTANTS = 2  # of the structure
+    GEOMETRY = 3  # of its contact
+    STATES = 4  # the last stroboscopic states, of which the oldest is overwritten
+    AGREEMENTS = 5  # for each q, how many states in a row agreed with those q forcing periods before
+
+
+class LaneLabel(IntEnum):
+    """Places in a lane's row of LABELS."""
+
+    TRAJECTORY = 0  # its row in the jobs
+    LAST_PERIOD = 1
+    PIECE = 2
+    MODE = 3
+    HELD = 4
+    SKIP = 5
+    LEAVE_BY = 6
+    GRAZINGS = 7
+
+
+class LaneNumber(IntEnum):
+    """Places in a lane's row of NUMBERS."""
+
+    END_TIME = 0  # of the motion, within its last forcing period
+    CHATTER_SPEED = 1
+
+
+class Flag(IntEnum):
+    """Places in the array `flags` of bits, one for each lane."""
+
+    BUSY = 0  # it holds a trajectory
+    AT_CONTACT = 1  # its arc starts at the contact
+    SCALAR = 2  # it is not on an arc, so the scalar kernel moves it
+
+
+class Helper(IntEnum):
+    """Places in the tuple `helpers`: what is done for one lane at a time."""
+
+    FIRST_ROOT = 0
+    TURNING_RANGE = 1
+    SCALAR_MOTION = 2
+
+
+class Code(IntEnum):
+    """Places in the tuple `code`: the functions of a structure."""
+
+    SERIES = 0
+    IMPACT = 1
+    FIELD = 2
+    CONSTANTS = 3
+    GEOMETRY = 4
+
+
+class JobArray(IntEnum):
+    """Places in the tuple `jobs` of arrays that have a row for each trajectory."""
+
+    STATES = 0
+    NUMBERS = 1  # see `JobNumber`
+    LABELS = 2  # see `JobLabel`
+    PARAMETERS = 3
+
+
+class JobNumber(IntEnum):
+    """Columns of the jobs' numbers."""
+
+    START_TIME = 0  # within the first forcing period
+    PERIOD_LENGTH = 1
+    END_TIME = 2  # within the last forcing period
+    CAPTURE_SPEED = 3
+
+
+class JobLabel(IntEnum):
+    """Columns of the jobs' labels."""
+
+    FIRST_PERIOD = 0
+    LAST_PERIOD = 1
+    LEAVE_BY = 2
+    PIECE = 3
+
+
+class EndNumber(IntEnum):
+    """Columns of the results' numbers; behind them lie the rates of the velocities and the shifts of the last event."""
+
+    TIME = 0
+    CHATTER_SPEED = 1
+    HIGHEST = 2
+    LOWEST = 3
+    LEAST_SPEED = 4
+    RATES = 5
+
+
+class EndLabel(IntEnum):
+    """Columns of the results' labels."""
+
+    STATUS = 0
+    DETAIL = 1  # the period of a recurrence, or the margin that was reached
+    MODE = 2
+    SIDE = 3
+    PERIOD = 4
+    IMPACTS = 5
+    GRAZINGS = 6
+    PERIODS_DONE = 7
+
+
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-# Slots of one vector: the state of each lane, what its step proposes, its contact, what is recorded of its leg, and its clock.
-NOW, ORIGIN, SIDE_NOW, NEW_TIME, NEW_SIDE, TARGET = 0, 1, 2, 3, 4, 5
-POINT, RATE_UP, RATE_DOWN, CAPTURE = 6, 7, 8, 9
-HIGHEST, LOWEST, LEAST, IMPACT_COUNT = 10, 11, 12, 13  # since the leg began
-ENDED_HIGHEST, ENDED_LOWEST, ENDED_LEAST, ENDED_IMPACT_COUNT, ENDED_SIDE = 14, 15, 16, 17, 18  # when the last leg ended
-TOP, BOTTOM, SLOWEST, COUNT = 19, 20, 21, 22  # from the start to the end of the last leg
-WALL = 23  # the time that no step goes beyond; it may go beyond the end of a leg, TARGET
-LEG, LEG_START, LEG_LENGTH, LEGS_DONE = 24, 25, 26, 27  # which forcing period, from what local time on, how long; how many ended
-FREE_LEGS = 28  # legs below this one are ended for all lanes at once
-NEXT_LOOK, LAST_LOOK = 29, 30  # at this many impacts of a leg the clock is looked at, as it was at that time
-# Then, from the slots that `at` lists, as many as the structure needs.
-POSITION, VELOCITY, NEW_POSITION, NEW_VELOCITY, AFTER_POSITION, AFTER_VELOCITY = 0, 1, 2, 3, 4, 5
-ENDED_POSITION, ENDED_VELOCITY = 6, 7
-PARAMETERS, CONSTANTS_AT, RECORDS, POSITIONS, VELOCITIES, ACCELERATIONS, MARGINS = 8, 9, 10, 11, 12, 13, 14
-
-LOWEST_ORDER, HIGHEST_ORDER = 14, 22  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
-STRIDE = HIGHEST_ORDER + 1  # slots of one series
-
-# Numbers of a structure and of a call, in `sizes`.
-MODEL_ROWS, COLUMN_COUNT, STOP_ROWS, SIDED, BENDS, RECORD_ROWS = 0, 1, 2, 3, 4, 5
-LANE_ORDER, SCALAR_ORDER, WORKSPACE, LAST_KEPT, WATCH, SETTLE, ENDS_ASKED, EVERY_END = 6, 7, 8, 9, 10, 11, 12, 13
-
-SHORTEST_STEP, SLOWEST_IMPACT = 3, 4  # in `settings`, after those of `layout.py`
-SETTINGS, SIZES = 5, 14  # the lengths of `settings` and `sizes`
-
-# For each lane: in `lane`, and in `gauge`.
-IDENT, LAST_LEG, PIECE_NOW, MODE_NOW, HELD_NOW, SKIP_NOW, FORCED_SIDE, TOUCHES = 0, 1, 2, 3, 4, 5, 6, 7
-LANE_LABELS = 8  # the length of a row of `lane`
-END_TIME, CHATTER_NOW = 0, 1
-GAUGES = 2  # and of `gauge`
-
-AWAKE, AT_CONTACT, PARKED = 0, 1, 2  # in `flags`: bits of the lanes that hold a trajectory, that start at contact, not in an arc
-ROOT_ALONE, TURNS_ALONE, VISIT_ALONE = 0, 1, 2  # in `helpers`: what is done for one lane at a time
-SERIES_CODE, IMPACT_CODE, FIELD_CODE, CONSTANTS_CODE, GEOMETRY_CODE = 0, 1, 2, 3, 4  # in `code`: the functions of a structure
-
-# Why a trajectory ended, after the reasons of `layout.py` (DONE, NOT_UNIQUE, NO_IMPACT, NOT_FINITE, STALLED, LIMITED).
-CAPTURED, SETTLED, OUTSIDE, UNRESOLVED = 9, 10, 11, 12
-BEYOND = 4  # a mode after those of `flow/kernel_layout.py`: on no side of the contact
-
-MOST_IMPACTS = 1e6  # of a unit of time, or of a shorter forcing period: beyond, an accumulation is not resolved but endured
+MOST_IMPACTS = 1e6  # of a unit of time, or of a shorter forcing period: more are an accumulation that is not being resolved
 NO_ROOT, TOUCH = -1.0, -2.0  # instead of the time of a lane's root

@@ -9,22 +9,9 @@ import math
 
 import numpy as np
 
-from saltus.flow.ensemble.lane_layout import (
-    ACCELERATIONS,
-    AFTER_VELOCITY,
-    COLUMN_COUNT,
-    FIELD_CODE,
-    LANE_ORDER,
-    MARGINS,
-    MODEL_ROWS,
-    POSITION,
-    POSITIONS,
-    STOP_ROWS,
-    STRIDE,
-    VELOCITIES,
-    VELOCITY,
-)
+from saltus.flow.ensemble.lane_layout import Code, Size
 from saltus.flow.kernel_layout import DEFECT, SMALLEST
+from saltus.flow.memory_layout import SERIES_LENGTH, LanePart
 from saltus.taylor import (
     ALL,
     WIDTH,
@@ -54,9 +41,9 @@ NEARLY = 1e-5  # of the time, and of the slope: a shorter move leads to the root
 
 
 @lean_jit
-def sizes_rows(at):
+def row_count(at):
     """How many coordinates there are, those of the sensitivities included."""
-    return at[VELOCITY] - at[POSITION]
+    return at[LanePart.VELOCITY] - at[LanePart.POSITION]
 
 
 @lean_jit
@@ -77,13 +64,15 @@ def natural_step(m, at, sizes, limits):
 
     `limits` are `step_limits` of the rows, and of the columns.
     """
-    rows, size = sizes[MODEL_ROWS], splat(SMALLEST)
+    rows, size = sizes[Size.OWN], splat(SMALLEST)
     for row in range(rows):
-        size = maximum(size, maximum(absolute(load(m, at[POSITION] + row)), absolute(load(m, at[VELOCITY] + row))))
-    step = row_step(m, at[VELOCITIES], sizes[LANE_ORDER], size, limits[0])
+        size = maximum(
+            size, maximum(absolute(load(m, at[LanePart.POSITION] + row)), absolute(load(m, at[LanePart.VELOCITY] + row)))
+        )
+    step = row_step(m, at[LanePart.VELOCITIES], sizes[Size.ORDER], size, limits[0])
     for row in range(1, rows):
-        step = minimum(step, row_step(m, at[VELOCITIES] + row * STRIDE, sizes[LANE_ORDER], size, limits[0]))
-    for first in range(rows, rows * (1 + sizes[COLUMN_COUNT]), rows):
+        step = minimum(step, row_step(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH, sizes[Size.ORDER], size, limits[0]))
+    for first in range(rows, rows * (1 + sizes[Size.COLUMNS]), rows):
         step = minimum(step, column_step(m, at, sizes, first, limits[1]))
     return step, size
 
@@ -92,11 +81,13 @@ def natural_step(m, at, sizes, limits):
 def column_step(m, at, sizes, first, limits):
     """The step that the series of a column of the tangent allows, relative to its own size (`steps.column_step`)."""
     size, step = splat(ZERO_TERM), splat(np.inf)
-    for row in range(first, first + sizes[MODEL_ROWS]):
-        size = maximum(size, maximum(absolute(load(m, at[POSITION] + row)), absolute(load(m, at[VELOCITY] + row))))
-        size = maximum(size, absolute(load(m, at[VELOCITIES] + row * STRIDE + 1)))
-    for row in range(first, first + sizes[MODEL_ROWS]):
-        step = minimum(step, row_step(m, at[VELOCITIES] + row * STRIDE, sizes[LANE_ORDER], size, limits))
+    for row in range(first, first + sizes[Size.OWN]):
+        size = maximum(
+            size, maximum(absolute(load(m, at[LanePart.POSITION] + row)), absolute(load(m, at[LanePart.VELOCITY] + row)))
+        )
+        size = maximum(size, absolute(load(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH + 1)))
+    for row in range(first, first + sizes[Size.OWN]):
+        step = minimum(step, row_step(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH, sizes[Size.ORDER], size, limits))
     return step
 
 
@@ -140,7 +131,7 @@ def sweep(m, at, order, start, h):
 
     B bounds how far the second derivative in u = t/h strays from that of the cubic q_0 + ... + q_3 h^3 u^3.
     """
-    positions, velocities, accelerations = at[POSITIONS], at[VELOCITIES], at[ACCELERATIONS]
+    positions, velocities, accelerations = at[LanePart.POSITIONS], at[LanePart.VELOCITIES], at[LanePart.ACCELERATIONS]
     x, v, a = load(m, positions + order), load(m, velocities + order), load(m, accelerations + order - 1)
     bend = absolute(a)
     x, v = fma(x, h, load(m, positions + order - 1)), fma(v, h, load(m, velocities + order - 1))
@@ -156,7 +147,7 @@ def sweep(m, at, order, start, h):
 @inline_jit
 def motion_at(m, at, order, start, h):
     """Position from `start` on, velocity, acceleration, and half its rate of change, at h."""
-    positions, velocities = at[POSITIONS], at[VELOCITIES]
+    positions, velocities = at[LanePart.POSITIONS], at[LanePart.VELOCITIES]
     x, v, a, jerk = load(m, positions + order), load(m, velocities + order), splat(0.0), splat(0.0)
     for k in range(order - 1, 0, -1):
         jerk, a = fma(jerk, h, a), fma(a, h, v)
@@ -183,12 +174,13 @@ def both_at(m, positions, velocities, order, start, h):
 
 
 @inline_jit
-def shape(g0, g1, g2, g3, bend, skip):
+def shape(cubic, bend, skip):
     """What is certain of a gap p0 + p1 u + p2 u^2 + p3 u^3 + ..., u in [0, 1], beyond its cubic bounded by B (see `sweep`).
 
     Returns bits of the lanes in which it has no root (where `skip` is set: but the one at 0), in which it falls, and in which
     it is concave, or convex; by the Bernstein coefficients of the cubic, of its derivative, or of the gap over u.
     """
+    g0, g1, g2, g3 = cubic
     rest = bend * (1.0 / 12.0)
     end = g0 + g1 + g2 + g3
     low = minimum(minimum(g0, g0 + g1 * (1.0 / 3.0)), minimum(g0 + (2.0 * g1 + g2) * (1.0 / 3.0), end))
@@ -207,12 +199,13 @@ def root_move(value, inverse, second, third):
 
 
 @inline_jit
-def first_guess(g0, g1, g2, g3, f, slope, pull):
+def first_guess(cubic, f, slope, pull):
     """The root d in [0, 1], counted back from the end, of the sextic with these values and derivatives at both ends.
 
     Scaled to a step of 1: g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start; f, its slope, and half its curvature `pull` at the end.
     One move from the root of the parabola at the end.
     """
+    g0, g1, g2, g3 = cubic
     a, b, c = g0 - f + slope - pull, g1 - slope + 2.0 * pull, g2 - pull  # what the parabola lacks at the start
     c3, c4 = 20.0 * a + 10.0 * b + 4.0 * c + g3, -45.0 * a - 25.0 * b - 11.0 * c - 3.0 * g3
     c5, c6 = 36.0 * a + 21.0 * b + 10.0 * c + 3.0 * g3, -10.0 * a - 6.0 * b - 3.0 * c - g3
@@ -235,13 +228,14 @@ def first_guess(g0, g1, g2, g3, f, slope, pull):
 
 
 @inline_jit
-def only_root(m, at, order, h, start, sign, g0, g1, g2, g3, x, v, a, chosen):
+def only_root(m, at, order, h, start, sign, cubic, end, chosen):
     """The root in (0, h] of gaps that have one there, not negative at 0 (if zero, then growing) and negative at h.
 
     Moves as in `root_move` from `first_guess`, with bisection where one leaves the bracket; `sign` is 1 or -1. A lane stays where
     it has converged, whatever the others do. Returns the root and the velocity there.
     """
-    d = first_guess(g0, g1, g2, g3, sign * x, sign * v * h, 0.5 * sign * a * (h * h))
+    x, v, a = end
+    d = first_guess(cubic, sign * x, sign * v * h, 0.5 * sign * a * (h * h))
     low, high, tau = splat(0.0), h, h - d * h
     tau = select(mask(bits(tau > 0.0) & bits(tau <= h)), tau, 0.5 * h)  # the guess may have gone astray
     speed, active = v, chosen
@@ -276,10 +270,10 @@ def lane_value(m, series, order, lane, t):
 def margins_certain(m, at, sizes, h):
     """Bits of the lanes in which every margin stays positive over the step for certain."""
     sure = ALL
-    for stop in range(sizes[STOP_ROWS]):
-        series = at[MARGINS] + stop * STRIDE
+    for stop in range(sizes[Size.MARGINS]):
+        series = at[LanePart.MARGINS] + stop * SERIES_LENGTH
         rest = splat(0.0)
-        for k in range(sizes[LANE_ORDER] - 1, 0, -1):
+        for k in range(sizes[Size.ORDER] - 1, 0, -1):
             rest = fma(rest, h, absolute(load(m, series + k)))
         sure &= bits(load(m, series) > rest * h)
     return sure
@@ -291,11 +285,11 @@ def series_true(code, m, at, sizes, tol, h, size):
 
     The new state must be in place. See `steps.leaps`.
     """
-    code[FIELD_CODE](m)
+    code[Code.FIELD](m)
     defect = splat(0.0)
-    for row in range(sizes[MODEL_ROWS]):
-        series, slope = at[ACCELERATIONS] + row * STRIDE, splat(0.0)
-        for k in range(sizes[LANE_ORDER] - 1, -1, -1):
+    for row in range(sizes[Size.OWN]):
+        series, slope = at[LanePart.ACCELERATIONS] + row * SERIES_LENGTH, splat(0.0)
+        for k in range(sizes[Size.ORDER] - 1, -1, -1):
             slope = fma(slope, h, load(m, series + k))
-        defect = maximum(defect, absolute(load(m, at[AFTER_VELOCITY] + row) - slope))
+        defect = maximum(defect, absolute(load(m, at[LanePart.AFTER_VELOCITY] + row) - slope))
     return bits(defect * h <= (DEFECT * tol) * size)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from saltus.flow.ensemble.function_types import LANE_ROOT, TURNING_RANGE
 from saltus.flow.ensemble.lane_layout import NO_ROOT, TOUCH
 from saltus.flow.roots import SIMPLE, first_root, horner, scale_gap
-from saltus.taylor import WIDTH, lean_jit
+from saltus.taylor import get, lean_jit
 from saltus.taylor import not_here as cached_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -21,7 +21,7 @@ MOST_TURNS = 16  # turning points within one step that are looked for
 def lane_root(m, series, order, lane, h, sign, g0, skip, poly, gap):
     """The first root of one lane's gap by `roots.first_root`: its time, NO_ROOT, or TOUCH where it touches zero before."""
     for k in range(order + 1):
-        gap[k] = sign * m[(series + k) * WIDTH + lane]
+        gap[k] = sign * get(m, series + k, lane)
     gap[0] = g0
     scale_gap(gap, skip, order, h, poly)
     kind, u, touch = first_root(poly, order - skip)
@@ -31,7 +31,7 @@ def lane_root(m, series, order, lane, h, sign, g0, skip, poly, gap):
 
 
 @lean_jit
-def move(p, n, u):
+def shift_start(p, n, u):
     """Replace p(s) by p(u + (1 - u) s)."""
     for k in range(n):
         for j in range(n - 1, k - 1, -1):
@@ -52,7 +52,7 @@ def turning_range(q, order, begin, h, p):
         power *= h
     start, left = begin / h, 1.0 - begin / h
     if begin > 0.0:
-        move(p, n, start)
+        shift_start(p, n, start)
     for _ in range(MOST_TURNS):
         while n > 0 and p[0] == 0.0:
             for k in range(n):
@@ -67,6 +67,6 @@ def turning_range(q, order, begin, h, p):
         start, left = start + u * left, (1.0 - u) * left
         x = horner(q, order, start * h)
         high, low = max(high, x), min(low, x)
-        move(p, n, u)
+        shift_start(p, n, u)
         p[0] = 0.0
     return high, low

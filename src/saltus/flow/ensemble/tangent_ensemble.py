@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from saltus.flow import kernel_layout as k
-from saltus.flow.ensemble.compiled_lanes import load_advance, load_driver, load_helpers
+from saltus.flow.ensemble.compiled_lanes import compile_everything
 from saltus.flow.ensemble.ensemble import compiled_lanes
 from saltus.flow.ensemble.ensemble_dataset import Wanted
+from saltus.flow.ensemble.lane_layout import EndLabel, JobLabel, JobNumber
 from saltus.flow.ensemble.threads import Jobs
+from saltus.flow.kernel_layout import Mode, Status
 from saltus.flow.simulation import limits_of, program
 from saltus.systems import System
 
@@ -32,15 +33,16 @@ class TangentEnsemble:
         self._lanes = compiled_lanes(system, program(system, limits, ()), wanted, 1)
         self._columns = {places.index(path): values for path, values in parameters.items()}
         self._lengths = lengths
-        load_driver(), load_helpers(), load_advance()  # compiled here, not by each thread that advances some of the motions
+        compile_everything()  # here, not in each thread that advances some of the motions
 
     def advance(self, rows: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Advanced:
         """Advance the motions of these numbers between two local times of a forcing period, (n,) each, on this thread.
 
         A state holds coordinate, its two derivatives, velocity, its two: (n, 6).
         """
-        numbers, labels = np.zeros((rows.size, 4)), np.zeros((rows.size, 4), dtype=np.int64)
-        numbers[:, 0], numbers[:, 1], numbers[:, 2] = begin, self._lengths[rows], end
+        numbers, labels = np.zeros((rows.size, len(JobNumber))), np.zeros((rows.size, len(JobLabel)), dtype=np.int64)
+        numbers[:, JobNumber.START_TIME], numbers[:, JobNumber.END_TIME] = begin, end
+        numbers[:, JobNumber.PERIOD_LENGTH] = self._lengths[rows]
         ends = self._lanes.run(Jobs(states, numbers, labels, {c: values[rows] for c, values in self._columns.items()}), 1)
-        done = (ends.labels[:, 0] == k.DONE) & (ends.labels[:, 2] != k.CHATTER)
+        done = (ends.of(EndLabel.STATUS) == Status.DONE) & (ends.of(EndLabel.MODE) != Mode.CHATTER)
         return Advanced(ends.states, done & np.isfinite(ends.states).all(axis=1))

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import kernel_layout as k
-from saltus.flow.ensemble import lane_layout as at
-from saltus.flow.ensemble.compiled_lanes import load_advance, load_driver, load_helpers
+from saltus.flow.ensemble.compiled_lanes import compile_everything, load_advance, load_driver, load_helpers
 from saltus.flow.ensemble.lane_functions import Slots
+from saltus.flow.ensemble.lane_layout import EndLabel, EndNumber, Size
+from saltus.flow.kernel_layout import CHATTER_SPEED, SHORTEST, SLOW
 from saltus.flow.simulation import Program, taylor_order
 from saltus.progress import Progress, silent
 from saltus.taylor import CACHE_LINE, WIDTH, pointer
@@ -27,13 +27,11 @@ PATIENCE = 0.1  # seconds between looks at Ctrl-C and at the progress
 
 @dataclass(frozen=True)
 class Jobs:
-    """Trajectories to run, an array with a row for each; see `fill` of `legs.py` for the columns."""
+    """Trajectories to run, an array with a row for each."""
 
     states: np.ndarray  # (n, 2 coordinates): coordinates, then velocities
-    numbers: (
-        np.ndarray
-    )  # (n, 4): local time at the start, forcing period, local time at the end, speed below which it is captured
-    labels: np.ndarray  # (n, 4): first and last forcing period, side to leave by, piece of the records
+    numbers: np.ndarray  # (n, len(JobNumber))
+    labels: np.ndarray  # (n, len(JobLabel))
     columns: dict[int, np.ndarray]  # by the parameter's place, (n,)
 
     def __len__(self) -> int:
@@ -42,12 +40,17 @@ class Jobs:
 
 @dataclass(frozen=True)
 class Ends:
-    """How the trajectories ended; see `finish` and `keep_sample` of `legs.py` for the columns."""
+    """How the trajectories ended, an array with a row for each."""
 
     states: np.ndarray  # (n, 2 coordinates)
-    numbers: np.ndarray  # (n, 5 + own coordinates + columns of the tangent)
-    labels: np.ndarray  # (n, 8)
+    numbers: np.ndarray  # (n, EndNumber.RATES + own coordinates + columns of the tangent)
+    labels: np.ndarray  # (n, len(EndLabel))
     samples: np.ndarray  # (n, kept, columns asked for)
+
+    def of(self, label: EndLabel) -> np.ndarray:
+        """One of the labels of every trajectory, (n,)."""
+        column: np.ndarray = self.labels[:, label]
+        return column
 
 
 def available_cores() -> int:
@@ -67,8 +70,8 @@ class Lanes:
     tol: float
     kept: int  # how many of the last forcing periods are kept
     sampled: list[int]  # which columns of a sample are
-    watch: bool  # whether extrema are recorded
-    settle: bool  # whether a trajectory ends when it has settled on a cycle
+    extrema: bool  # whether they are recorded
+    settle: bool  # whether a trajectory ends when it repeats itself
 
     def run(self, jobs: Jobs, threads: int, progress: Progress = silent, total: float = 0.0) -> Ends:
         """Run all jobs; `total` is how many forcing periods they are, for the progress.
@@ -79,13 +82,13 @@ class Lanes:
         n, own = len(jobs), self.own
         ends = Ends(
             np.empty((n, jobs.states.shape[1])),
-            np.zeros((n, 5 + own + self.program.structure.module.COLUMNS)),
-            np.empty((n, 8), dtype=np.int64),
+            np.zeros((n, EndNumber.RATES + own + self.program.structure.module.COLUMNS)),
+            np.empty((n, len(EndLabel)), dtype=np.int64),
             np.empty((n, self.kept, len(self.sampled))),
         )
         controls = [np.zeros(2, dtype=np.int64) for _ in range(threads)]
         chunks, lock = iter(range(0, n, CHUNK)), threading.Lock()
-        load_driver(), load_helpers(), load_advance()  # compiled here, not by each thread
+        compile_everything()  # here, not in each thread
         progress(0.0, WHAT)
         with ThreadPoolExecutor(threads) as pool:
             try:  # an interrupt while they are begun must stop them too, or the pool would wait for their end
@@ -133,19 +136,29 @@ class Lanes:
 
     def _arguments(self) -> tuple[Any, ...]:
         """What every call of the driver is given: functions, sizes, places and settings."""
-        structure, order = self.program.structure, lane_order(self.tol)
+        structure = self.program.structure
         module, scalar = structure.module, structure.functions
         code = (*self.functions, pointer(module.constants), pointer(module.geometry))
-        sizes = np.zeros(at.SIZES, dtype=np.int64)
-        sizes[[at.MODEL_ROWS, at.COLUMN_COUNT, at.STOP_ROWS]] = module.OWN, module.COLUMNS, module.STOPS
-        sizes[[at.SIDED, at.BENDS, at.RECORD_ROWS]] = module.SIDES, module.STEEP, self.slots.records
-        sizes[[at.LANE_ORDER, at.SCALAR_ORDER, at.WORKSPACE]] = order, taylor_order(self.tol), module.ROWS
-        sizes[[at.LAST_KEPT, at.WATCH, at.SETTLE]] = self.kept, self.watch, self.settle
-        sizes[at.ENDS_ASKED] = self.settle or bool(self.sampled)
-        sizes[at.EVERY_END] = self.settle or self.kept > 1
-        settings = np.zeros(at.SETTINGS)
-        settings[k.TOLERANCE], settings[at.SHORTEST_STEP] = self.tol, k.SHORTEST
-        settings[at.SLOWEST_IMPACT] = max(k.SLOW * math.sqrt(self.tol), k.CHATTER_SPEED)
+        sizes = np.zeros(len(Size), dtype=np.int64)
+        given = {
+            Size.OWN: module.OWN,
+            Size.COLUMNS: module.COLUMNS,
+            Size.MARGINS: module.STOPS,
+            Size.SIDES: module.SIDES,
+            Size.CHECKED: module.STEEP,
+            Size.RECORDS: self.slots.records,
+            Size.ORDER: lane_order(self.tol),
+            Size.SCALAR_ORDER: taylor_order(self.tol),
+            Size.WORKSPACE: module.ROWS,
+            Size.KEPT: self.kept,
+            Size.EXTREMA: self.extrema,
+            Size.SETTLE: self.settle,
+            Size.ENDS_ASKED: self.settle or bool(self.sampled),
+            Size.EVERY_END: self.settle or self.kept > 1,
+        }
+        sizes[list(given)] = list(given.values())
+        slowest = max(SLOW * math.sqrt(self.tol), CHATTER_SPEED)
+        settings = np.array([self.tol, SHORTEST, slowest])  # in the places of `LaneSetting`
         places = np.array(list(self.slots.places.values()), dtype=np.int64)
         return code, (load_advance(), scalar), load_helpers(), sizes, places, settings
 

@@ -1,0 +1,38 @@
+"""On which side of its contact a state moves on: the one rule for single motions and for lanes.
+
+This text is compiled together with the lanes (see `driver.py`); `simulation.py` calls it as it is.
+"""
+
+from __future__ import annotations
+
+from saltus.flow.kernel_layout import Geometry, Mode
+from saltus.taylor import lean_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@lean_jit
+def side_of_state(sides, position, velocity, geometry):
+    """The mode and the side of a state: by the gap, at contact by the velocity, and at rest there CONTACT decides.
+
+    The mode is BEYOND where the state lies on no side of the contact. An arc that starts at the contact with a velocity that
+    points outward of every side begins with its impact.
+    """
+    if sides == 0:
+        return Mode.ARC, 1
+    into, open_side, pressed = 0, 0, False
+    for i in range(sides):
+        side, rate = 1 - 2 * i, geometry[Geometry.RATE_UP + i]
+        gap = rate * (position - geometry[Geometry.CONTACT])
+        if gap > 0.0 and open_side == 0:
+            open_side = side
+        pressed = pressed or gap < 0.0
+        if rate * velocity > 0.0 and into == 0:
+            into = side
+    if open_side != 0:
+        return Mode.ARC, open_side
+    if pressed:
+        return Mode.BEYOND, 1
+    if velocity == 0.0:
+        return Mode.CONTACT, 1
+    return (Mode.CONTACT, into) if into != 0 else (Mode.ARC, 1)
