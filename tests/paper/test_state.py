@@ -1,5 +1,7 @@
 """What is up to date is left alone; what is missing, changed or interrupted is made again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -93,16 +95,43 @@ def test_other_parameters_make_it_again(tmp_path, registry):
     assert calls == [3, 5]
 
 
-def test_the_key_follows_the_source_of_everything_imported(monkeypatch):
+@pytest.mark.parametrize(
+    ("module", "changes"),
+    [
+        ("saltus.paper.figures.fig08", True),
+        ("saltus.theory.quasi_static", True),  # inner files of rooms, whose names come through the front door
+        ("saltus.theory.loaded_equilibria", True),
+        ("saltus.flow.roots", True),
+        ("saltus.systems.metainterface", True),
+        ("saltus.plots.loading_paths", True),
+        ("saltus.paper.figures.fig09", False),
+        ("saltus.plots.basins", False),  # other inner files of a room that it uses
+        ("saltus.theory.rocking", False),
+        ("saltus.sweep.plan", False),  # and of rooms that it does not
+        ("saltus.attractors.find", False),
+    ],
+)
+def test_a_figure_is_out_of_date_by_a_change_in_what_it_uses_and_by_no_other(module, changes, monkeypatch, tmp_path):
     from saltus.paper.figures import fig08
 
-    key = state.key(fig08.FIGURE)
-    assert "saltus.theory.quasi_static" in state.closure("saltus.paper.figures.fig08")
-    assert "saltus.flow" not in state.closure("saltus.paper.figures.fig02")
+    figure = replace(fig08.FIGURE, compute=fig08.compute, draw=None)
+    (tmp_path / "fig08.nc").write_bytes(b"data")
+    state.write(figure, tmp_path, [])
+    assert state.up_to_date(figure, tmp_path)
     original = state._source
-    changed = "saltus.theory.quasi_static"
-    monkeypatch.setattr(state, "_source", lambda module: original(module) + (b"#" if module == changed else b""))
-    assert state.key(fig08.FIGURE) != key
+    assert original(module)
+    monkeypatch.setattr(state, "_source", lambda name: original(name) + (b"#" if name == module else b""))
+    assert state.up_to_date(figure, tmp_path) is not changes
+
+
+def test_a_changed_claim_makes_its_own_figure_anew(tmp_path, monkeypatch):
+    reproduce(output=tmp_path)
+    entry = replace(state.claim_tables()["fig99"]["line"], tolerance=1e-3)
+    other = state.claim_tables() | {"fig98": {"line": entry}}
+    monkeypatch.setattr(state, "claim_tables", lambda: other)
+    assert not reproduce(output=tmp_path)[0].made
+    monkeypatch.setattr(state, "claim_tables", lambda: other | {"fig99": {"line": entry}})
+    assert reproduce(output=tmp_path)[0].made
 
 
 def test_an_interrupt_leaves_what_was_there_and_the_next_run_goes_on(tmp_path, registry):
