@@ -6,6 +6,7 @@ import html
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from importlib.resources import files
 from pathlib import Path
 
 import saltus
@@ -14,18 +15,6 @@ from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import Claim, Verdict, tally, to_markdown
 from saltus.paper.figures.figure import PaperFigure
 
-CSS = """
-body { font: 16px/1.5 Georgia, "Times New Roman", serif; color: #1a1a1a; margin: 2rem auto; max-width: 62rem; padding: 0 1rem; }
-h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.5rem; border-top: 1px solid #ccc; padding-top: 1rem; }
-img { max-width: 100%; display: block; margin: 1rem auto; }
-p.caption { font-size: 0.95rem; } p.files { font-size: 0.85rem; }
-table { border-collapse: collapse; font-size: 0.85rem; width: 100%; margin: 1rem 0; }
-th, td { border: 1px solid #ccc; padding: 0.25rem 0.5rem; text-align: left; vertical-align: top; overflow-wrap: break-word; }
-th:nth-child(2) { width: 7rem; } th:nth-child(3), th:nth-child(4) { width: 6.5rem; } th:nth-child(5) { width: 5.5rem; }
-th { background: #f2f2f2; } td.agrees { background: #e6f2e9; }
-td.erratum { background: #fdf3d7; } td.disagrees { background: #fbe3e0; }
-nav a { margin-right: 0.8rem; } code { font-size: 0.85em; }
-"""
 KINDS = {Verdict.AGREES: "agrees", Verdict.ERRATUM: "erratum", Verdict.DISAGREES: "disagrees"}
 
 
@@ -65,7 +54,7 @@ def _page(present: dict[PaperFigure, list[Claim]], folder: Path) -> Iterator[str
     everything = [claim for group in present.values() for claim in group]
     yield '<!doctype html><html lang="en"><head><meta charset="utf-8">'
     yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    yield f"<title>The paper, computed by saltus</title><style>{CSS}</style></head><body>"
+    yield f"<title>The paper, computed by saltus</title><style>{_style_sheet()}</style></head><body>"
     yield "<h1>Non-smooth dynamics of buckling based metainterfaces: the paper, computed</h1>"
     yield f"<p>saltus {saltus.__version__}. {tally(everything)} The whole table: "
     yield '<a href="claims.md">claims.md</a>, <a href="claims.json">claims.json</a>.</p><nav>'
@@ -74,6 +63,10 @@ def _page(present: dict[PaperFigure, list[Claim]], folder: Path) -> Iterator[str
     for figure, claims in present.items():
         yield from _section(figure, claims, folder)
     yield "</body></html>"
+
+
+def _style_sheet() -> str:
+    return (files("saltus.paper") / "report.css").read_text(encoding="utf-8")
 
 
 def _section(figure: PaperFigure, claims: list[Claim], folder: Path) -> Iterator[str]:

@@ -61,26 +61,13 @@ def _jump(alpha: float, e: float) -> Any:
     """[[T]] / (T of the rotation before) over zeta' / theta', from the formula and from the model's kinetic energy."""
     ground = np.linspace(-2.0, 2.0, 201)
     dots = ground[10::20]
+    impact: dict[str, Any] = {"alpha": alpha, "e": e, "ground_velocity": ground}
+    computed = np.array([_model_jump(alpha, e, g) for g in dots])
     return dataset(
         {
-            "jump": (
-                "ground",
-                2 * rocking_energy_jump(1.0, alpha=alpha, e=e, ground_velocity=ground),
-                "1",
-                "[[T]] over theta'-^2 / 2",
-            ),
-            "decreases": (
-                "ground",
-                rocking_energy_decreases(1.0, alpha=alpha, e=e, ground_velocity=ground),
-                "1",
-                "either condition holds",
-            ),
-            "computed": (
-                "dot",
-                2 * np.array([_model_jump(alpha, e, g) for g in dots]),
-                "1",
-                "the same from the model's energies",
-            ),
+            "jump": ("ground", 2 * rocking_energy_jump(1.0, **impact), "1", "[[T]] over theta'-^2 / 2"),
+            "decreases": ("ground", rocking_energy_decreases(1.0, **impact), "1", "either condition holds"),
+            "computed": ("dot", 2 * computed, "1", "the same from the model's energies"),
         },
         {"ground": ("ground", ground, "1", "zeta' / theta'-"), "dot": ("dot", dots, "1", "zeta' / theta'-")},
         what="energy jump at an impact",

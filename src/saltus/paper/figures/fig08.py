@@ -42,14 +42,10 @@ def _borders(beta0: float) -> Any:
     vertical = np.linspace(LOWEST, 0.0, 321)
     start, lowest = subcritical_vertical(beta0), unloaded_fold(beta0)[0]
     folded = start + (lowest - start) * np.linspace(0, 1, 121) ** 2
+    critical = critical_horizontal(beta0, vertical)
     return dataset(
         {
-            "critical": (
-                "vertical",
-                critical_horizontal(beta0, vertical),
-                "1",
-                "Hcr, where theta = 0 is lost (the paper's border)",
-            ),
+            "critical": ("vertical", critical, "1", "Hcr, where theta = 0 is lost (the paper's border)"),
             "fold": ("folded", fold_horizontal(beta0, folded), "1", "H at the fold of deformed equilibria (erratum 23)"),
         },
         {
@@ -75,7 +71,7 @@ def _paths(beta0: float, loads: tuple[tuple[float, float, float], ...], what: st
         {
             "horizontal": (("path", "phase"), horizontal, "1", "H"),
             "vertical": (("path", "phase"), vertical, "1", "V"),
-            "within": ("path", is_monostable(beta0, horizontal, vertical).all(axis=1), "1", "whole path in the true domain"),
+            "within": ("path", is_monostable(beta0, horizontal, vertical).all(axis=1), "1", "all of the path in the true domain"),
             "within_printed": ("path", paper_monostable(beta0, horizontal, vertical).all(axis=1), "1", "in the printed domain"),
             "system": ("path", np.array(systems), "1", "the System as JSON"),
         },

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,20 @@ from saltus.paper.figure_data import dataset
 from saltus.paper.measures.spectrum_features import detached, main_branch, turning
 from saltus.systems import System
 
-PHASES = 361  # over one forcing period
-BEYOND = 3e-3  # relative distance past a fold at which a motion is let go: nearer to it motions linger where the orbit was
-APART = 1e-5  # relative: a point of a branch may be the fold itself
-TOLD_APART = 1e-6  # rad: less is one motion found from two points
-SETTLE, LAST = 800, 12  # forcing periods until the motion after a jump is looked at, and for how long
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnotSettings:
+    """How knots are solved for, and how long motions are followed past a fold."""
+
+    phases: int = 361  # Motions are given at so many phases of one forcing period.
+    beyond: float = 3e-3  # So far, relative, past a fold a motion is let go: nearer to it motions linger where the orbit was.
+    apart: float = 1e-5  # A point of a branch that is nearer to a fold, relative, may be the fold itself.
+    distinct: float = 1e-6  # Motions that differ by less, in rad, are one motion from two points.
+    settle: int = 800  # Past a fold a motion is looked at after so many forcing periods,
+    last: int = 12  # and for so many.
+
+
+SETTINGS = KnotSettings()
 
 
 def orbit_at(branch: Any, index: int, value: float) -> Any:
@@ -35,9 +45,9 @@ def knots(spectrum: Any) -> Any:
     """
     branch = main_branch(spectrum)
     rows = [row for i, j, value in _self_crossings(branch) if (row := _knot(branch, i, j, value)) is not None]
-    rows = [pair for pair in rows if np.abs(pair[0][2] - pair[1][2]).max() > TOLD_APART]
-    phase = np.linspace(0.0, 2 * np.pi, PHASES)
-    theta = np.array([[row[2] for row in pair] for pair in rows]).reshape(-1, 2, PHASES)
+    rows = [pair for pair in rows if np.abs(pair[0][2] - pair[1][2]).max() > SETTINGS.distinct]
+    phase = np.linspace(0.0, 2 * np.pi, SETTINGS.phases)
+    theta = np.array([[row[2] for row in pair] for pair in rows]).reshape(-1, 2, SETTINGS.phases)
     return dataset(
         {
             "parameter": ("knot", np.array([pair[0][0] for pair in rows]), "1", str(spectrum.attrs["path"])),
@@ -103,9 +113,9 @@ def _knot(branch: Any, i: int, j: int, value: float) -> list[tuple[float, float,
 
 
 def over_a_period(orbit: Any) -> np.ndarray:
-    """theta of an orbit of one forcing period at `PHASES` phases of the load, from 0 to 2 pi."""
+    """theta of an orbit of one forcing period at `SETTINGS.phases` phases of the load, from 0 to 2 pi."""
     start = float(orbit.start().get("time", 0.0))
-    times = np.linspace(0.0, 2 * np.pi, PHASES) / orbit.frequency
+    times = np.linspace(0.0, 2 * np.pi, SETTINGS.phases) / orbit.frequency
     return np.asarray(orbit.motion().at(start + np.mod(times - start, orbit.duration))[0], dtype=float)
 
 
@@ -122,7 +132,7 @@ def jumps(spectrum: Any) -> Any:
         for fold in turning(branch):
             orbit, sign = _last_stable(branch, float(fold))
             if orbit is not None and low < fold < high:
-                rows.append((name, float(fold), float(fold * (1 + sign * BEYOND)), orbit))
+                rows.append((name, float(fold), float(fold * (1 + sign * SETTINGS.beyond)), orbit))
     orbits = [row[3] for row in rows]
     columns = {name: ("jump", np.array([row[k] for row in rows]), "1") for k, name in ((1, "fold"), (2, "value"))}
     return dataset(
@@ -143,7 +153,9 @@ def _settled(system: Any, path: str, values: np.ndarray, orbits: list[Any]) -> n
     starts: dict[str, Any] = {
         name: np.array([orbit.start().get(name, 0.0) for orbit in orbits]) for name in ("theta", "velocity", "time")
     }
-    ends = simulate_many(system, **starts, parameters={path: values}, periods=SETTLE, sample=("extrema",), last=LAST)
+    ends = simulate_many(
+        system, **starts, parameters={path: values}, periods=SETTINGS.settle, sample=("extrema",), last=SETTINGS.last
+    )
     size = np.maximum(np.abs(ends["largest_theta"].values), np.abs(ends["smallest_theta"].values))
     return np.asarray(size.reshape(len(orbits), -1).max(axis=1))
 
@@ -151,7 +163,7 @@ def _settled(system: Any, path: str, values: np.ndarray, orbits: list[Any]) -> n
 def _last_stable(branch: Any, fold: float) -> tuple[Any, float]:
     """The stable orbit nearest to a fold, but not at it, and the sign of the way on which there is none."""
     x = branch["parameter"].values
-    stable = np.flatnonzero(branch["stable"].values & (np.abs(x - fold) > APART * abs(fold)))
+    stable = np.flatnonzero(branch["stable"].values & (np.abs(x - fold) > SETTINGS.apart * abs(fold)))
     if not stable.size:
         return None, 0.0
     nearest = int(stable[np.argmin(np.abs(x[stable] - fold))])

@@ -5,6 +5,7 @@ The panels of a figure are given by the value that tells them apart, in rising o
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -17,10 +18,18 @@ from saltus.paper.measures.response_measures import Panels
 from saltus.paper.measures.spectrum_features import count, stable_motions
 from saltus.systems import System
 
-INNER = 200  # values within a band at which stable motions are counted
-HIGH = 1.0  # Omega: frequencies beyond the primary resonance
-LOW = 0.5  # Omega: frequencies of the superharmonic resonances
-LARGE_LOAD = 2.0  # Hhat of the panels in which chaos is seen
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChaosCriteria:
+    """By which numbers the statements on chaos in Figs. 9 to 13 are judged."""
+
+    inner: int = 200  # Within a band stable motions are counted at so many values.
+    high: float = 1.0  # Frequencies above this one are beyond the primary resonance.
+    low: float = 0.5  # Superharmonic resonances are below this frequency.
+    large_load: float = 2.0  # The paper sees chaos in the panels from this Hhat on.
+
+
+CRITERIA = ChaosCriteria()
 
 
 def bands_of(spectrum: Any) -> list[dict[str, float]]:
@@ -44,7 +53,7 @@ def force_spectra(panels: Panels) -> dict[str, Measured]:
     """Fig. 9, over the amplitudes of the force."""
     smallest, largest = min(panels), max(panels)
     return {
-        "fig09-quasi-periodic": _quasi_periodic(panels[smallest], LOW),
+        "fig09-quasi-periodic": _quasi_periodic(panels[smallest], CRITERIA.low),
         "fig09-chaos": _widening(panels),
         "fig09-chaos-range": _around_resonance(panels[largest], largest),
         "fig09-pierced": pierced(panels[largest], load=largest),
@@ -53,8 +62,8 @@ def force_spectra(panels: Panels) -> dict[str, Measured]:
 
 def _widening(panels: Panels) -> Measured:
     rows = [{"load": load, "width": _width(tree)} for load, tree in panels.items()]
-    large = [row["width"] for row in rows if row["load"] >= LARGE_LOAD]
-    small = [row["width"] for row in rows if row["load"] < LARGE_LOAD]
+    large = [row["width"] for row in rows if row["load"] >= CRITERIA.large_load]
+    small = [row["width"] for row in rows if row["load"] < CRITERIA.large_load]
     grows = bool(large) and min(large) > max(small, default=0.0) and bool((np.diff(large) > 0).all())
     return measured(grows, panels=rows)
 
@@ -67,7 +76,7 @@ def _around_resonance(spectrum: Any, load: float) -> Measured:
 
 def _stable_share(spectrum: Any, low: float, high: float) -> float:
     """The share of a range over which there is a stable periodic motion."""
-    return float((stable_motions(spectrum, np.linspace(low, high, INNER + 2)[1:-1]) > 0).mean())
+    return float((stable_motions(spectrum, np.linspace(low, high, CRITERIA.inner + 2)[1:-1]) > 0).mean())
 
 
 def pierced(spectrum: Any, **panel: float) -> Measured:
@@ -79,7 +88,7 @@ def pierced(spectrum: Any, **panel: float) -> Measured:
 def ground_spectra(panels: Panels) -> dict[str, Measured]:
     """Fig. 10, over the amplitudes of the ground motion."""
     return {
-        "fig10-quasi-periodic": _quasi_periodic(panels[max(panels)], HIGH),
+        "fig10-quasi-periodic": _quasi_periodic(panels[max(panels)], CRITERIA.high),
         "fig10-chaos": _at_high_frequency(panels),
     }
 
@@ -95,8 +104,10 @@ def _wandering(spectrum: Any) -> np.ndarray:
 
 def _at_high_frequency(panels: Panels) -> Measured:
     """Erratum 31: what looks like chaos there is a transient."""
-    lasting = [sum(band["high"] - band["low"] for band in bands_of(tree) if band["low"] > HIGH) for tree in panels.values()]
-    seen = [int((_wandering(tree) > HIGH).sum()) for tree in panels.values()]
+    lasting = [
+        sum(band["high"] - band["low"] for band in bands_of(tree) if band["low"] > CRITERIA.high) for tree in panels.values()
+    ]
+    seen = [int((_wandering(tree) > CRITERIA.high).sum()) for tree in panels.values()]
     return measured(
         lasting[-1] > 0.0 and bool((np.diff(lasting) > 0).all()),
         seen[-1] > 0 and bool((np.diff(seen) > 0).all()),
@@ -144,6 +155,6 @@ def shifts(panels: Panels) -> Measured | None:
     if len(panels) < 2:
         return None
     least = np.array([float(_wandering(tree).min(initial=np.inf)) for tree in panels.values()])
-    falls = min(panels) < HIGH and bool(np.isfinite(least).all()) and bool((np.diff(least) < 0).all())
+    falls = min(panels) < CRITERIA.high and bool(np.isfinite(least).all()) and bool((np.diff(least) < 0).all())
     rows = [{"frequency": frequency, "load": load} for frequency, load in zip(panels, least, strict=True)]
     return measured(bool((np.diff(least) > 0).all()), falls, panels=rows)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -18,12 +19,20 @@ from saltus.theory import high_frequency_onset
 
 Panels = Mapping[float, Any]
 
-SHALLOW = -1.0  # V above which no deformed equilibrium is there without a horizontal load, for any of the charts
-PRIMARY = (0.7, 1.6)  # Omega about 1: the frequencies of Fig. 14 beside it
-SLOW = 0.25  # Omega: far below resonance motions follow the loads, and nothing is anticipated
-NARROW = 0.15  # of the quasi-static domain
-FEW = 0.02  # of the changes looked into: at no special point that could be located
-SLIGHT = 0.15  # relative
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChartCriteria:
+    """By which numbers the statements on Figs. 14 and 15 are judged."""
+
+    shallow: float = -1.0  # Above this V no chart has a deformed equilibrium without a horizontal load.
+    primary: tuple[float, float] = (0.7, 1.6)  # Omega is about 1 between these, the frequencies of Fig. 14 beside it.
+    slow: float = 0.25  # Below this Omega, far below resonance, motions follow the loads and nothing is anticipated.
+    narrow: float = 0.15  # A region is narrow below this share of the quasi-static domain.
+    few: float = 0.02  # At most this share of the changes looked into lies at no special point that could be located.
+    slight: float = 0.15  # Relative differences below this are slight.
+
+
+CRITERIA = ChartCriteria()
 ROWS = np.linspace(-1.2, -0.2, 41)  # V at which the onset is compared
 REFERENCE_V = np.array([-0.5])  # at which the onset is named
 
@@ -46,7 +55,7 @@ def _anticipates(panels: Panels) -> Measured:
     """As printed: at every frequency. Erratum 34: not far below resonance, where cells with nothing but rest are even gained."""
     rows = [{"frequency": w, "lost": lost(tree), "gained": gained(tree)} for w, tree in panels.items()]
     always = bool(rows) and all(row["lost"] > row["gained"] for row in rows)
-    fast = bool(rows) and all((row["lost"] > row["gained"]) == (row["frequency"] > SLOW) for row in rows)
+    fast = bool(rows) and all((row["lost"] > row["gained"]) == (row["frequency"] > CRITERIA.slow) for row in rows)
     return measured(always, fast, panels=rows)
 
 
@@ -66,12 +75,12 @@ def _largest_amplitude(panels: Panels) -> Measured:
     rows = []
     for frequency, tree in panels.items():
         cells = chart_cells(tree)
-        size = cells.amplitude[np.ix_(cells.vertical > SHALLOW, cells.horizontal <= widest)]
+        size = cells.amplitude[np.ix_(cells.vertical > CRITERIA.shallow, cells.horizontal <= widest)]
         largest, mean = float(np.nanmax(size, initial=0.0)), float(np.nan_to_num(size).mean())
         rows.append({"frequency": frequency, "largest": largest, "mean": mean})
     tops = [max(rows, key=lambda row: row[name])["frequency"] for name in ("largest", "mean")]
-    holds = len(rows) > 1 and all(PRIMARY[0] <= top <= PRIMARY[1] for top in tops)
-    return measured(holds, shallow=SHALLOW, widest=widest, panels=rows)
+    holds = len(rows) > 1 and all(CRITERIA.primary[0] <= top <= CRITERIA.primary[1] for top in tops)
+    return measured(holds, shallow=CRITERIA.shallow, widest=widest, panels=rows)
 
 
 def _second_motion(panels: Panels) -> Measured:
@@ -86,8 +95,8 @@ def _second_motion(panels: Panels) -> Measured:
     first = float(cells.horizontal[period_three.any(axis=0)].min(initial=np.inf))
     found = bool(several.any())
     return measured(
-        found and share < NARROW,
-        found and share >= NARROW and six > 0.0,
+        found and share < CRITERIA.narrow,
+        found and share >= CRITERIA.narrow and six > 0.0,
         frequency=fast, several=share, six=six, three=three, first=first,
     )  # fmt: skip
 
@@ -119,8 +128,8 @@ def agreement(data: Any) -> Measured:
         )
         looked, beside = differ["looked_into"].values.astype(bool), differ["beside_rest"].values.astype(bool)
         known, known_at_rest = total - int((~looked).sum()), at_rest - int((beside & ~looked).sum())
-        judged += [known > 0 and looked.sum() <= FEW * known]
-        judged += [known_at_rest > 0 and (looked & beside).sum() <= FEW * known_at_rest]
+        judged += [known > 0 and looked.sum() <= CRITERIA.few * known]
+        judged += [known_at_rest > 0 and (looked & beside).sum() <= CRITERIA.few * known_at_rest]
         rows.append(
             {
                 "frequency": float(tree.attrs["frequency"]),
@@ -162,7 +171,7 @@ def _border_and_angle(angles: Panels) -> Measured:
     static = [np.abs(ROWS / math.tan(math.radians(beta0))) for beta0 in ends]
     place, shape = _farthest(one / two), _farthest((one / static[0]) / (two / static[1]))
     return measured(
-        min(shape, place) < SLIGHT,
+        min(shape, place) < CRITERIA.slight,
         low_angle=ends[0], high_angle=ends[1], low=ROWS[0], high=ROWS[-1], place=place, shape=shape,
     )  # fmt: skip
 

@@ -7,6 +7,7 @@ of chaotic and quasi-periodic bands is measured in `chaos_measures.py`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,15 +29,23 @@ from saltus.paper.measures.spectrum_features import (
 
 Panels = Mapping[float, Any]
 
-CONFIRMED = 1e-8  # distance of a stable motion from itself, by direct simulation
-BESIDE = 1e-9  # relative
-ON_BRANCH = 2e-2  # rad between a simulated attractor and the line drawn between the points of its branch
-EQUAL = 1e-10  # rad between amplitudes that are equal
-RESONANCE = 0.9  # Omega of the primary one, about (Fig. 9)
-SAMPLES = 600  # values at which motions are counted, an even number
-APART = 0.1  # rad: motions or amplitudes that plainly differ
-LARGE_LOAD = 0.5  # Hhat from which detached loops are there
-SHOWN_LOOPS = 3  # whose range of frequencies is named
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResponseCriteria:
+    """By which numbers the statements on Figs. 9 to 13 are judged."""
+
+    confirmed: float = 1e-8  # A stable motion returns to within this distance of itself by direct simulation.
+    beside: float = 1e-9  # Branches are read at this relative distance on both sides of a value at which one may begin.
+    on_branch: float = 2e-2  # A simulated attractor lies within so many rad of the line drawn between the points of its branch.
+    equal: float = 1e-10  # Amplitudes that differ by less, in rad, are equal.
+    resonance: float = 0.9  # The primary resonance of Fig. 9 is at about this frequency.
+    samples: int = 600  # At so many values, an even number, the stable motions of a range are counted.
+    apart: float = 0.1  # Motions or amplitudes that differ by more, in rad, plainly differ.
+    large_load: float = 0.5  # Detached loops are there from this Hhat on.
+    shown_loops: int = 3  # The evidence names the ranges of so many loops of a panel.
+
+
+CRITERIA = ResponseCriteria()
 LOADS = np.array([1.0, 2.0, 5.0, 15.0])  # of Hcr, at which the amplitudes of two frequencies are compared
 
 
@@ -51,9 +60,11 @@ def confirmed(spectra: Iterable[Any]) -> Measured:
         places, lines = spectrum["attractors"], [line for _, branch in branches_of(spectrum) for line in smooth_lines(branch)]
         for value, amplitude in zip(places["parameter"].values, places["amplitude"].values, strict=True):
             # on both sides: a branch found at this very value may begin, or close, exactly there
-            known = np.concatenate([passing(lines, float(value) * (1 + side), stable=True) for side in (-BESIDE, BESIDE)])
+            known = np.concatenate(
+                [passing(lines, float(value) * (1 + side), stable=True) for side in (-CRITERIA.beside, CRITERIA.beside)]
+            )
             off, attractors = max(off, float(np.abs(known - amplitude).min(initial=np.inf))), attractors + 1
-    holds = orbits > 0 and attractors > 0 and kept < CONFIRMED and off < ON_BRANCH
+    holds = orbits > 0 and attractors > 0 and kept < CRITERIA.confirmed and off < CRITERIA.on_branch
     return measured(holds, orbits=orbits, kept=kept, attractors=attractors, off=off)
 
 
@@ -63,7 +74,7 @@ def force_spectra(panels: Panels) -> dict[str, Measured]:
         "fig09-knots-appear": _knots_appear(panels),
         "fig09-knots": _knots_differ(panels),
         "fig09-superharmonic": _superharmonics(panels),
-        "fig09-loops": loops({load: tree for load, tree in panels.items() if load >= LARGE_LOAD}),
+        "fig09-loops": loops({load: tree for load, tree in panels.items() if load >= CRITERIA.large_load}),
         "fig09-jumps": _jumps(panels),
         "fig09-confirmed": confirmed(panels.values()),
     }
@@ -89,7 +100,7 @@ def _knots_differ(panels: Panels) -> Measured:
     apart = np.concatenate([[], *(one["apart"].values for one in knots.values())])
     equal = np.concatenate([[], *(np.ptp(one["amplitude"].values, axis=1) for one in knots.values())])
     rows = [_last_knot(load, one) for load, one in knots.items() if one.sizes["knot"]]
-    holds = apart.size > 0 and apart.min() > APART and equal.max() < EQUAL
+    holds = apart.size > 0 and apart.min() > CRITERIA.apart and equal.max() < CRITERIA.equal
     return measured(bool(holds), knots=apart.size, difference=equal.max() if equal.size else np.nan, panels=rows)
 
 
@@ -118,7 +129,9 @@ def loops(panels: Panels) -> Measured:
     for load, tree in panels.items():
         main, bounds = main_branch(tree), tree.attrs["bounds"]
         above = [branch for _, branch in detached(tree) if _rises_above(branch, main, bounds)]
-        spans = [(int(b["period"][0]), float(b["parameter"].min()), float(b["parameter"].max())) for b in above[:SHOWN_LOOPS]]
+        spans = [
+            (int(b["period"][0]), float(b["parameter"].min()), float(b["parameter"].max())) for b in above[: CRITERIA.shown_loops]
+        ]
         rows.append({"load": load, "loops": [{"period": period, "low": low, "high": high} for period, low, high in spans]})
     return measured(bool(rows) and all(row["loops"] for row in rows), panels=rows)
 
@@ -127,7 +140,7 @@ def _rises_above(branch: Any, main: Any, bounds: Any) -> bool:
     """Whether somewhere within the bounds a branch is plainly larger than all of the main one there."""
     lines = list(smooth_lines(main))
     return any(
-        amplitude - np.max(passing(lines, value), initial=0.0) >= APART
+        amplitude - np.max(passing(lines, value), initial=0.0) >= CRITERIA.apart
         for value, amplitude in zip(branch["parameter"].values, branch["amplitude"].values, strict=True)
         if bounds[0] <= value <= bounds[1]
     )
@@ -139,8 +152,8 @@ def _jumps(panels: Panels) -> Measured:
     for load, tree in panels.items():
         sizes = np.abs(tree["jumps"]["after"].values - tree["jumps"]["before"].values)
         if sizes.size:
-            rows.append({"load": load, "jumps": int((sizes > APART).sum()), "folds": sizes.size, "largest": sizes.max()})
-    return measured(bool(rows) and all(row["jumps"] * 2 > row["folds"] for row in rows), apart=APART, panels=rows)
+            rows.append({"load": load, "jumps": int((sizes > CRITERIA.apart).sum()), "folds": sizes.size, "largest": sizes.max()})
+    return measured(bool(rows) and all(row["jumps"] * 2 > row["folds"] for row in rows), apart=CRITERIA.apart, panels=rows)
 
 
 def ground_spectra(panels: Panels) -> dict[str, Measured]:
@@ -235,7 +248,7 @@ def _flattens(panels: Panels) -> Measured:
     sizes = np.array([_largest(main_branch(tree), critical * LOADS) for tree in panels.values()])
     falls, several = np.diff(sizes, axis=0) < 0, len(panels) > 1
     rows = [{"frequency": w, "sizes": [{"size": x} for x in row]} for w, row in zip(panels, sizes, strict=True)]
-    late = bool(falls[:, -1].all()) and not falls[:, 0].any() and min(panels) < RESONANCE
+    late = bool(falls[:, -1].all()) and not falls[:, 0].any() and min(panels) < CRITERIA.resonance
     return measured(several and bool(falls.all()), several and late, panels=rows)
 
 
@@ -244,7 +257,7 @@ def coexistence(panels: Panels) -> Measured:
     more, rows = [], []
     for frequency, tree in panels.items():
         start = 2 * _critical(tree)
-        values, number = range_counts(tree, SAMPLES)
+        values, number = range_counts(tree, CRITERIA.samples)
         early, later = int(stable_motions(tree, np.array([start]))[0]), number[values > start]
         most, place = int(later.max()), float(values[values > start][later.argmax()])
         more.append(most > max(early, 1))
@@ -259,9 +272,9 @@ def both_diagram(spectrum: Any, mirror: Any) -> dict[str, Measured]:
     main = main_branch(spectrum)
     uneven = np.abs(main["highest"].values + main["lowest"].values)
     kinds = {kind: count(spectrum, kind) for kind in ("LP", "PD", "GR")}
-    values, number = range_counts(spectrum, SAMPLES)
+    values, number = range_counts(spectrum, CRITERIA.samples)
     most = int(number.max())
-    symmetric = max(gaps["(i)"], gaps["(ii)"]) < CONFIRMED and gaps["(iii)"] > APART and not any(own)
+    symmetric = max(gaps["(i)"], gaps["(ii)"]) < CRITERIA.confirmed and gaps["(iii)"] > CRITERIA.apart and not any(own)
     return {
         "fig13-symmetry": measured(
             symmetric, loads=[{"load": load, "gap": gap} for load, gap in gaps.items()], uneven=uneven.max()
