@@ -30,7 +30,7 @@ def parameter_table(system: System, parameters: Any) -> dict[str, Any]:
     for path in parameters:
         if path not in known:
             system.get(str(path))  # refuses what leads nowhere
-            raise ParameterError(f"{path} is not a number, so it cannot be varied; {near(str(path), known)}")
+            raise ParameterError(f"{path} is not a number, so it cannot be varied; {near(str(path), known)}", "parameters")
     return dict(parameters)
 
 
@@ -42,7 +42,7 @@ def check_parameters(system: System, columns: Mapping[str, np.ndarray]) -> None:
     """
     for path, values in columns.items():
         if path.endswith(".order") and not np.equal(values, np.round(values)).all():
-            raise ParameterError(f"{path} must be whole numbers")
+            raise ParameterError(f"{path} must be whole numbers", "parameters")
     if columns and all(a.size for a in columns.values()):
         rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(a) for a in columns.values())), axis=1)
         for i in _chosen(rows):
@@ -66,9 +66,9 @@ def finite_array(name: str, given: Any) -> Any:
             raise TypeError
         array = given.astype(float) if isinstance(given, xarray.DataArray) else np.asarray(given, dtype=float)
     except (TypeError, ValueError):
-        raise ParameterError(f"{name} must be a number or an array of numbers, got {given!r}") from None
+        raise ParameterError(f"{name} must be a number or an array of numbers, got {given!r}", name) from None
     if not np.isfinite(array).all():
-        raise ParameterError(f"{name} must be finite; it holds nan or inf")
+        raise ParameterError(f"{name} must be finite; it holds nan or inf", name)
     return array
 
 

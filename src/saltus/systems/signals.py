@@ -154,7 +154,8 @@ class Record(Signal):
         if not (np.diff(time) > 0).all():
             bad = int(np.argmin(np.diff(time) > 0)) + 1
             raise ParameterError(
-                f"{where}: times must increase, but sample {bad} has {time[bad]:g} after {time[bad - 1]:g}; sort the file"
+                f"{where}: times must increase, but sample {bad} has {time[bad]:g} after {time[bad - 1]:g}; sort the file",
+                "time",
             )
         time.setflags(write=False)
         value.setflags(write=False)

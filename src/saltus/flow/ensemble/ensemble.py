@@ -150,10 +150,10 @@ def _names(argument: str, given: Any, known: tuple[str, ...] | None) -> tuple[st
     try:
         names = (given,) if isinstance(given, str) else tuple(given)
     except TypeError:
-        raise ParameterError(f"{argument} must be names, got {given!r}") from None
+        raise ParameterError(f"{argument} must be names, got {given!r}", argument) from None
     for name in names:
         if known is not None and name not in known:
-            raise ParameterError(f"{argument} knows no {name!r}; {near(str(name), known)}")
+            raise ParameterError(f"{argument} knows no {name!r}; {near(str(name), known)}", argument)
     return names
 
 

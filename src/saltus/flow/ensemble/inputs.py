@@ -54,7 +54,7 @@ def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, 
     names = system.model.coordinates
     for name in coordinates:
         if name not in names:
-            raise ParameterError(f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names)}")
+            raise ParameterError(f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names)}", name)
     for name in names:
         if name not in coordinates:
             raise ParameterError(f"the state at the start needs {name}=...")
