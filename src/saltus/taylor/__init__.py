@@ -1,4 +1,26 @@
-"""From a model's Python to its Taylor series in machine code: traced, differentiated, written, compiled and cached."""
+"""From a model's Python to its Taylor series in machine code: traced, differentiated, written, compiled and cached.
+
+The way of an equation. `tracing.py` runs a model once on symbols, which gives a graph of shared nodes (`graph.py`).
+`derivatives.py` differentiates it. `tapes.py` lists the nodes, operands first, for a generated source file (`generated.py`).
+When that file is compiled, `series.py` (Taylor coefficients) and `instants.py` (values at one instant) write LLVM's
+instructions for the tapes by the rules of `rules.py`: for one motion on plain doubles, for an ensemble on vectors with one double
+for each lane. `memory.py` knows where the code finds its arguments, `vectors.py` what arithmetic it is made of;
+`lane_vectors.py` gives numba the same vectors for the ensemble's own loops. There is no second generator and no second rule.
+
+What the generated code may assume. The time reaches it through the load only, as a local time that restarts with every forcing
+period. Expressions that are expanded in series hold no comparisons; on one side of a contact they are analytic wherever they are
+finite. Parts that depend on parameters alone are computed once for a motion (`shared_constants`). Series may use fused
+multiply-adds; values at an instant never do, so that the difference of two equal products is 0. One motion divides and uses the C
+library's sine and cosine, so that every coefficient is good to rounding; lanes multiply by reciprocals.
+
+How an elementary function is added: by one entry in `FUNCTIONS` (`rules.py`), NumPy's function and its slope, as
+`"atan": Function(np.arctan, lambda u, y: 1.0 / (1.0 + u * u), increasing=True)`. Tracing, derivatives, both widths and the bounds
+follow from it, and `tests/taylor` goes through the table and compares the coefficients with power series in 40 digits.
+
+How code is cached: a generated file lies in the user's cache directory under a digest of its text, of the sources that write its
+code and of numba's options (`cache.py`), and numba keeps the machine code beside it. Numbers are arguments, so they never compile
+anything. What numba does not promise to keep is used in `private_numba.py` alone.
+"""
 
 from saltus._front_door import front_door
 

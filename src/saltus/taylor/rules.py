@@ -22,7 +22,8 @@ import numpy as np
 from saltus.taylor.vectors import add, multiply, subtract
 
 if TYPE_CHECKING:
-    from saltus.taylor.series import Coefficient, Row, Series
+    from saltus.taylor.series import Series
+    from saltus.taylor.sums import Coefficient, Row
 
 Rule = Callable[..., None]  # of the writer, the node's own series, which lacks the coefficient of this order, and its operands'
 

@@ -55,7 +55,7 @@ def step_limits(order, tol):
     """
     log_tol = math.log2(tol)
     rarely = -log_tol / order - LOG_GAP
-    return log_tol, rarely, math.exp2(rarely), (1.0 / (order - 3), 1.0 / (order - 2), 1.0 / (order - 1), 1.0 / order)
+    return log_tol, rarely, 2.0**rarely, (1.0 / (order - 3), 1.0 / (order - 2), 1.0 / (order - 1), 1.0 / order)
 
 
 @inline_jit

@@ -1,0 +1,93 @@
+"""What is private of numba: where it is missing, and on the oldest and the newest numba that pyproject.toml allows."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numba
+import pytest
+
+import saltus
+from saltus.flow.compiled import kernel_module, load_kernel
+from saltus.taylor.cache import cache_directory
+
+SOURCE = Path(saltus.__file__).parents[1]
+SYSTEM = """
+import json, saltus
+wall = saltus.WallOscillator(damping=0.1, wall=0.4)
+load = saltus.Load(frequency=1.3, force=saltus.Harmonic(0.7))
+system = saltus.System(model=wall, load=load, impact=saltus.VelocityReduction(0.8))
+motion = saltus.simulate(system, x=0.1, velocity=0.2, periods=5)
+"""
+MOTION = SYSTEM + "print(json.dumps([motion.x, motion.velocity, len(motion.impacts)]))"
+BOTH = SYSTEM + (
+    "many = saltus.simulate_many(system, x=[0.1], velocity=0.2, periods=5, threads=1)\n"
+    "print(json.dumps([motion.x, motion.velocity, len(motion.impacts), float(many.x[0]), float(many.velocity[0])]))"
+)
+WITHOUT = """
+import importlib
+whole = importlib.import_module
+def partly(name, *more):
+    if name.startswith("numba.core"):
+        raise ImportError(name)
+    return whole(name, *more)
+importlib.import_module = partly
+from saltus.taylor import private_numba as p
+assert not any((p.CPU_OPTIONS, p.FUNCTION_CACHE, p.RUNTIME, p.ADDRESS_PROTOCOL, p.EXPERIMENTAL))
+"""
+
+
+def run(script, cache, *paths):
+    """The numbers that a script prints, in a process of its own."""
+    environment = os.environ | {"SALTUS_CACHE_DIR": str(cache), "PYTHONPATH": os.pathsep.join(map(str, [*paths, SOURCE]))}
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment, check=False)
+    assert result.returncode == 0, result.stderr[-4000:]
+    return json.loads(result.stdout.splitlines()[-1])
+
+
+def test_without_what_is_private_motions_are_the_same(tmp_path):
+    """The kernel, slow to compile, is taken from this process' cache; the structure is compiled and cached in the plain way."""
+    load_kernel()
+    kernel, target = Path(kernel_module().__file__).stem, tmp_path / "kernels"
+    (target / "__pycache__").mkdir(parents=True)
+    for path in [*cache_directory().glob(f"{kernel}*"), *cache_directory().glob(f"__pycache__/{kernel}*")]:
+        shutil.copy2(path, target / path.relative_to(cache_directory()))
+    first = run(WITHOUT + MOTION, tmp_path)
+    made = {path.name for path in target.rglob("*.nbc")}
+    assert any(name.startswith("structure_") for name in made)
+    assert run(WITHOUT + MOTION, tmp_path) == first  # from the cache
+    assert {path.name for path in target.rglob("*.nbc")} == made
+    assert first == run(MOTION, cache_directory().parent)
+
+
+def allowed():
+    """The oldest numba and the bound that its versions stay below."""
+    dependencies = tomllib.loads((SOURCE.parent / "pyproject.toml").read_text())["project"]["dependencies"]
+    (found,) = [re.fullmatch(r"numba>=([\d.]+),<([\d.]+)", text) for text in dependencies if text.startswith("numba")]
+    return found.groups()
+
+
+def install(requirement, folder):
+    """Put a numba, and the NumPy that goes with it, into a folder that Python can be told of; skip where that cannot be had."""
+    command = ["-m", "pip", "install", "--quiet", "--only-binary=:all:", "--target", str(folder), requirement]
+    for python in (sys.executable, "python3"):
+        result = subprocess.run([python, *command], capture_output=True, text=True, check=False)
+        if result.returncode == 0:
+            return
+    pytest.skip(f"pip cannot install {requirement} here: {result.stderr.strip()[-300:]}")
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("which", ["oldest", "newest"])
+def test_motions_are_the_same_on_every_numba_allowed(which, tmp_path):
+    oldest, bound = allowed()
+    install(f"numba=={oldest}.*" if which == "oldest" else f"numba<{bound}", tmp_path / "packages")
+    version = run("import json, numba; print(json.dumps(numba.__version__))", tmp_path, tmp_path / "packages")
+    assert version.startswith(f"{oldest}.") if which == "oldest" else version >= numba.__version__
+    there = run(BOTH, tmp_path / "cache", tmp_path / "packages")
+    assert there == pytest.approx(run(BOTH, cache_directory().parent), rel=1e-12, abs=1e-12)
