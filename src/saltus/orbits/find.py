@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,21 @@ from saltus.orbits.symmetry import half, is_symmetric, keeps_symmetry
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import System, check_system
 
-LONGEST = 12  # forcing periods of an orbit that is looked for if none are named
-ROUNDS = 5  # of settling, each longer than the one before
+
+@dataclass(frozen=True)
+class FindSettings:
+    """How a motion is let settle, and its orbit solved for."""
+
+    # Orbits of up to so many forcing periods are looked for if no limit is given.
+    max_period: int = 12
+    # A motion is given so many forcing periods to settle, then twice as many, and so on, in so many rounds.
+    settling: int = 160
+    rounds: int = 5
+    # Newton's method may take so many iterations from a motion to its orbit.
+    iterations: int = 25
+
+
+SETTINGS = FindSettings()
 
 
 def find_orbit(
@@ -36,7 +50,7 @@ def find_orbit(
     velocity: Any = 0.0,
     period: int | None = None,
     settle: int | None = None,
-    max_period: int = LONGEST,
+    max_period: int = SETTINGS.max_period,
     parameters: tuple[str, ...] = (),
     **coordinates: float,
 ) -> PeriodicOrbit:
@@ -69,8 +83,8 @@ def find_orbit(
         state = _after(system, state, settle)
         return _polish(base, state, _period_of(system, state, period, max_period), None)
     passed = 0
-    for attempt in range(ROUNDS):
-        state = _after(system, state, wait := 160 * 2**attempt)
+    for attempt in range(SETTINGS.rounds):
+        state = _after(system, state, wait := SETTINGS.settling * 2**attempt)
         passed += wait
         q = _returning(system, state, period, max_period)
         if q is not None:
@@ -175,7 +189,7 @@ def orbit_near(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOr
     if motion.side == 0 or len(motion.events.of(EventKind.REST)) or not motion.phase_known:
         return None
     problem, unknowns = guess(base, motion, _vector(system, state), periods)
-    found = PeriodicOrbit.near(problem, unknowns, problem.values, iterations=25)
+    found = PeriodicOrbit.near(problem, unknowns, problem.values, iterations=SETTINGS.iterations)
     return None if found is None else simplest(found)
 
 

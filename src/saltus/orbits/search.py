@@ -8,22 +8,39 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import Rectangle, Window, check_count, check_window
-from saltus.errors import ParameterError
+from saltus.checks import Rectangle, Window, check_count, check_path, check_window
+from saltus.errors import MotionError, ParameterError
 from saltus.flow import RECURRENCE, Recurrence, find_recurrence
 from saltus.orbits.find import orbit_from
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.progress import Progress, silent
-from saltus.systems import System
+from saltus.systems import System, check_system
 
-SETTLE = 200  # forcing periods before the motion is taken to have settled
-TRANSIENT = 24  # forcing periods of each motion in which near returns are looked for
-RETURN = 0.15  # distance of a near return from which Newton's method is tried for an orbit that repels
-GUESSES = 12  # the nearest returns that are tried, for each period
-STILL = 1e-6  # a motion that stays this near to the contact is at rest
-SAME_STATE = 1e-5  # a settled motion this near to a known one is the same
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """Where orbits are looked for."""
+
+    # Motions are given so many forcing periods to settle.
+    settling: int = 200
+    # Near returns are looked for in so many forcing periods at the beginning of each motion, and in as many at its end.
+    transient: int = 24
+    # Newton's method is tried for an orbit that repels from returns nearer than this, of each period from so many of the nearest,
+    # which must lie so far apart.
+    near: float = 0.15
+    guesses: int = 12
+    apart: float = 0.05
+    # A motion that stays this near to the contact is at rest, and an orbit no larger than this is rest.
+    still: float = 1e-6
+    # A settled motion whose state is this near to a known one is on the same orbit.
+    same_state: float = 1e-5
+    # Orbits are the same whose extrema and speeds of impact agree to this.
+    same_orbit: float = 1e-6
+
+
+SETTINGS = SearchSettings()
 EVEN = 1.32471795724474602596 ** -np.array([1.0, 2.0])  # steps that cover a square evenly: x^-1, x^-2 of x^3 = x + 1
 
 
@@ -88,34 +105,24 @@ def search_orbits(
     Raises:
         ParameterError: an unknown parameter, no values, an effort without meaning.
     """
-    for name, number in (("max_period", max_period), ("starts", starts)):
-        check_count(name, number, 1)
-    area = check_window(window, system)
-    system.get(path)
-    grid = np.atleast_1d(np.asarray(list(values), dtype=float))
+    check_system(system, "search_orbits", coordinates=1)
+    check_count("max_period", max_period, 1)
+    check_count("starts", starts, 1)
+    check_path(system, path)
+    area, grid = check_window(window, system), np.atleast_1d(np.asarray(list(values), dtype=float))
     if not grid.size or not np.isfinite(grid).all():
         raise ParameterError(f"values must be numbers of {path} at which to search, got {grid.tolist()}", "values")
-    if len(system.model.coordinates) > 1:
-        raise ParameterError("search_orbits works on models with one coordinate; use find_orbit from your own states")
-    states = initial_states(system, starts, area, seed)
-    early, late = _follow(system, path, grid, states, max_period)
-    assert late.extrema is not None
-    excursion = np.abs(late.extrema - _contact(system)[0]).max(axis=(1, 2))
+    early, late = _follow(system, path, grid, initial_states(system, starts, area, seed), max_period)
     found: list[PeriodicOrbit] = []
     unsettled, at_rest = np.zeros(len(grid), dtype=int), np.zeros(len(grid), dtype=int)
     settled: list[tuple[float, int, float, float]] = []
     for i, value in enumerate(grid):
         base = Problem(system.with_({path: float(value)}), Signature((), 1), (path,))
-        rows = np.arange(i * starts, (i + 1) * starts)
-        alive = rows[np.isfinite(late.states[rows]).all(axis=(1, 2))]
-        moving = alive[excursion[alive] > STILL]
-        at_rest[i] = len(alive) - len(moving)
+        moving, at_rest[i] = _moving(system, late, np.arange(i * starts, (i + 1) * starts))
         here, seen, unsettled[i] = _attracting(base, late.only(moving))
         settled += [(float(value), *row) for row in seen]
-        reach = max_period if repelling is None else repelling
-        if reach > 0:
-            here += _repelling(base, np.concatenate([early.states[moving], late.states[moving]]), reach, here)
-        found += here
+        states = np.concatenate([early.states[moving], late.states[moving]])
+        found += here + _repelling(base, states, max_period if repelling is None else repelling, here)
         progress((i + 1) / len(grid), "searching")
     columns = np.array(settled, dtype=float).reshape(-1, 4).T
     dots = Settled(columns[0], columns[1].astype(int), columns[2], columns[3])
@@ -141,12 +148,20 @@ def _contact(system: System) -> np.ndarray:
 
 def _follow(system: System, path: str, grid: np.ndarray, states: np.ndarray, max_period: int) -> tuple[Recurrence, Recurrence]:
     """Motions from the same states at every value, a row for each: their first periods, and how they go on and settle."""
-    kept = max(TRANSIENT, max_period + 1)
+    kept = max(SETTINGS.transient, max_period + 1)
     parameters = {path: np.repeat(grid, len(states))}
     options: dict[str, Any] = {"parameters": parameters, "max_period": max_period, "kept": kept, "stop_early": False}
     early = find_recurrence(system, np.tile(states, (len(grid), 1)), kept, **options)
     begin = np.where(np.isfinite(early.states[:, -1]), early.states[:, -1], _contact(system))
-    return early, find_recurrence(system, begin, SETTLE, extrema=True, **options)
+    return early, find_recurrence(system, begin, SETTINGS.settling, extrema=True, **options)
+
+
+def _moving(system: System, late: Recurrence, rows: np.ndarray) -> tuple[np.ndarray, int]:
+    """Those of these motions that neither rest at the contact nor have ended, and how many of them rest."""
+    assert late.extrema is not None
+    alive = rows[np.isfinite(late.states[rows]).all(axis=(1, 2))]
+    moving = alive[np.abs(late.extrema[alive] - _contact(system)[0]).max(axis=(1, 2), initial=0.0) > SETTINGS.still]
+    return moving, len(alive) - len(moving)
 
 
 def _attracting(base: Problem, late: Recurrence) -> tuple[list[PeriodicOrbit], list[tuple[int, float, float]], int]:
@@ -156,7 +171,7 @@ def _attracting(base: Problem, late: Recurrence) -> tuple[list[PeriodicOrbit], l
     known = np.empty((0, 2))
     unsettled = 0
     for states, period, highest, lowest in zip(late.states, late.period.tolist(), late.highest, late.lowest, strict=True):
-        if known.size and np.abs(known - states[-1]).max(axis=1).min() < SAME_STATE:
+        if known.size and np.abs(known - states[-1]).max(axis=1).min() < SETTINGS.same_state:
             continue
         if not period:
             unsettled += 1
@@ -169,40 +184,39 @@ def _attracting(base: Problem, late: Recurrence) -> tuple[list[PeriodicOrbit], l
     return found, seen, unsettled
 
 
-def _repelling(base: Problem, strobes: np.ndarray, max_period: int, known: list[PeriodicOrbit]) -> list[PeriodicOrbit]:
-    """Orbits near which motions return to where they were."""
+def _repelling(base: Problem, states: np.ndarray, max_period: int, known: list[PeriodicOrbit]) -> list[PeriodicOrbit]:
+    """Orbits near which motions with these states (n, kept, 2) return to where they were."""
     found: list[PeriodicOrbit] = []
-    for q in range(1, max_period + 1):
-        if strobes.shape[1] <= q or not len(strobes):
-            break
-        distance = np.abs(strobes[:, q:] - strobes[:, :-q]).max(axis=2)
-        states, distance = strobes[:, :-q].reshape(-1, 2), distance.ravel()
-        distance = np.where(np.isfinite(distance), distance, np.inf)
-        order = np.argsort(distance)
-        tried: list[np.ndarray] = []
-        for i in order:
-            if not RECURRENCE.near_return < distance[i] < RETURN or len(tried) >= GUESSES:
-                if distance[i] >= RETURN or len(tried) >= GUESSES:
-                    break
-                continue
-            if any(np.abs(states[i] - other).max() < 0.05 for other in tried):
-                continue
-            tried.append(states[i])
-            orbit = _newton(base, states[i], q)
+    for period in range(1, min(max_period, states.shape[1] - 1 if len(states) else 0) + 1):
+        for guess in _guesses(states, period):
+            orbit = _newton(base, guess, period)
             if orbit is not None and not any(same_orbit(orbit, other) for other in known):
                 _add(found, orbit)
     return found
 
 
-def _newton(base: Problem, state: np.ndarray, period: int) -> PeriodicOrbit | None:
-    from saltus.errors import MotionError
+def _guesses(states: np.ndarray, period: int) -> list[np.ndarray]:
+    """The states nearest to which motions come back after a period, but that do not repeat themselves."""
+    distance = np.abs(states[:, period:] - states[:, :-period]).max(axis=2).ravel()
+    begin = states[:, :-period].reshape(-1, 2)
+    distance = np.where(np.isfinite(distance), distance, np.inf)
+    chosen: list[np.ndarray] = []
+    for i in np.argsort(distance):
+        if distance[i] >= SETTINGS.near or len(chosen) >= SETTINGS.guesses:
+            break
+        again = any(np.abs(begin[i] - other).max() < SETTINGS.apart for other in chosen)
+        if distance[i] > RECURRENCE.near_return and not again:
+            chosen.append(begin[i])
+    return chosen
 
+
+def _newton(base: Problem, state: np.ndarray, period: int) -> PeriodicOrbit | None:
     name = base.system.model.coordinates[0]
     try:
         orbit = orbit_from(base, {name: float(state[0]), "velocity": float(state[1])}, period)
     except MotionError:
         return None
-    return orbit if orbit is not None and orbit.admissible and orbit.amplitude > STILL else None
+    return orbit if orbit is not None and orbit.admissible and orbit.amplitude > SETTINGS.still else None
 
 
 def _add(found: list[PeriodicOrbit], orbit: PeriodicOrbit) -> None:
@@ -215,7 +229,7 @@ def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> boo
     if (a.period, a.signature.impact_count) != (b.period, b.signature.impact_count):
         return False
     one, other = np.array([a.highest, a.lowest]), np.array([b.highest, b.lowest])
-    same = np.abs(one - other).max() < 1e-6 or (mirrored and np.abs(one + other[::-1]).max() < 1e-6)
+    same = np.abs(one - other).max() < SETTINGS.same_orbit or (mirrored and np.abs(one + other[::-1]).max() < SETTINGS.same_orbit)
     if not same or a.speeds.size == 0:
         return bool(same)
-    return bool(np.abs(np.sort(a.speeds) - np.sort(b.speeds)).max() < 1e-6)
+    return bool(np.abs(np.sort(a.speeds) - np.sort(b.speeds)).max() < SETTINGS.same_orbit)
