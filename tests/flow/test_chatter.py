@@ -17,8 +17,10 @@ from shared_systems import BETA80, forced
 from saltus.flow import EventKind, simulate
 from saltus.flow.compiled import load_kernel
 from saltus.flow.kernel_layout import Mode, Status, Where
+from saltus.flow.kernel_state import KernelState
 from saltus.flow.memory_layout import State
-from saltus.flow.simulation import _prepare, program
+from saltus.flow.request import MotionRequest
+from saltus.flow.structures import program
 from saltus.systems import EnergyRestitution, Harmonic, Load, System, WallOscillator
 
 
@@ -49,7 +51,11 @@ def law(numbers, v0, t, lower_factor=1.0):
 def averaged_speed(system, v0, duration, contact=0.0):
     """The speed of the kernel's CHATTER mode after a time, from its own state (a motion at contact reports 0)."""
     run = program(system)
-    where, state, settings = _prepare(system, run, np.array([contact]), np.array([v0]), None, duration, 0.0, 1e-14)
+    arguments = {"velocity": v0, "periods": None, "duration": duration, "tol": 1e-14, "time": 0.0, "side": None}
+    coordinates = {system.model.coordinates[0]: contact}
+    request = MotionRequest(system=system, coordinates=coordinates, stop_at=(), dense=False, **arguments)
+    now = KernelState.at_start(request, run)
+    where, state, settings = now.where, now.state, now.settings
     steps = (np.empty((64, 2), dtype=np.int64), np.empty((64, 2)), np.empty((64, 1, where[Where.ORDER] + 2)))
     events = (np.empty((64, 4), dtype=np.int64), np.empty((64, 3)))
     assert load_kernel()(where, state, settings, run.env, run.model, steps, events) == Status.DONE

@@ -9,7 +9,7 @@ import pytest
 
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.flow.simulation import _structures
+from saltus.flow.structures import _structures
 from saltus.systems import Harmonic, Load, Model, System, VelocityReduction, WallOscillator
 from saltus.systems.registry import MODELS, register
 from saltus.taylor.cache import cache_directory
@@ -152,7 +152,7 @@ class Tabulated(Model):
 def test_an_array_in_a_model_is_not_taken_from_another_one():
     from generated_functions import Generated
 
-    from saltus.flow.simulation import structure_key
+    from saltus.flow.structures import structure_key
 
     one, four = (System(model=Tabulated(factors=np.array([f]))) for f in (1.0, 4.0))
     assert structure_key(one) != structure_key(four)

@@ -14,7 +14,7 @@ from saltus.flow.ensemble.function_types import LANE_SERIES
 from saltus.flow.ensemble.threads import lane_order
 from saltus.flow.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, LanePart, LaneSlot
 from saltus.flow.memory_layout import SERIES_LENGTH as STRIDE
-from saltus.flow.simulation import program
+from saltus.flow.structures import program
 from saltus.systems import Harmonic, Load, Model, Record, System, WallOscillator
 from saltus.taylor import private_numba as jit
 from saltus.taylor.graph import RECORD_WIDTH

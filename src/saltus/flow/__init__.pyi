@@ -22,8 +22,9 @@ from .recurrence import (
     return_period,
 )
 from .sensitivity import Sensitivities, sensitivities
-from .simulation import limits_of, program, simulate, taylor_order
+from .simulation import simulate
 from .stops import Stop
+from .structures import limits_of, program, taylor_order
 from .validity import Validity
 
 __all__ = [

@@ -11,8 +11,8 @@ from saltus.errors import MotionError
 from saltus.flow.dense_output import DenseOutput
 from saltus.flow.kernel_layout import Where
 from saltus.flow.motion import Event, EventKind, Impacts, Samples
+from saltus.flow.request import MotionRequest
 from saltus.flow.validity import Validity, ValidityCheck
-from saltus.systems import System
 
 MOST_STEPS = 10_000_000  # kept whole; about 2 GB
 BUFFER = 4096  # steps, and events, that one call of the kernel may record
@@ -74,20 +74,19 @@ class Recorder:
     bounded by the samples and the events.
     """
 
-    def __init__(
-        self, system: System, order: int, length: float, dense: bool, sample_times: np.ndarray | None, columns: int = 0
-    ) -> None:
-        dof, size = len(system.model.coordinates), BUFFER if dense or sample_times is not None else 8
+    def __init__(self, request: MotionRequest, order: int, columns: int) -> None:
+        kept = request.dense or request.sample_times is not None
+        dof, size = len(request.system.model.coordinates), BUFFER if kept else 8
         self.steps = (np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
         self.events = (np.empty((BUFFER, 4), dtype=np.int64), np.empty((BUFFER, 3 + columns)))
         self.total = 0  # events so far
         self._kept = 0  # steps so far
-        self._length, self._times = length, sample_times
+        self._length, self._times = float(request.clock.length), request.sample_times
         self._pieces: list[DenseOutput] = []
         self._events: list[tuple[np.ndarray, ...]] = []
         self._samples: list[tuple[np.ndarray, ...]] = []
         self._next = 0  # index of the first sample time that is still to come
-        self._check = ValidityCheck(system)
+        self._check = ValidityCheck(request.system)
 
     def take(self, where: np.ndarray) -> None:
         """Empty the buffers."""

@@ -13,6 +13,7 @@ from saltus.errors import ParameterError
 from saltus.flow.kernel_layout import GrazingDetail
 from saltus.flow.memory_layout import RestDetail
 from saltus.flow.motion import EventKind, Motion
+from saltus.flow.request import MotionRequest
 from saltus.flow.simulation import Followed, follow
 from saltus.flow.stops import Stop
 from saltus.progress import Progress, silent
@@ -88,9 +89,9 @@ def sensitivities(
         MotionError: as for `simulate`.
     """
     paths = _paths(parameters)
-    followed = follow(
-        system,
-        paths,
+    request = MotionRequest(
+        system=system,
+        coordinates=coordinates,
         velocity=velocity,
         periods=periods,
         duration=duration,
@@ -99,10 +100,9 @@ def sensitivities(
         side=side,
         stop_at=stop_at,
         dense=dense,
-        samples=None,
-        progress=progress,
-        coordinates=coordinates,
+        sensitivities=paths,
     )
+    followed = follow(request, progress)
     motion, n = followed.motion, len(system.model.coordinates)
     columns = followed.columns + np.outer(_rates(motion), _end_shift(followed, paths, periods))
     return Sensitivities(

@@ -16,7 +16,7 @@ from saltus.flow.ensemble.inputs import Inputs, read_inputs
 from saltus.flow.ensemble.lane_layout import JobLabel, JobNumber
 from saltus.flow.ensemble.threads import Jobs, Lanes, available_cores
 from saltus.flow.forcing_time import Clock, clock
-from saltus.flow.simulation import Program, check_gap, limits_of, program
+from saltus.flow.structures import Program, check_gap, limits_of, program
 from saltus.progress import Progress, silent
 from saltus.systems import System, check_system, numbers
 

@@ -13,7 +13,7 @@ from saltus.flow.ensemble.ensemble_dataset import Wanted
 from saltus.flow.ensemble.lane_layout import EndLabel, JobLabel, JobNumber
 from saltus.flow.ensemble.threads import Jobs
 from saltus.flow.kernel_layout import Mode, Status
-from saltus.flow.simulation import limits_of, program
+from saltus.flow.structures import limits_of, program
 from saltus.systems import System
 
 

@@ -16,7 +16,7 @@ from saltus.flow.ensemble.compiled_lanes import compile_everything, load_advance
 from saltus.flow.ensemble.lane_functions import Slots
 from saltus.flow.ensemble.lane_layout import EndLabel, EndNumber, Size
 from saltus.flow.kernel_layout import CHATTER_SPEED, SHORTEST, SLOW
-from saltus.flow.simulation import Program, taylor_order
+from saltus.flow.structures import Program, taylor_order
 from saltus.progress import Progress, silent
 from saltus.taylor import CACHE_LINE, WIDTH, pointer
 

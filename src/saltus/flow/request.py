@@ -1,0 +1,99 @@
+"""What a single motion is asked for: the arguments that `simulate` and `sensitivities` share, read and checked once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import check_number
+from saltus.errors import ParameterError, near
+from saltus.flow.forcing_time import Clock, clock
+from saltus.flow.structures import limits_of
+from saltus.systems import System, check_system
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionRequest:
+    """The arguments of `simulate`, as they are given.
+
+    Raises:
+        ParameterError: an argument without meaning.
+    """
+
+    system: System
+    coordinates: Mapping[str, float]
+    velocity: Any
+    periods: float | None
+    duration: float | None
+    tol: float
+    time: float
+    side: int | None
+    stop_at: Iterable[str]
+    dense: bool
+    samples: Any = None
+    sensitivities: tuple[str, ...] | None = None  # parameters to differentiate to; None without derivatives
+    # What follows from these:
+    position: np.ndarray = field(init=False)
+    speeds: np.ndarray = field(init=False)
+    limits: tuple[str, ...] = field(init=False)  # margins that end the motion
+    clock: Clock = field(init=False)
+    sample_times: np.ndarray | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        check_system(self.system, "simulate")
+        for name, value in self._read().items():
+            object.__setattr__(self, name, value)
+
+    def _read(self) -> dict[str, Any]:
+        """The fields that follow from the arguments."""
+        position, speeds = _start_state(self.system, self.velocity, self.coordinates)
+        limits = limits_of(self.system, self.stop_at)
+        check_number("tol", self.tol, at_least=1e-15, at_most=1e-6)
+        check_number("time", self.time)
+        if self.side not in (None, 1, -1):
+            raise ParameterError(f"side must be +1 or -1, got {self.side!r}", "side")
+        return {
+            "position": position,
+            "speeds": speeds,
+            "limits": limits,
+            "clock": clock(float(self.time), self.system.load.period, self.periods, self.duration),
+            "sample_times": None if self.samples is None else _sample_times(self.samples, float(self.time)),
+        }
+
+
+def _sample_times(samples: Any, start: float) -> np.ndarray:
+    try:
+        times = np.atleast_1d(np.asarray(samples, dtype=float))
+    except (TypeError, ValueError):
+        times = np.array([np.nan])
+    if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0).any() or (times < start).any():
+        raise ParameterError(
+            f"samples must be times that do not decrease, from the start {start:g} on, got {samples!r}", "samples"
+        )
+    return times
+
+
+def _start_state(system: System, velocity: Any, coordinates: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    names = system.model.coordinates
+    for name in coordinates:
+        if name not in names:
+            raise ParameterError(f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names)}", name)
+    missing = [name for name in names if name not in coordinates]
+    if missing:
+        raise ParameterError(f"the state at the start needs {missing[0]}=...", missing[0])
+    for name in names:
+        check_number(name, coordinates[name])
+    try:
+        speeds = np.atleast_1d(velocity)
+        if np.ndim(velocity) == 0 and velocity == 0.0:
+            speeds = np.zeros(len(names))
+    except ValueError:
+        raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}", "velocity") from None
+    if speeds.shape != (len(names),):
+        raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}", "velocity")
+    for value in speeds:
+        check_number("velocity", value)
+    return np.array([coordinates[name] for name in names], dtype=float), speeds.astype(float)
