@@ -94,7 +94,7 @@ def test_bands_are_light_blue_and_light_orange_behind_everything(axes):
 
 
 def test_limits_are_two_greens_apart_from_each_other_and_from_the_critical_load(axes):
-    response.draw_limits(axes, 1.7, 3.5, scale=1.0)
+    response.draw_limits(axes, (1.7, 3.5), scale=1.0)
     response.draw_critical(axes, 0.1)
     line, farthest, critical = axes.lines
     assert line.get_ydata()[0] == 1.7
@@ -105,7 +105,7 @@ def test_limits_are_two_greens_apart_from_each_other_and_from_the_critical_load(
 
 
 def test_limits_beyond_the_axes_do_not_stretch_them(axes):
-    response.draw_limits(axes, 1.7, 35.0)
+    response.draw_limits(axes, (1.7, 35.0))
     assert len(axes.lines) == 1
     assert axes.get_ylim() == (0, 4)
 

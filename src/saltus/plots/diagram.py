@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 from typing import Any
 
 import numpy as np
@@ -31,15 +29,15 @@ def draw_diagram(tree: Any) -> Figure:
     top = _top(tree, low, high)
     axes[0].set_ylim(-0.02 * top, 1.08 * top)  # so that marks on the axis are seen whole
     axes[0].set_ylabel(rf"$\max_\tau|{name}|${unit}")
-    limits = _limits(tree)
+    limits = [float(limit) for limit in np.atleast_1d(tree.attrs["limits"])]
     draw_response(axes[0], tree)
-    draw_limits(axes[0], *limits)
+    draw_limits(axes[0], limits)
     if simulated:
         draw_stroboscopic_states(axes[1], tree)
         axes[1].set_ylabel(rf"${name}$ at phase 0{unit}")
         axes[1].set_title("stroboscopic points of direct simulation", loc="left", pad=3)
     axes[-1].set_xlabel(parameter_name(tree.attrs["path"]))
-    response_legend(figure, [tree], limits=limits[0] < 1.08 * top)
+    response_legend(figure, [tree], limits=min(limits, default=np.inf) < 1.08 * top)
     return figure
 
 
@@ -58,15 +56,6 @@ def _top(tree: Any, low: float, high: float) -> float:
 
 def _within(x: np.ndarray, low: float, high: float) -> np.ndarray:
     return np.asarray((x >= low) & (x <= high))
-
-
-def _limits(tree: Any) -> tuple[float, float]:
-    """The straight line and the kinematic limit of a metainterface; infinite where there are none, or where they vary."""
-    model = json.loads(tree.attrs["system"])["model"]
-    if model.get("type") != "Metainterface" or tree.attrs["path"] == "model.beta0":
-        return math.inf, math.inf
-    straight = math.pi - float(model["beta0"])
-    return straight, 2.0 * straight
 
 
 def draw_stroboscopic_states(ax: Any, tree: Any) -> None:

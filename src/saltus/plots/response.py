@@ -5,7 +5,8 @@ They are drawn from the DataTree of a study: children `branch_...` (see `saltus.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,17 @@ import numpy as np
 from saltus.branch_lines import branches_of, smooth_lines
 from saltus.plots.conventions import INK, LIMIT, LIMIT_LINE, STABLE_LINE, UNSTABLE_LINE
 
-PLACES, AROUND = 24, 0.05  # tried for an inset along each side, and what its ticks take, in shares of the axes
-LEAST_MARK = 1.5  # mm between two marks of one kind: nearer ones are left to the zooms and to the data
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResponseSettings:
+    """Where an inset may be placed, and how near marks may come to one another."""
+
+    inset_places: int = 24  # So many places along each side of the axes are tried for an inset.
+    inset_margin: float = 0.05  # The ticks of an inset take this share of the axes.
+    mark_distance: float = 1.5  # Marks of one kind that are nearer, in mm, are left to the insets and to the data.
+
+
+SETTINGS = ResponseSettings()
 
 QSB_LINE: dict[str, Any] = {"color": "#7b2d9b", "linestyle": (0, (3, 2)), "linewidth": 1.0}
 FARTHEST_LINE: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (1, 1.2)), "linewidth": 1.2}
@@ -71,7 +81,7 @@ def draw_special(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: flo
         inside = ((places >= low) & (places <= high)).all(axis=1)
         kept: list[np.ndarray] = []
         for place in places[inside]:
-            if all(np.linalg.norm((place - other) / (high - low) * unit) > LEAST_MARK for other in kept):
+            if all(np.linalg.norm((place - other) / (high - low) * unit) > SETTINGS.mark_distance for other in kept):
                 kept.append(place)
         if kept:
             ax.plot(*np.array(kept).T, linestyle="none", zorder=5, **_mark(style))
@@ -105,10 +115,10 @@ def draw_bands(ax: Any, spectrum: Any) -> None:
         ax.axvspan(low, high, color=BANDS[str(kind)], linewidth=0, zorder=0)
 
 
-def draw_limits(ax: Any, line: float, farthest: float, scale: float = 1.0, mirrored: bool = False) -> None:
+def draw_limits(ax: Any, limits: Iterable[float], scale: float = 1.0, mirrored: bool = False) -> None:
     """Green lines at the straight line, dashed, and at the kinematic limit, dotted, those that fall inside the axes."""
     low, high = ax.get_ylim()
-    for angle, style in ((line, LIMIT_LINE), (farthest, FARTHEST_LINE)):
+    for angle, style in zip(limits, (LIMIT_LINE, FARTHEST_LINE), strict=False):
         for value in (angle / scale, *((-angle / scale,) if mirrored else ())):
             if low < value < high:
                 ax.axhline(value, zorder=2, **style)
@@ -158,12 +168,13 @@ def free_place(
         for _, x, y in smooth_lines(branch, quantity):
             marks.append(np.stack([(x - left) / (right - left), (y / scale - low) / (high - low)], axis=1))
     points = np.concatenate(marks)
+    margin = SETTINGS.inset_margin
     lines = [(line.get_ydata()[0] - low) / (high - low) for line in ax.get_lines() if len(set(line.get_ydata())) == 1]
     best, least = (0.1, 0.1), np.inf
-    for y in np.linspace(0.07, 0.96 - size[1], PLACES):
-        for x in np.linspace(0.07, 0.98 - size[0], PLACES):
-            inside = (np.abs(points - np.array([x + size[0] / 2, y + size[1] / 2])) < np.array(size) / 2 + AROUND).all(axis=1)
-            crossed = sum(y - AROUND < line < y + size[1] + AROUND for line in lines)
+    for y in np.linspace(0.07, 0.96 - size[1], SETTINGS.inset_places):
+        for x in np.linspace(0.07, 0.98 - size[0], SETTINGS.inset_places):
+            inside = (np.abs(points - np.array([x + size[0] / 2, y + size[1] / 2])) < np.array(size) / 2 + margin).all(axis=1)
+            crossed = sum(y - margin < line < y + size[1] + margin for line in lines)
             cost = inside.sum() + 0.5 * crossed - 1e-3 * y  # rather a line than a branch, and rather above
             if cost < least:
                 best, least = (x, y), cost

@@ -63,7 +63,7 @@ def draw_panel(ax: Any, tree: Any, name: str, title: str, unit: str) -> None:
     ax.set_ylabel(rf"$\max_\tau|\theta|/{unit}$")
     panel_label(ax, name)
     ax.set_title(title, pad=4)
-    draw_limits(ax, tree.attrs["line"], tree.attrs["farthest"], scale)
+    draw_limits(ax, tree.attrs["limits"], scale)
     draw_response(ax, tree, scale=scale)
 
 

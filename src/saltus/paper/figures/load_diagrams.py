@@ -74,6 +74,6 @@ def draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
 
 def frame(ax: Any, tree: Any, mirrored: bool = False) -> None:
     """The limits of the mechanism, the quasi-static bifurcation and the name of the parameter."""
-    draw_limits(ax, tree.attrs["line"], tree.attrs["farthest"], mirrored=mirrored)
+    draw_limits(ax, tree.attrs["limits"], mirrored=mirrored)
     draw_critical(ax, tree.attrs["critical"])
     ax.set_xlabel(r"load amplitude $\widehat{\mathcal{H}}$")

@@ -40,7 +40,7 @@ def draw(data: Any) -> Any:
     figure = new_figure(DOUBLE_COLUMN, 120.0)
     axes = figure.subplots(2, len(data.children), squeeze=False, sharex="col", height_ratios=[3, 2])
     for column, (name, tree) in zip(axes.T, data.children.items(), strict=True):
-        _strobes(column[0], tree)
+        _stroboscopic_states(column[0], tree)
         _exponents(column[1], tree)
         column[0].set_title(TITLES[name], pad=4)
         panel_label(column[0], name)
@@ -51,7 +51,7 @@ def draw(data: Any) -> Any:
     return figure
 
 
-def _strobes(ax: Any, tree: Any) -> None:
+def _stroboscopic_states(ax: Any, tree: Any) -> None:
     draw_bands(ax, tree)
     places = tree["stroboscopic"]["position"].values
     values = np.broadcast_to(tree["stroboscopic"]["value"].values[:, None, None], places.shape)

@@ -36,8 +36,7 @@ def static_scale(system: System) -> float:
 
 
 def _panel(tree: Any, scale: float) -> Any:
-    """A study's tree with the scale of its rotations, both limits of the mechanism and Hcr among its attributes, all in rad."""
+    """A study's tree with the scale of its rotations, in rad, and Hcr among its attributes."""
     beta0 = math.radians(BETA0)
-    angles = {"scale": scale, "line": math.pi - beta0, "farthest": 2 * (math.pi - beta0)}
-    tree.attrs = {**tree.attrs, **angles, "critical": float(critical_horizontal(beta0, VERTICAL))}
+    tree.attrs = {**tree.attrs, "scale": scale, "critical": float(critical_horizontal(beta0, VERTICAL))}
     return tree

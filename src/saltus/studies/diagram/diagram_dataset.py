@@ -10,6 +10,7 @@ from saltus.orbits import Branch, PeriodicOrbit, RestingOrbit, Search, defects
 from saltus.provenance import provenance
 from saltus.studies.diagram.bands import Bands, band_dataset
 from saltus.systems import System
+from saltus.theory import amplitude_limits
 
 if TYPE_CHECKING:
     import xarray
@@ -31,6 +32,7 @@ def diagram_tree(
         path=found.path,
         coordinate=system.model.coordinates[0],
         bounds=list(bounds),
+        limits=_limits(system, found.path, bounds),
         starts=found.starts,
         window=np.ravel(found.window).tolist(),
         **facts,
@@ -40,6 +42,12 @@ def diagram_tree(
     nodes |= {f"branch_{i:03d}": confirmed(branch) for i, branch in enumerate(by_length)}
     bands = {"bands": band_dataset()} if chaos is None else chaos.marked(turning_points(branches)).to_datasets()
     return xarray.DataTree.from_dict({**nodes, "attractors": _attractors(found), **bands, "search": _search(found)})
+
+
+def _limits(system: System, path: str, bounds: tuple[float, float]) -> list[float]:
+    """The amplitudes that motions of the mechanism do not pass, rad; none where they vary with the parameter of the diagram."""
+    low, high = ([float(limit.value) for limit in amplitude_limits(system, {path: value})] for value in bounds)
+    return low if low == high else []
 
 
 def turning_points(branches: list[Branch]) -> list[tuple[str, float]]:
