@@ -237,7 +237,7 @@ def test_a_curve_is_told_in_the_order_of_the_charts_axes():
 def test_a_chart_is_read_in_any_order_of_its_dimensions():
     turned = chart().transpose("motion", "horizontal", "vertical")
     one, other = read_chart(chart()), read_chart(turned)
-    for name in ("motions", "family", "rest_alone"):
+    for name in ("motions", "family", "monostable"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
     assert disagreements(turned, borders()).sizes["change"] == disagreements(chart(), borders()).sizes["change"]
 

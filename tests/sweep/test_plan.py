@@ -20,7 +20,7 @@ GRID = np.linspace(0.0, 1.0, 4)
         ({"function": "not_a_function"}, "is of type int, not a function"),
         ({"arguments": {"a": {"b": [1, np.arange(2)]}}}, r"arguments\['a'\]\['b'\]\[1\] is of type ndarray"),
         ({"arguments": {"a": float("nan")}}, r"arguments\['a'\] is nan"),
-        ({"arguments": {1: 2}}, "has the key 1; keys are texts"),
+        ({"arguments": {1: 2}}, "has the key 1; keys are strings"),
         ({"attrs": {"system": object()}}, r"attrs\['system'\] is of type object"),
         ({"attrs": {"plan": 1}}, "must not have the key 'plan'"),
         ({"axes": {}}, "at least one axis"),

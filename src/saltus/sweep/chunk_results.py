@@ -35,7 +35,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Raised:
-    """What a function raised, as text: not every error can travel between processes."""
+    """What a function raised, as strings: not every error can travel between processes."""
 
     error: str
     traceback: str = ""

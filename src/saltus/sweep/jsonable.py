@@ -34,10 +34,10 @@ def as_json(value: Any, place: str) -> Any:
         return [as_json(item, f"{place}[{i}]") for i, item in enumerate(value)]
     if not isinstance(value, Mapping):
         kind = type(value).__name__
-        raise ParameterError(f"{place} is of type {kind}, which JSON does not have; numbers, texts, lists and dicts can be kept")
+        raise ParameterError(f"{place} is of type {kind}, which JSON does not have; numbers, strings, lists and dicts can be")
     for key in value:
         if not isinstance(key, str):
-            raise ParameterError(f"{place} has the key {key!r}; keys are texts in JSON")
+            raise ParameterError(f"{place} has the key {key!r}; keys are strings in JSON")
     return {key: as_json(item, f"{place}[{key!r}]") for key, item in value.items()}
 
 
@@ -47,7 +47,7 @@ def one_line(value: Any) -> str:
 
 
 def differences(there: Any, here: Any, place: str = "") -> Iterator[str]:
-    """What differs between two JSON values, entry by entry; texts that are JSON themselves are looked into."""
+    """What differs between two JSON values, entry by entry; strings that are JSON themselves are compared entry by entry too."""
     there, here = _parsed(there), _parsed(here)
     if isinstance(there, dict) and isinstance(here, dict):
         for key in dict.fromkeys([*there, *here]):

@@ -119,17 +119,17 @@ class Plan:
         return (*self.axes, *(extra for extra, _ in self.variables[name].extra))
 
     def shape(self, name: str, index: Index | None = None) -> tuple[int, ...]:
-        """The shape of a variable, whole or in the chunk `index`."""
+        """The shape of a variable, of all of it or in the chunk `index`."""
         sizes = self.chunks.sizes.values() if index is None else (s.stop - s.start for s in self.chunks.slices(index))
         return (*sizes, *(size for _, size in self.variables[name].extra))
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Those of the dataset: the plan's own, and the plan itself as a text."""
+        """Those of the dataset: the plan's own, and the plan itself as a string of JSON."""
         return {**self.attrs, "plan": one_line(self.describe())}
 
     def describe(self) -> dict[str, Any]:
-        """The plan as JSON: two plans that say the same compute the same. Axes are told by a digest of their values."""
+        """The plan as JSON: plans that are equal as JSON compute the same. Axes are identified by a digest of their values."""
         variables = {
             name: {"dtype": v.dtype, "extra": [list(e) for e in v.extra], "attrs": v.attrs, "fill": repr(v.fill)}
             for name, v in self.variables.items()

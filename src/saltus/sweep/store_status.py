@@ -21,7 +21,7 @@ class Status:
 
     `done` and `failed` count chunks, of `total`; a failed chunk is one that raised when it was last tried. `bytes` is the size of
     the store's files. `started` is when the store was made, `updated` when the last chunk was written (None: none yet).
-    `running` is whether a run on this machine is writing to it, None where the file system does not tell.
+    `running` is whether a run on this machine is writing to it, None where the file system has no locks.
     """
 
     path: Path

@@ -85,7 +85,7 @@ def unseen_folds(chart: ChartMotions, curves: Sequence[xarray.Dataset]) -> np.nd
     Where another border of theirs is less than a cell away they exist in too narrow a strip for a cell to show it.
     """
     found, rows = [np.empty((0, 2))], [crossings(chart, curve) for curve in curves]
-    rows = [row[((row[:, :2] >= 0) & (row[:, :2] <= np.array(chart.rest_alone.shape) - 1)).all(axis=1)] for row in rows]
+    rows = [row[((row[:, :2] >= 0) & (row[:, :2] <= np.array(chart.monostable.shape) - 1)).all(axis=1)] for row in rows]
     points = np.concatenate([np.empty((0, 3)), *rows])
     number = np.repeat(np.arange(len(curves)), [len(row) for row in rows])
     period = np.array([int(curve.attrs["period"]) for curve in curves], dtype=int)[number]

@@ -37,7 +37,7 @@ class BorderSettings:
     harmless: int = 10
     # Changes that are looked into one by one.
     one_by_one: int = 2000
-    # A change matters so many times more where the neighbour has rest alone: that is the border of the monostable domain.
+    # A change matters so many times more where the neighbour is monostable, at rest: that is what a designer asks for.
     beside_rest: int = 10
 
 
@@ -154,7 +154,7 @@ class BorderSearch:
 
     def _urgency(self, changes: Changes) -> np.ndarray:
         """The larger the family the more, above all with rest alone beside it."""
-        beside_rest = self.chart.rest_alone[tuple(changes.target.T)]
+        beside_rest = self.chart.monostable[tuple(changes.target.T)]
         return np.asarray(self.chart.family_size[changes.motion] * np.where(beside_rest, SETTINGS.beside_rest, 1))
 
     def _note(self, change: Changes, ending: Ending) -> None:

@@ -24,12 +24,12 @@ class ChartMotions:
     motions: np.ndarray  # of dtype MOTION, by cell and falling amplitude
     family: np.ndarray  # (n,): a number that motions share which have counterparts in neighbouring cells
     least: float  # amplitude that counts
-    rest_alone: np.ndarray  # (rows, columns): no motion, settled or not, beside rest
+    monostable: np.ndarray  # (rows, columns): rest is the only motion
 
     @property
     def place(self) -> np.ndarray:
         """(n, 2): row and column of each motion."""
-        return np.stack(np.unravel_index(self.motions["cell"], self.rest_alone.shape), axis=1)
+        return np.stack(np.unravel_index(self.motions["cell"], self.monostable.shape), axis=1)
 
     @property
     def family_size(self) -> np.ndarray:
@@ -64,12 +64,12 @@ def read_chart(chart: xarray.Dataset) -> ChartMotions:
     from scipy.sparse.csgraph import connected_components
 
     chart, motions = chart.transpose("vertical", "horizontal", ...), read_motions(chart)
-    rest_alone = monostable(chart).values
-    pairs = np.concatenate([np.empty((0, 2), dtype=int), *(_counterparts(motions, rest_alone.shape, side)[0] for side in SIDES)])
+    shape = chart["count"].shape
+    pairs = np.concatenate([np.empty((0, 2), dtype=int), *(_counterparts(motions, shape, side)[0] for side in SIDES)])
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(motions), len(motions)))
     family = connected_components(graph, directed=False)[1] if len(motions) else np.zeros(0, dtype=int)
     axes = chart["horizontal"].values, chart["vertical"].values
-    return ChartMotions(*axes, motions, family, float(chart.attrs["least"]), rest_alone)
+    return ChartMotions(*axes, motions, family, float(chart.attrs["least"]), monostable(chart).values)
 
 
 def monostable(chart: xarray.Dataset) -> xarray.DataArray:
@@ -98,7 +98,7 @@ def changes_of(chart: ChartMotions) -> Changes:
     counts, place = chart.motions["amplitude"] > COUNTS * chart.least, chart.place
     motion, target = [], []
     for side in SIDES:
-        lonely = np.flatnonzero(_counterparts(chart.motions, chart.rest_alone.shape, side)[1] & counts)
+        lonely = np.flatnonzero(_counterparts(chart.motions, chart.monostable.shape, side)[1] & counts)
         motion.append(lonely)
         target.append(place[lonely] + side)
     chosen = np.concatenate(motion)

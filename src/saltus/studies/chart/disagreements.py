@@ -40,7 +40,7 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
         "amplitude": cells.motions["amplitude"][left.motion],
         "period": cells.motions["period"][left.motion],
         "cells": cells.family_size[left.motion],
-        "beside_rest": cells.rest_alone[tuple(left.target.T)],
+        "beside_rest": cells.monostable[tuple(left.target.T)],
         "looked_into": np.array([e is not None for e in endings], dtype=bool)[~known],
     }
     data = {name: ("change", values) for name, values in columns.items()}
@@ -51,10 +51,10 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     chaos = ((number["count"] == 0) & (number["unsettled"] > 0)).values
     attrs = {
         "changes": len(changes),
-        "changes_beside_rest": int(cells.rest_alone[tuple(changes.target.T)].sum()),
+        "changes_beside_rest": int(cells.monostable[tuple(changes.target.T)].sum()),
         "on_curves": int(on_curves.sum()),
         "harmless": int(harmless.sum()),
-        "chaos_beside_rest": _neighbours(chaos, cells.rest_alone),
+        "chaos_beside_rest": _neighbours(chaos, cells.monostable),
     }
     return xr.Dataset(data, attrs=attrs)
 

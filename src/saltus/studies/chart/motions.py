@@ -87,7 +87,7 @@ def by_cell(motions: np.ndarray) -> np.ndarray:
 
 
 def table(motions: np.ndarray, size: int, coordinate: str) -> dict[str, np.ndarray]:
-    """What a chart of `size` cells says of its motions, which are given by cell and falling amplitude: a row for each cell."""
+    """The variables of a chart of `size` cells that follow from its motions, which are given by cell and falling amplitude."""
     number = np.bincount(motions["cell"], minlength=size)
     rank = np.arange(len(motions)) - np.repeat(np.cumsum(number) - number, number)
     kept = rank < KEPT

@@ -26,7 +26,7 @@ NUMBERS = ("max_period", "starts", "least", "periods", "tol", "seed")
 
 @dataclass(frozen=True)
 class DurationSettings:
-    """How long a motion is given to settle where nothing is said."""
+    """How long a motion is given to settle where `periods` is not given."""
 
     decay: float = 75.0  # A motion has settled, as a rule, once exp(-C tau / 2) has fallen to exp(-75).
     fewest: int = 40  # With much damping, or at a low frequency, some motions need longer than that rule says.
@@ -38,7 +38,7 @@ DURATION = DurationSettings()
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChartRequest:
-    """The arguments of `stability_chart` that say what is computed.
+    """The arguments of `stability_chart` that decide what is computed.
 
     Raises:
         ParameterError: an argument without meaning, or one that the system refuses.

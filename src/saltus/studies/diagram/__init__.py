@@ -1,1 +1,5 @@
-"""Response spectra and bifurcation diagrams: every branch that a search finds, and the bands of chaos."""
+"""Response spectra and bifurcation diagrams: every branch that a search finds, and the bands of chaos.
+
+`diagram.py` searches, `branch_set.py` follows what is found and what is born on it, `chaos_search.py` looks for chaos, which
+`bands.py` holds, and `diagram_dataset.py` confirms all orbits by simulation and makes the result.
+"""

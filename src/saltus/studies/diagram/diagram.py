@@ -93,25 +93,17 @@ def bifurcation_diagram(
         ParameterError: an argument without meaning.
     """
     low, high = check_bounds(bounds)
+    where: dict[str, Any] = {"window": window, "seed": seed}
+    effort: dict[str, Any] = {"max_period": max_period, "starts": starts, "repelling": repelling, **where}
     progress(0.0, "searching")
-    found = search_orbits(
-        system.with_({path: 0.5 * (low + high)}),
-        path,
-        _values((low, high), values),
-        max_period=max_period,
-        starts=starts,
-        window=window,
-        seed=seed,
-        repelling=repelling,
-        progress=part_of(progress, 0.0, SHARES.search),
-    )
+    searching = part_of(progress, 0.0, SHARES.search)
+    grid, middle = _values((low, high), values), system.with_({path: 0.5 * (low + high)})
+    found = search_orbits(middle, path, grid, **effort, progress=searching)
     branches = BranchSet(path, (low, high), max_period, step, switch)
     following = part_of(progress, SHARES.search, SHARES.branches)
     branches.fill(sorted(found.orbits, key=lambda orbit: (orbit.period, not orbit.stable)), following)
-    chaos = None
-    if bands:
-        looking = part_of(progress, SHARES.branches, SHARES.bands)
-        chaos = chaotic_bands(system, path, (low, high), count=bands, window=window, seed=seed, progress=looking)
+    looking = part_of(progress, SHARES.branches, SHARES.bands)
+    chaos = chaotic_bands(system, path, (low, high), count=bands, **where, progress=looking) if bands else None
     progress(SHARES.bands, "confirming")
     tree = diagram_tree(system, branches.branches, found, (low, high), chaos, max_period=max_period, left=branches.left)
     progress(1.0, "done")
