@@ -56,8 +56,8 @@ def attractors_along(
 ) -> xarray.Dataset:
     """The attractors at each value of a parameter, with labels that an attractor keeps as the parameter changes.
 
-    At each value they are found as by `attractors`, from the same initial states and from points of the attractors at the value
-    before, so that none is lost because its basin is small. Those at two neighbouring values are then matched, the nearest
+    At each value they are found by `find_attractors`, from the same initial states and from states of the attractors at the
+    value before, so that none is lost because its basin is small. Those at two neighbouring values are then matched, the nearest
     first: by the distance between the sets of their points at phase 0 (Hausdorff's, the larger of the two ways), relative to the
     size of the larger set. Half the threshold holds between different periods, as across a period doubling; three times as much
     between two of the same period if motions from all points of the one settle on the other. One that is matched to none is
@@ -67,7 +67,7 @@ def attractors_along(
         system: what moves.
         path: dotted path of the parameter.
         values: of the parameter, increasing or decreasing: identities are kept from each to the next.
-        window, starts, max_period, seed, tol: as for `attractors`.
+        window, starts, max_period, seed, tol: as for `find_attractors`.
         known: branches along the same parameter, whose stable orbits count at every value.
         threshold: the largest relative distance of one and the same attractor at neighbouring values.
         progress: called with the fraction done and what is being done.
@@ -78,7 +78,7 @@ def attractors_along(
         births and deaths.
 
     Raises:
-        ParameterError: a path to no number, values that are not monotonic, and as for `attractors`.
+        ParameterError: a path to no number, values that are not monotonic, and as for `find_attractors`.
     """
     check_number("threshold", threshold, above=0.0)
     grid, followed = _values(system, path, values), _Followed(threshold)

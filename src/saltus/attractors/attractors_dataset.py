@@ -50,8 +50,8 @@ def variable(dims: str | tuple[str, ...], values: Any, unit: str, text: str) -> 
 def about(system: System, kind: str, **numbers: Any) -> dict[str, Any]:
     """The attributes of a dataset: what it holds, the kind of load, and where it comes from."""
     load = "constant" if is_constant(system.load) else "periodic"
-    said = {"title": f"{kind} computed by saltus", "kind": kind, "load": load, "Conventions": "CF-1.8"}
-    return said | provenance(system, **numbers)
+    attributes = {"title": f"{kind} computed by saltus", "kind": kind, "load": load, "Conventions": "CF-1.8"}
+    return attributes | provenance(system, **numbers)
 
 
 def coordinate(system: System) -> tuple[str, str]:

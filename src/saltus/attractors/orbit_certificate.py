@@ -14,10 +14,22 @@ from saltus.flow import nearest_return
 from saltus.orbits import PeriodicOrbit, Problem, Signature, orbit_from
 from saltus.systems import System
 
-RESIDUAL = 1e-9  # of the orbit's equations
-DEFECT = 1e-6  # of its repetition in direct simulation, and of the motion's states from its own
-NEUTRAL = 1e-9  # a multiplier this near to 1 does not show that an orbit attracts
-SLOW = 1e-3  # a motion that approaches slowly may still be as far away
+
+@dataclass(frozen=True)
+class CertificateSettings:
+    """How well an orbit must explain a motion."""
+
+    # Its equations must be solved to this.
+    residual: float = 1e-9
+    # It must repeat itself to this in direct simulation, and lie as near to the motion's states,
+    defect: float = 1e-6
+    # or this near to those of a motion that approaches slowly.
+    slow: float = 1e-3
+    # A multiplier this near to 1 does not show that an orbit attracts.
+    neutral: float = 1e-9
+
+
+SETTINGS = CertificateSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +46,13 @@ class Certificate:
         orbit = self.orbit
         if orbit is None:
             return "Newton's method finds no orbit there"
-        if not orbit.admissible or not orbit.residual < RESIDUAL:
+        if not orbit.admissible or not orbit.residual < SETTINGS.residual:
             return f"no admissible orbit solves the equations there (residual {orbit.residual:.1g})"
         if orbit.grazes:
             return "the orbit there touches the contact without speed, and has no multipliers"
-        if not orbit.stable or abs(orbit.multipliers[0]) > 1.0 - NEUTRAL:
+        if not orbit.stable or abs(orbit.multipliers[0]) > 1.0 - SETTINGS.neutral:
             return f"the orbit there does not attract: its largest multiplier is {abs(orbit.multipliers[0]):.9g}"
-        if not orbit.defect < DEFECT:
+        if not orbit.defect < SETTINGS.defect:
             return f"in direct simulation the orbit there misses itself by {orbit.defect:.1g}"
         if not self.distance < self.within:
             return f"the orbit found passes {self.distance:.1g} beside the motion"
@@ -77,7 +89,7 @@ def certify(system: System, state: np.ndarray, period: int | None, max_period: i
     states = np.concatenate([[state], later])
     q = period or nearest_return(states[::-1], max_period)
     orbit = solved_orbit(system, state, q, admissible=False)
-    within = DEFECT if period else SLOW
+    within = SETTINGS.defect if period else SETTINGS.slow
     if orbit is None:
         return Certificate(None, np.inf, within)
     apart = np.abs(states[:q] - np.array(orbit.state)).max(axis=1)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RecurrenceSettings:
-    """The numbers by which a motion is said to repeat itself, for all who ask."""
+    """The numbers by which a motion repeats itself, in orbits, attractors, charts and diagrams."""
 
     # The compiled lanes look for periods up to this one (`LONGEST_RECURRENCE` in flow/ensemble/sampling.py): a motion has settled
     # on q periods when 2 q + 2 successive states agree with those q periods before to within 1e-10 of their size.

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -96,7 +97,7 @@ def uncertainty_exponent(labels: Any, distances: Iterable[int] | None = None) ->
     0.5, unless fewer than three are.
 
     Raises:
-        ParameterError: a grid too small for three distances; distances that are not whole.
+        ParameterError: a grid too small for three distances; distances that are no whole numbers.
     """
     from scipy.ndimage import maximum_filter, minimum_filter
 
@@ -143,6 +144,14 @@ def _slope(reach: np.ndarray, shares: np.ndarray) -> tuple[float, float]:
     return slope, float(np.sqrt(residual @ residual / (len(x) - 2) / (x @ x)))
 
 
+class WadaVerdict(StrEnum):
+    """Whether basins have the Wada property."""
+
+    WADA = "wada"
+    NOT_WADA = "not wada"
+    UNDECIDED = "undecided"
+
+
 @dataclass(frozen=True, eq=False)
 class Wada:
     """How near to the boundary all basins are (after Daza et al., Sci. Rep. 5 (2015) 16579)."""
@@ -153,19 +162,19 @@ class Wada:
     boundary_cells: int
 
     @property
-    def verdict(self) -> str:
-        """ "wada", "not wada" or "undecided", by the share at the largest radius; of fewer than three basins "not wada"."""
+    def verdict(self) -> WadaVerdict:
+        """By the share at the largest radius; of fewer than three basins that they are not."""
         share = self.shares[-1] if len(self.shares) else 0.0
         if len(self.labels) < 3 or share <= FAILS:
-            return "not wada"
-        return "wada" if share >= AGREES else "undecided"
+            return WadaVerdict.NOT_WADA
+        return WadaVerdict.WADA if share >= AGREES else WadaVerdict.UNDECIDED
 
     @property
     def resolution(self) -> str:
         """What the test can see."""
         return (
             f"a boundary cell meets all {len(self.labels)} basins if each has a cell within {int(self.radii[-1])} cells of it: "
-            "basins that part there on a finer scale are not told from Wada ones, and threads finer than a cell are not seen"
+            "basins that part there on a finer scale look like Wada ones, and threads finer than a cell are not seen"
         )
 
 

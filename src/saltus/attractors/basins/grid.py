@@ -101,9 +101,9 @@ def basins_of_attraction(
     within a distance of the attractor's points at phase 0, in forcing periods; to rest, at most that to the proof of capture.
 
     Args:
-        system: what moves, as for `attractors`.
-        velocity: the velocities of the grid, increasing; by default 201 over the window of `found`, or of `attractors`.
-        found: the attractors and their labels; by default those that `attractors` finds, over the grid.
+        system: what moves, as for `find_attractors`.
+        velocity: the velocities of the grid, increasing; by default 201 over the window of `found`, or of `find_attractors`.
+        found: the attractors and their labels; by default those that `find_attractors` finds, over the grid.
         periods: the most forcing periods of each motion.
         within: that distance, in the larger of coordinate and velocity.
         curves: adds the curves at which basins meet, computed by the backward flow (see `basin_boundaries`), as `boundary_...`
@@ -120,7 +120,7 @@ def basins_of_attraction(
         `cells` is the share of the grid.
 
     Raises:
-        ParameterError: as for `attractors`; a grid that does not increase; attractors of another system.
+        ParameterError: as for `find_attractors`; a grid that does not increase; attractors of another system.
     """
     clock = with_clock(system)
     grid = _grid(clock, velocity, coordinates, found)

@@ -17,7 +17,7 @@ from saltus.systems import System
 class LabellingSettings:
     """How motions are followed until their label is known."""
 
-    # After so many forcing periods, and later longer ones, motions that have settled are told from those that go on.
+    # After so many forcing periods, and later longer ones, motions that have settled are labelled, and the others go on.
     stage: int = 48
     # So many of the last states of a motion that does not settle must lie on a sampled set, in the median.
     last: int = 64

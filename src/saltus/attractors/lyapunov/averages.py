@@ -40,7 +40,7 @@ def uncertainty(series: np.ndarray) -> np.ndarray:
     are ever less correlated, and where entries follow their like the standard error from them grows until the batches outlast
     the correlation. The largest of those from 16 to 127 batches is taken, times the factor of Student's t for as few. It is
     honest as long as the correlation dies out within a sixteenth of the run; for regular motion, whose averages converge faster
-    than any scatter tells, it is far too large.
+    than their scatter shows, it is far too large.
 
     Raises:
         ValueError: fewer than 16 entries.
@@ -59,7 +59,7 @@ class Estimate:
 
     value: np.ndarray  # (...)
     error: np.ndarray  # (...)
-    halves: np.ndarray  # (2, ...): from the first and from the second half of the run alone
+    halves: np.ndarray  # (2, ...): from the first and from the second half of the run
     half_errors: np.ndarray  # (2, ...)
 
     @classmethod

@@ -52,7 +52,7 @@ def lyapunov_many(
 
     Returns:
         A Dataset over the dimensions of the arguments: `exponent` and its `error`, `at_half` and `later_half` (from the halves of
-        the run alone), each with a dimension `index` of 2; `resolution`, below which an exponent is not told from 0; `positive`,
+        the run), each with a dimension `index` of 2; `resolution`, below which an exponent may be 0; `positive`,
         whether the largest is above both, in all and in both halves; `period`, the forcing periods after which the motion repeats
         itself at the end, 0 if it does not, `ending`, and the state at the end.
 
@@ -140,8 +140,8 @@ def _measures(system: System, run: _Many, stretched: Stretched, captured: np.nda
 
 MEANINGS = {
     "exponent": "Lyapunov exponents, per unit of dimensionless time",
-    "at_half": "the exponents from the first half of the run alone",
-    "later_half": "the exponents from the second half of the run alone",
+    "at_half": "the exponents from the first half of the run",
+    "later_half": "the exponents from the second half of the run",
     "error": "half width of the 95 % interval of the exponent",
     "resolution": "2 ln(t) / t, what growth by the square of the time would give",
     "positive": "whether the largest exponent is above its error and the resolution, in all and in both halves",

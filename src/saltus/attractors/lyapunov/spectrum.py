@@ -11,7 +11,7 @@ import numpy as np
 from saltus.attractors.lyapunov.area_contraction import Contraction
 from saltus.attractors.lyapunov.averages import BATCHES, Estimate, average, resolution, uncertainty
 from saltus.attractors.lyapunov.renormalisation import check_run, first_frame, period_length, span_count, state_of
-from saltus.attractors.lyapunov.two_trajectory import ACCURACY, TOLD, separation_growth
+from saltus.attractors.lyapunov.two_trajectory import ACCURACY, EVERY, separation_growth
 from saltus.flow import Motion, Stop, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
@@ -27,14 +27,14 @@ class Exponents:
 
     values: np.ndarray  # (2 n,) for n coordinates
     errors: np.ndarray  # (2 n,): half widths of 95 % intervals, see `averages.uncertainty`
-    halves: np.ndarray  # (2, 2 n): the same exponents from the first and from the second half of the run alone
+    halves: np.ndarray  # (2, 2 n): the same exponents from the first and from the second half of the run
     half_errors: np.ndarray  # (2, 2 n)
     divergence: float  # the mean of ln det per unit of time, from impacts and the time on each side; NaN where not so simple
     stroboscopic: float  # the stroboscopic map's largest exponent over the forcing period, from two trajectories; or NaN
     stroboscopic_error: float
     periods: int  # forcing periods (units of time under constant loads) that were averaged over
     duration: float  # that in dimensionless time
-    largest_condition: float  # of the derivatives over a piece of the run
+    largest_condition: float  # of the derivatives over a span of the run
     state: dict[str, Any]  # at the end of the run, at phase 0: arguments of `simulate`
     note: str | None  # why the exponents are not finite
 
@@ -56,7 +56,7 @@ class Exponents:
 
     @property
     def resolution(self) -> float:
-        """2 ln(t) / t after a time t: below it an exponent is not told from the growth by t^2 that a regular motion may have."""
+        """2 ln(t) / t after a time t: a regular motion, which may grow by t^2, may have an exponent below it."""
         return float(resolution(self.duration))
 
     @property
@@ -140,7 +140,7 @@ class _Run:
                 if self.note is not None:
                     self.state = begin
                     return
-            if p % TOLD == TOLD - 1:
+            if p % EVERY == EVERY - 1:
                 progress((p + 1) / len(self.areas), "derivatives")
 
     def _advance(self, p: int, j: int, frame: np.ndarray, contraction: Contraction, tol: float) -> np.ndarray:

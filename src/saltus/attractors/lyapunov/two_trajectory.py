@@ -14,7 +14,7 @@ from saltus.systems import System
 DISTANCE = 1e-7  # of the two: far above the error of a period, far below what bends the map
 ACCURACY = 1e-5  # what motions at that distance, with errors of their own, may miss of an exponent
 TOLERANCE = 1e-14
-TOLD = 16  # periods between calls of the progress
+EVERY = 16  # periods between calls of the progress
 
 
 def separation_growth(
@@ -37,7 +37,7 @@ def separation_growth(
             break
         growth[p] = np.log(distance / np.linalg.norm(away))
         here, away = following, apart * (DISTANCE / distance)
-        if p % TOLD == TOLD - 1:
+        if p % EVERY == EVERY - 1:
             progress((p + 1) / periods, "two trajectories")
     return growth
 

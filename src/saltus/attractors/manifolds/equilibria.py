@@ -18,11 +18,23 @@ from saltus.checks import Rectangle, check_window
 from saltus.errors import ParameterError
 from saltus.systems import Constant, System
 
-GRID = 2001  # points of the window between which equilibria are looked for
-SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # of a derivative by central differences
-DIFFERENCE = 1e-3
-NEUTRAL = 1e-9  # a real part up to this, which differences leave where nothing is lost, is 0
-INSIDE = 1e-6  # from the contact, where the pull at the contact itself is 0
+
+@dataclass(frozen=True)
+class EquilibriumSettings:
+    """How equilibria are found, and their eigenvalues."""
+
+    # Equilibria are looked for between so many points of the window.
+    grid: int = 2001
+    # Derivatives are central differences of sixth order with this step.
+    difference: float = 1e-3
+    # A real part up to this, which differences leave where nothing is lost, is 0.
+    neutral: float = 1e-9
+    # The pull beside the contact is looked at so far from it where the pull at the contact is 0.
+    inside: float = 1e-6
+
+
+SETTINGS = EquilibriumSettings()
+SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # of a first derivative by central differences
 
 
 @dataclass(frozen=True)
@@ -54,13 +66,13 @@ def equilibria(system: System, window: Rectangle = PLANE) -> tuple[Equilibrium, 
     model, low, high = system.model, *area.coordinate
     found = []
     for side in model.sides or (1,):
-        grid = np.linspace(low, high, GRID)
+        grid = np.linspace(low, high, SETTINGS.grid)
         if model.sides:
             grid = np.sort(np.append(grid[np.asarray(model.gap(grid, side)) > 0.0], _beside(system, side)))
         pull = _pull(system, side)
         for place in _zeros(pull, grid[(grid >= low) & (grid <= high)]):
             values = _eigenvalues(system, place, side)
-            found.append(Equilibrium(place, side, values, values[0].real <= NEUTRAL))
+            found.append(Equilibrium(place, side, values, values[0].real <= SETTINGS.neutral))
     if model.sides and low <= float(model.contact) <= high:
         found += _at_contact(system)
     return tuple(sorted(found, key=lambda one: one.place))
@@ -84,7 +96,7 @@ def _pull(system: System, side: int) -> Callable[[float], float]:
 def _beside(system: System, side: int) -> float:
     """A coordinate just inside a side."""
     contact = float(system.model.contact)
-    return contact + (INSIDE if float(system.model.gap(contact + INSIDE, side)) > 0.0 else -INSIDE)
+    return contact + (SETTINGS.inside if float(system.model.gap(contact + SETTINGS.inside, side)) > 0.0 else -SETTINGS.inside)
 
 
 def _zeros(pull: Callable[[float], float], grid: np.ndarray) -> Iterator[float]:
@@ -101,7 +113,7 @@ def _eigenvalues(system: System, place: float, side: int) -> tuple[complex, comp
     def pull(q: float, v: float) -> float:
         return float(system.model.acceleration(0.0, q, v, float(side), system.load))
 
-    h = DIFFERENCE
+    h = SETTINGS.difference
     slope = sum(w * (pull(place + j * h, 0.0) - pull(place - j * h, 0.0)) for j, w in SIXTH_ORDER) / h
     loss = sum(w * (pull(place, j * h) - pull(place, -j * h)) for j, w in SIXTH_ORDER) / h
     root = cmath.sqrt(0.25 * loss * loss + slope)

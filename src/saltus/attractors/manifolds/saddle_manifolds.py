@@ -49,7 +49,7 @@ class Manifold:
 
     orbit: PeriodicOrbit
     stable: bool
-    multiplier: float  # mu_s or mu_u, of the orbit's whole period
+    multiplier: float  # mu_s or mu_u, over the orbit's period
     orbit_states: np.ndarray  # (q, 2): the orbit at phase 0
     directions: np.ndarray  # (q, 2): unit vectors along the manifold there
     branches: tuple[ManifoldBranch, ...]

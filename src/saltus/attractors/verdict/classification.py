@@ -37,7 +37,7 @@ def classify(
     * `chaotic`: not settled after transient + periods; then a largest Lyapunov exponent above 0 by more than its error and the
       growth of regular motions, in both halves of a run and of one twice as long that goes on from it; and none of 128 motions
       from states beside the last one settles within `periods`, or 2000 forcing periods if that is more. Chaotic transients,
-      which end at random, are told by that with a probability of 95 % while they last less than 43 times as long in the mean.
+      which end at random, are seen by that with a probability of 95 % while they last less than 43 times as long in the mean.
       The 0-1 test is recorded beside it, and must not contradict.
     * `quasi-periodic`: only where `excludes_tori` knows no reason against it: exponents of 0 within their error and resolution,
       and a 0-1 test that sees order.

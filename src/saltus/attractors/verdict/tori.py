@@ -29,7 +29,7 @@ def excludes_tori(system: System) -> str | None:
     * and P shrinks areas: da/dv < 0 on every side, and no impact raises the speed.
 
     For then P maps the curve onto itself and, being continuous, the area within onto at least itself; and it has less to give.
-    Both are checked by interval bounds over the whole forcing period and all states. Sufficient, not necessary: a load of which
+    Both are checked by interval bounds over all of the forcing period and all states. Sufficient, not necessary: a load of which
     the bounds do not decide is one that may have tori.
 
     Raises:
@@ -42,15 +42,15 @@ def excludes_tori(system: System) -> str | None:
     traced = trace(system)
     leaves = Leaves([Interval(value) for value in system.parameters.values()], [], time=_cells(system))
     rate = _slowest_contraction(traced, leaves)
-    whole = None if rate is None or not _loses(traced, leaves) else _whole(system, traced, leaves)
-    if whole is None:
+    continuous = None if rate is None or not _loses(traced, leaves) else _continuous(system, traced, leaves)
+    if continuous is None:
         return None
     if system.load.period is None:
-        return f"under constant loads a motion of one coordinate has no room for a torus, and {whole} and areas shrink"
+        return f"under constant loads a motion of one coordinate has no room for a torus, and {continuous} and areas shrink"
     left = math.exp(-rate * system.load.period)
     return (
-        f"the stroboscopic map is continuous, as {whole}, and it shrinks areas, in a forcing period to at most {left:.3g} of "
-        "what they were, so that it has no invariant closed curve (errata 22)"
+        f"the stroboscopic map is continuous, as {continuous}, and it shrinks areas, in a forcing period to at most {left:.3g} "
+        "of what they were, so that it has no invariant closed curve (errata 22)"
     )
 
 
@@ -93,7 +93,7 @@ def _loses(traced: Trace, leaves: Leaves) -> bool:
     return True
 
 
-def _whole(system: System, traced: Trace, leaves: Leaves) -> str | None:
+def _continuous(system: System, traced: Trace, leaves: Leaves) -> str | None:
     """Why motions that begin close together stay so for a while; None where the contact may push away on both sides."""
     if traced.sides == 0:
         return "the motion has no contact"
