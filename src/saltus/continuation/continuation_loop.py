@@ -24,14 +24,14 @@ Bounds = Mapping[str, tuple[float, float]]  # the least and the largest value of
 
 
 class Watch:
-    """Tells how much of a curve has been seen: of the range of its first parameter, or of the points it may have."""
+    """Reports how much of a curve has been seen: of the range of its first parameter, or of the points it may have."""
 
     def __init__(self, progress: Progress, bounds: Bounds, most_points: int) -> None:
         self.progress, self.names, self.most_points = progress, tuple(bounds), most_points
         self.bounds, self.seen, self.points = next(iter(bounds.values())), (np.inf, -np.inf), 0
 
     def __call__(self, point: Any) -> None:
-        """Tell of a new point."""
+        """Report a new point."""
         if self.progress is silent:
             return
         self.seen, self.points = (min(self.seen[0], point.parameter), max(self.seen[1], point.parameter)), self.points + 1

@@ -41,6 +41,10 @@ class Point:
         """The largest residual of the equations."""
         return 0.0
 
+    def beside(self, step: float) -> Any:
+        """The point of the curve a short step along the tangent, or None."""
+        return self.curve.solve(self.place + step * self.tangent, self.tangent)
+
     def turned(self) -> Self:
         """The same point, followed the other way."""
         return replace(self, tangent=-self.tangent)

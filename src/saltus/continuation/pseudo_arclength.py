@@ -30,7 +30,6 @@ class EquationCurve(Curve[P]):
         """A solution as a point."""
 
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
-        """The point near a guess in the hyperplane through it normal to a direction of length 1."""
         normal = direction * self.weights**2
 
         def linear(found: Evaluation, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -41,7 +40,6 @@ class EquationCurve(Curve[P]):
         return None if found is None else self.with_tangent(found, direction)
 
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
-        """The point near a guess with the guess's own value at an index of its place; its tangent goes along the direction."""
         free = np.arange(guess.size) != index % guess.size
 
         def filled(numbers: np.ndarray) -> np.ndarray:

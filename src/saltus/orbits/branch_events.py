@@ -21,7 +21,7 @@ Run = Continuation
 
 
 @dataclass(frozen=True)
-class BranchSettings:
+class BranchLimits:
     """Where a branch is given up, and what tells its events from rounding."""
 
     most_impacts: int = 120  # impacts of one period with which orbits are still followed
@@ -36,7 +36,7 @@ class BranchSettings:
     # is found between the ends
 
 
-SETTINGS = BranchSettings()
+SETTINGS = BranchLimits()
 
 
 class OrbitEvents(Events):
@@ -47,7 +47,6 @@ class OrbitEvents(Events):
         return End(OrbitEnd.SHRINKS, ahead.parameter) if ahead.orbit.amplitude < SETTINGS.smallest else None
 
     def nearest(self, point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
-        """A place counted from the impact from which it lies nearest to another point."""
         return nearest(point, place, other)
 
 
@@ -172,7 +171,7 @@ def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
         return None
     test = FLIP[odd]
     for reach in SETTINGS.reaches:
-        ends = [curve.solve(middle.place + sign * reach * middle.tangent, middle.tangent) for sign in (-1.0, 1.0)]
+        ends = [middle.beside(sign * reach) for sign in (-1.0, 1.0)]
         if ends[0] is not None and ends[1] is not None and test.value(ends[0]) * test.value(ends[1]) < 0.0:
             return located(test, ends[0], ends[1])
     return None

@@ -35,7 +35,7 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
 def _admissible_direction(start: OrbitPoint) -> OrbitPoint | None:
     for probe in PROBES:
         for point in (start, start.turned()):
-            ahead = point.curve.solve(point.place + probe * point.tangent, point.tangent)
+            ahead = point.beside(probe)
             if ahead is not None and ahead.orbit.admissible and min(ahead.orbit.slowest, ahead.orbit.clearance) > 0.0:
                 return point
     return None

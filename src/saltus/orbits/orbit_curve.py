@@ -66,7 +66,6 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
         return self.problem.evaluate(place[:n], place[n:], look=thorough)
 
     def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> OrbitPoint:
-        """A solution as a point."""
         return OrbitPoint(self, found.place, tangent, found.iterations, found.evaluation)
 
     def with_problem(self, problem: Problem) -> OrbitCurve:

@@ -80,7 +80,6 @@ class ConditionedCurve(OrbitCurve):
         return super().solve(guess, direction / self.norm(direction))
 
     def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> SpecialCurvePoint:
-        """A solution as a point."""
         value = found.evaluation.condition_value
         curve = replace(self, condition=self.condition.moved(value))
         return SpecialCurvePoint(curve, found.place, tangent, found.iterations, found.evaluation.equations, value)

@@ -54,8 +54,11 @@ class CurveEvents(OrbitEvents):
         assert cut.special is not None
         return End(OrbitEnd.MEETS_GRAZING, cut.point.parameter, cut.special.kind)
 
+    def ended(self, run: Continuation, ahead: SpecialCurvePoint, cut: Cut | None) -> End | None:
+        """The end of an orbit that has shrunk to rest, unless it is another grazing."""
+        return super().ended(run, ahead, cut) if cut is None else None
+
     def tests(self, point: SpecialCurvePoint) -> Iterable[TestFunction]:
-        """The test functions of codimension-two points."""
         return curve_tests(self.kind, point.orbit.symmetric)
 
 

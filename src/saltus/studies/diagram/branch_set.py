@@ -146,5 +146,5 @@ def _is_parent(special: SpecialPoint, branch: Branch) -> bool:
 
 def _beside(special: SpecialPoint) -> list[PeriodicOrbit]:
     """An orbit next to a special point on its own branch."""
-    point = special.point.curve.solve(special.point.place + SETTINGS.beside * special.point.tangent, special.point.tangent)
+    point = special.point.beside(SETTINGS.beside)
     return [] if point is None or not point.orbit.admissible else [point.orbit]
