@@ -22,7 +22,7 @@ class CurveEnd(EndReason):
     CLOSED = "closes"
     MOST_POINTS = "more than {detail} points"
     NO_STEP = "the steps shrink to nothing: the {detail} has a singularity that is none of the known kinds"
-    NOT_LOCATED = "{kind} that could not be located"
+    NOT_LOCATED = "a {kind} that could not be located"
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ class CurveEvents(OrbitEvents):
         assert cut.special is not None
         return End(OrbitEnd.MEETS_GRAZING, cut.point.parameter, cut.special.kind)
 
-    def ended(self, run: Continuation, ahead: SpecialCurvePoint, cut: Cut | None) -> End | None:
+    def ended(self, run: Continuation, ahead: Any, cut: Cut | None) -> End | None:
         """The end of an orbit that has shrunk to rest, unless it is another grazing."""
         return super().ended(run, ahead, cut) if cut is None else None
 
