@@ -35,7 +35,7 @@ def reproduce(
 ) -> list[Result]:
     """Compute and draw the named parts of the paper (all where none is named) into `output`, and write the report.
 
-    What is up to date is left alone unless `force`. An interrupt leaves whole files only, and the next run goes on from there.
+    What is up to date is left alone unless `force`. An interrupt leaves complete files only, and the next run goes on from there.
 
     Raises:
         ParameterError: an unknown name, with the near ones; an output folder that cannot be written to.

@@ -10,14 +10,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patheffects import Normal, Stroke
 
-from saltus.plots.attractor_marks import (
-    MOST_NAMED,
-    UNDECIDED,
-    attractor_colours,
-    attractor_legend,
-    draw_points,
-    steady,
-)
+from saltus.plots.attractor_marks import MOST_NAMED, UNDECIDED, attractor_colours, attractor_legend, draw_points, steady
 from saltus.plots.axis_names import symbol, unit_in_brackets
 from saltus.plots.conventions import INK, SINGLE_COLUMN, new_figure, styled
 from saltus.plots.marks import cell_edges

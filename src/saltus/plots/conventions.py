@@ -60,8 +60,8 @@ RC: Any = {
     "ytick.major.size": 3.0,
     "lines.linewidth": 1.0,
     "lines.solid_capstyle": "round",
-    "pdf.fonttype": 42,  # fonts embedded whole, so that a publisher can edit the text
-    "agg.path.chunksize": 20_000,  # a curve of a million points is drawn in pieces
+    "pdf.fonttype": 42,  # all glyphs embedded, so that a publisher can edit the text
+    "agg.path.chunksize": 20_000,  # a curve of a million points is drawn in parts
     "savefig.dpi": RESOLUTION,
     "figure.dpi": 100,
     "axes.formatter.use_mathtext": True,

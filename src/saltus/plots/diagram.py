@@ -27,7 +27,7 @@ def draw_diagram(tree: Any) -> Figure:
     axes = figure.subplots(1 + simulated, 1, sharex=True, squeeze=False, height_ratios=[3, 2][: 1 + simulated])[:, 0]
     axes[0].set_xlim(low, high)
     top = _top(tree, low, high)
-    axes[0].set_ylim(-0.02 * top, 1.08 * top)  # so that marks on the axis are seen whole
+    axes[0].set_ylim(-0.02 * top, 1.08 * top)  # so that marks on the axis are not cut
     axes[0].set_ylabel(rf"$\max_\tau|{name}|${unit}")
     limits = [float(limit) for limit in np.atleast_1d(tree.attrs["limits"])]
     draw_response(axes[0], tree)

@@ -23,7 +23,7 @@ LINES: tuple[dict[str, Any], ...] = ({"color": STABLE, "ls": "-"}, {"color": UNS
 def draw_motion(dataset: xarray.Dataset) -> Figure:
     """The coordinates over time, and velocities over coordinates, of a motion as `Motion.to_xarray` gives it.
 
-    The phase portrait shows the whole motion in grey and its last forcing period on top; without a forcing period, the whole.
+    The phase portrait shows all of the motion in grey and its last forcing period on top; without a forcing period, all of it.
     An open circle marks the start, a full one the end. Green lines mark the limits of the mechanism that are reached.
     """
     figure = new_figure(DOUBLE_COLUMN, 68.0)

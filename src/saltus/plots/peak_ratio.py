@@ -8,7 +8,7 @@ from saltus.plots.conventions import DASHES, shades
 
 
 def draw_family(ax: Any, family: Any, names: list[str], title: str) -> None:
-    """Curves ratio(curve, stiffness_ratio) with dots simulated(curve, dot), told apart by shade and dashes."""
+    """Curves ratio(curve, stiffness_ratio) with dots simulated(curve, dot), which differ in shade and dashes."""
     colours = shades(family.sizes["curve"])
     for i, (name, colour) in enumerate(zip(names, colours, strict=True)):
         ax.plot(family["stiffness_ratio"], family["ratio"][i], color=colour, ls=DASHES[i], lw=1.2, label=name)

@@ -12,16 +12,7 @@ from saltus.branch_lines import border_curves
 from saltus.paper.figure_data import joined
 from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.figures.parallel_panels import each
-from saltus.plots import (
-    DOUBLE_COLUMN,
-    chart_legend,
-    draw_chart,
-    draw_closed_form,
-    draw_lines,
-    new_figure,
-    panel_label,
-    styled,
-)
+from saltus.plots import DOUBLE_COLUMN, chart_legend, draw_chart, draw_closed_form, draw_lines, new_figure, panel_label, styled
 from saltus.studies import bordered_chart
 from saltus.theory import high_frequency_onset
 

@@ -112,7 +112,7 @@ def _numbers() -> Any:
 
 
 def count_unloaded(beta0: float, vertical: float) -> int:
-    """How many equilibria there are under V alone."""
+    """How many equilibria there are under V only."""
     return len(equilibria(System(model=Metainterface(beta0=beta0), load=Load(vertical=vertical))))
 
 

@@ -1,4 +1,4 @@
-"""What a part of the paper is: a computation, a picture drawn from its dataset alone, and what it measures for its claims."""
+"""What a part of the paper is: a computation, a picture drawn from its dataset, and what is measured for its claims."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class PaperFigure:
     """One figure, table or group of statements of the paper, which `reproduce` makes by its name.
 
     1. `compute(**parameters)` returns an xarray DataTree: every number behind the picture, with units;
-    2. `draw(data)` returns a matplotlib Figure from that data alone, or is None where there is nothing to draw;
-    3. `measure(data)` returns the numbers for its claims, again from the data alone; the tables of claims hold the rest;
+    2. `draw(data)` returns a matplotlib Figure from nothing but that data, or is None where there is nothing to draw;
+    3. `measure(data)` returns the numbers for its claims, again from nothing but the data; the tables of claims hold the rest;
     4. `table(data)`, where given, returns Markdown.
     """
 

@@ -16,7 +16,7 @@ def each(make: Callable[..., Any], values: Mapping[str, Any], /, longest: str = 
     """`make(value, **options)` for every value, by the value's name.
 
     Those that take `longest` are begun first: the "first" or the "last" of the figure. Branches are followed by one core, so
-    panels beside one another use what each of them alone would leave idle.
+    panels beside one another use what a single one would leave idle.
     """
     cores = min(available_cores(), len(values))
     if cores < 2:

@@ -1,6 +1,6 @@
 """What section 6 says of chaotic and quasi-periodic motions in Figs. 9 to 13, measured by the bands of their diagrams.
 
-The panels of a figure are given by the value that tells them apart, in rising order.
+The panels of a figure are given by the value in which they differ, in rising order.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def _stable_share(spectrum: Any, low: float, high: float) -> float:
 
 
 def pierced(spectrum: Any, **panel: float) -> Measured:
-    """Whether a stable periodic motion goes through a band of chaos; `panel` is what tells the panel from others."""
+    """Whether a stable periodic motion goes through a band of chaos; `panel` is the load or frequency of the panel."""
     rows = [band | {"share": _stable_share(spectrum, band["low"], band["high"])} for band in bands_of(spectrum)]
     return measured(any(row["share"] > 0.0 for row in rows), bands=rows, grazings=count(spectrum, "GR"), **panel)
 
@@ -151,7 +151,7 @@ def two_regions(panels: Panels) -> Measured:
 
 
 def shifts(panels: Panels) -> Measured | None:
-    """As printed: for all frequencies. Erratum 32: above the primary resonance. None where there is one frequency alone."""
+    """As printed: for all frequencies. Erratum 32: above the primary resonance. None where there is only one frequency."""
     if len(panels) < 2:
         return None
     least = np.array([float(_wandering(tree).min(initial=np.inf)) for tree in panels.values()])

@@ -1,6 +1,6 @@
 """What the text says of Figs. 14 and 15, measured: each trend answered by a number.
 
-The panels of a figure are given by the value that tells them apart, in rising order.
+The panels of a figure are given by the value in which they differ, in rising order.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What section 6 says of Figs. 9 to 13, measured: knots, superharmonics, loops, jumps, onsets, coexistence, symmetry.
 
-The panels of a figure are given by the value that tells them apart, such as {0.2: tree, 0.5: tree}, in rising order. What it says
+The panels of a figure are given by the value in which they differ, such as {0.2: tree, 0.5: tree}, in rising order. What it says
 of chaotic and quasi-periodic bands is measured in `chaos_measures.py`.
 """
 

@@ -1,4 +1,4 @@
-"""What a spectrum or a diagram shows, as numbers, from its DataTree alone: peaks, detached loops, coexisting motions, onsets."""
+"""What a diagram shows, as numbers, from nothing but its DataTree: peaks, detached loops, coexisting motions, onsets."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def _kinetic_residual(model: Any, load: Any, t: float, theta: Any, velocity: Any
 
 
 def _lagrange_residual(model: Any, load: Any, t: float, theta: Any, velocity: Any, acceleration: Any) -> float:
-    """Euler-Lagrange from kin_eng, pot_eng_beta, Rayleigh and ext_forces_beta alone, by differences, along the motion."""
+    """Euler-Lagrange from kin_eng, pot_eng_beta, Rayleigh and ext_forces_beta only, by differences, along the motion."""
     step = 1e-20j
 
     def slope(function: Any, point: tuple[float, float], j: int) -> float:
@@ -104,8 +104,8 @@ def _reduction_residual(single: Any, double: Any, load: Any, theta: Any, velocit
     for j, side in ((0, 1), (1, -1)):
         where = tuple(theta[i] if i == j else 0.0 for i in (0, 1))
         speed = tuple(velocity[i] if i == j else 0.0 for i in (0, 1))
-        alone = single.acceleration(0.2, theta[j], velocity[j], side, load)
-        both = tuple(alone if i == j else 0.0 for i in (0, 1))
+        moving = single.acceleration(0.2, theta[j], velocity[j], side, load)
+        both = tuple(moving if i == j else 0.0 for i in (0, 1))
         worst = max(worst, abs(float(double.constraint_reactions(0.2, where, speed, both, load)[j])))
     return worst
 
