@@ -31,18 +31,19 @@ from saltus.taylor import (
     entry_point,
     generated_header,
     is_compiled,
+    lane_vectors,
     load_module,
     module_name,
     pointer,
     records,
 )
 
-_TYPES = digest(inspect.getsource(scalar_types), inspect.getsource(function_types))
+_WRITTEN_BY = digest(*(inspect.getsource(module) for module in (scalar_types, function_types, lane_vectors)))
 _SIGNATURES = f"""
 from saltus.flow.ensemble.function_types import *
 from saltus.taylor.lane_vectors import *
 from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit, pointed_jit
-# types of {_TYPES}
+# types and vectors of {_WRITTEN_BY}
 """
 
 
