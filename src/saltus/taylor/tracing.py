@@ -68,7 +68,7 @@ class Trace:
     `contact_acceleration`, the second derivative of the gap at rest at contact, a function of the time alone, and
     `contact_damping`, minus its derivative to the velocity; `next_side` and `velocity_after`, the reset; `margins` to stop at.
 
-    With `columns` of a tangent (see `tangent.py`) `acceleration` goes on after the model's own `dof` with those of the columns.
+    With `columns` of a tangent (`derivatives.py`) `acceleration` goes on after the model's own `dof` with those of the columns.
     """
 
     parameters: list[str] = field(default_factory=list)
