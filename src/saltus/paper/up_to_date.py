@@ -22,12 +22,12 @@ FOLDER = ".saltus"  # inside the output folder
 
 
 def key(figure: PaperFigure) -> str:
-    """A fingerprint of saltus' version, the sources of the figure and of all it imports of saltus, its parameters and claims."""
+    """A fingerprint of saltus' version, the sources of the figure and of all it imports, its title, parameters and claims."""
     digest = hashlib.sha256(saltus.__version__.encode())
     for module in sorted(closure(figure.module)):
         digest.update(module.encode() + b"\0" + _source(module) + b"\0")
     claims = {id: asdict(entry) for id, entry in claim_tables().get(figure.name, {}).items()}
-    digest.update(json.dumps([dict(figure.parameters), claims], sort_keys=True).encode())
+    digest.update(json.dumps([figure.title, dict(figure.parameters), claims], sort_keys=True).encode())
     return digest.hexdigest()
 
 
