@@ -2,10 +2,10 @@ from .compiled import load_segments
 from .ensemble.compiled_lanes import load_advance, load_driver, load_helpers
 from .ensemble.dataset_reading import stop_names, stroboscopic
 from .ensemble.ensemble import compiled_lanes, simulate_many
-from .ensemble.ensemble_dataset import Wanted
 from .ensemble.inputs import Inputs, read_inputs
 from .ensemble.tangent_ensemble import TangentEnsemble
 from .ensemble.threads import Jobs, Lanes, available_cores
+from .ensemble.wanted import Wanted
 from .kernel_layout import STRUCTURE_SIZES, Where
 from .load_release import Release, contact_pull, load_releases, peak_near
 from .motion import DenseOutput, Event, EventKind, Impacts, Motion

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import check_number
-from saltus.errors import ParameterError, near
+from saltus.errors import ParameterError
 from saltus.flow.ensemble.compiled_lanes import compile_beside, compile_driver_aside, load_lane_functions
-from saltus.flow.ensemble.ensemble_dataset import KEPT, Wanted, to_dataset
+from saltus.flow.ensemble.ensemble_dataset import to_dataset
 from saltus.flow.ensemble.inputs import Inputs, read_inputs
 from saltus.flow.ensemble.lane_layout import JobLabel, JobNumber
-from saltus.flow.ensemble.threads import Jobs, Lanes, available_cores
+from saltus.flow.ensemble.threads import Jobs, Lanes
+from saltus.flow.ensemble.wanted import Sample, Until, Wanted, read_last, read_names, read_side, read_threads
 from saltus.flow.forcing_time import Clock, clock
 from saltus.flow.structures import Program, check_gap, limits_of, program
 from saltus.progress import Progress, silent
@@ -23,7 +24,6 @@ from saltus.systems import System, check_system, numbers
 if TYPE_CHECKING:
     import xarray
 
-ENDINGS = ("rest", "settled")
 MOST_SYSTEMS, MOST_PROVED = 16, 1 << 18  # systems, and parameter sets of each, whose speeds of capture are remembered
 SLIVER = 1e-9  # of a forcing period: a duration that ends within less of a whole one was meant to be whole
 
@@ -54,27 +54,16 @@ def simulate_many(
     threads nor on what else is computed, to the last bit. What is computed is bounded in memory by what is asked for.
 
     Args:
-        system: what moves.
-        velocity: the velocities at the start; a tuple of arrays where there are several coordinates.
         parameters: arrays by dotted path, such as {"load.horizontal.amplitude": np.linspace(0, 1, 101)}.
-        periods, duration: how long, in forcing periods or in dimensionless time; one of them, one number for all.
-        tol: the error that one step may make, relative to the state, in [1e-15, 1e-6].
-        time: the dimensionless time at the start.
-        side: +1 or -1, the side to leave by where the motion from rest at contact is not unique.
-        stop_at: margins of the model that end a trajectory; its own `stops` always do.
-        sample: what is kept of each of the `last` forcing periods: "state" (at its end, stroboscopically), "extrema" of the first
-            coordinate in it, "impact_count" (the number of impacts), "speed" (the least abs(v-) of its impacts). They are counted
-            from the start, and the one in which the trajectory ends is kept, however short. Of "extrema" and "speed" the whole
-            motion's are returned too.
+        sample: what is kept of each of the `last` forcing periods, see `Sample`. Periods are counted from the start, and the one
+            in which the trajectory ends is kept, however short. Of "extrema" and "speed" the whole motion's are returned too.
         last: of how many forcing periods, counted back from the end; "all" keeps every one.
-        until: ends a trajectory early: "rest", when it is proved to be captured at rest for all later loads (`capture_speed`);
-            "settled", when it repeats itself every q <= 16 forcing periods.
-        sensitivities: dotted paths of parameters: adds the derivatives of the end state to the initial one and to them. The time
-            at the start is fixed, and at the end too, but that n periods asked for end at time + n 2 pi / W, which moves with
-            "load.frequency" W, also where a trajectory has settled; and that a margin's end moves with it.
+        until: ends a trajectory early, see `Until`.
+        sensitivities: dotted paths of parameters: adds the derivatives of the end state to the initial one and to them, at a
+            fixed time; but the end of n periods moves with "load.frequency", and that at a margin with the margin.
         threads: how many cores to use; by default all.
-        progress: called with the fraction done and what is being done, ten times a second.
-        coordinates: the state at the start by the model's names: theta=..., or x=... for a wall oscillator.
+        velocity, periods, duration, tol, time, side, stop_at, progress, coordinates: as for `simulate`; velocity a tuple of
+            arrays where there are several coordinates.
 
     Returns:
         A Dataset with the state at the end, `time`, `side`, `stop` (why it ended), `impact_count`, `grazings`, `periods` done
@@ -89,24 +78,38 @@ def simulate_many(
         tol=tol,
         periods=periods,
         limits=limits_of(system, stop_at),
-        sample=_names("sample", sample, tuple(KEPT)),
-        until=_names("until", until, ENDINGS),
-        paths=None if sensitivities is None else _names("sensitivities", sensitivities, None),
+        sample=read_names("sample", sample, Sample),
+        until=read_names("until", until, Until),
+        paths=None if sensitivities is None else read_names("sensitivities", sensitivities),
     )
-    side, threads = _side(side), _threads(threads)
+    side, threads = read_side(side), read_threads(threads)
     inputs = read_inputs(system, velocity, time, parameters, coordinates)
-    aside = compile_driver_aside()
+    return _run(system, inputs, wanted, duration, side, last, threads, progress)
+
+
+def _run(
+    system: System,
+    inputs: Inputs,
+    wanted: Wanted,
+    duration: float | None,
+    side: int,
+    last: int | str,
+    threads: int,
+    progress: Progress,
+) -> xarray.Dataset:
+    """Compile what is not there yet, run the trajectories, and write their dataset."""
+    driver = compile_driver_aside()
     run = program(system, wanted.limits, wanted.paths)
     if system.model.sides:
         check_gap(system.model)
-    jobs = _jobs(system, run, inputs, periods, duration, side)
-    if "rest" in wanted.until:
+    jobs = _jobs(system, run, inputs, wanted.periods, duration, side)
+    if Until.REST in wanted.until:
         jobs.numbers[:, JobNumber.CAPTURE_SPEED] = _capture(system, inputs.parameters, wanted.limits)
     spans = jobs.labels[:, JobLabel.LAST_PERIOD] - jobs.labels[:, JobLabel.FIRST_PERIOD]
     begun = jobs.numbers[:, JobNumber.END_TIME] > jobs.numbers[:, JobNumber.START_TIME]
-    lanes = compiled_lanes(system, run, wanted, _kept(last, int(np.max(spans + begun, initial=1))))
-    if aside is not None:
-        compile_beside(aside)
+    lanes = compiled_lanes(system, run, wanted, read_last(last, int(np.max(spans + begun, initial=1))))
+    if driver is not None:
+        compile_beside(driver)
     ends = lanes.run(jobs, threads, progress, total=float(np.sum(spans + 1)))
     return to_dataset(system, inputs, wanted, jobs, ends)
 
@@ -146,38 +149,6 @@ def _capture(system: System, columns: dict[str, np.ndarray], limits: tuple[str, 
 _proved: dict[tuple[Any, ...], dict[bytes, float]] = {}  # studies ask for the same parameters again and again
 
 
-def _names(argument: str, given: Any, known: tuple[str, ...] | None) -> tuple[str, ...]:
-    try:
-        names = (given,) if isinstance(given, str) else tuple(given)
-    except TypeError:
-        raise ParameterError(f"{argument} must be names, got {given!r}", argument) from None
-    for name in names:
-        if known is not None and name not in known:
-            raise ParameterError(f"{argument} knows no {name!r}; {near(str(name), known)}", argument)
-    return names
-
-
-def _kept(last: Any, periods: int) -> int:
-    if isinstance(last, str) and last == "all":
-        return periods
-    if isinstance(last, bool) or not isinstance(last, (int, np.integer)) or last < 1:
-        raise ParameterError(f'last must be a whole number of forcing periods from 1 on, or "all", got {last!r}', "last")
-    return max(1, min(int(last), periods))
-
-
-def _side(side: Any) -> int:
-    if side is not None and (np.ndim(side) or side not in (1, -1)):
-        raise ParameterError(f"side must be +1 or -1, got {side!r}", "side")
-    return side or 0
-
-
-def _threads(threads: Any) -> int:
-    threads = available_cores() if threads is None else threads
-    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-        raise ParameterError(f"threads must be a whole number of at least 1, got {threads!r}", "threads")
-    return int(threads)
-
-
 def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> Lanes:
     """The compiled lanes of a system and what they are to keep."""
     key = run.structure.module.__name__
@@ -193,9 +164,9 @@ def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> L
         records=(run.env[2], run.env[3]),
         tol=wanted.tol,
         kept=kept if wanted.sample else 1,
-        sampled=[c for name in KEPT if name in wanted.sample for c in KEPT[name](own)],
-        extrema="extrema" in wanted.sample,
-        settle="settled" in wanted.until,
+        sampled=[column for kind in Sample if kind in wanted.sample for column in kind.columns(own)],
+        extrema=Sample.EXTREMA in wanted.sample,
+        settle=Until.SETTLED in wanted.until,
     )
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.flow.ensemble.lane_layout import EndLabel, EndNumber, JobLabel, JobNumber
+from saltus.flow.ensemble.wanted import Sample, Until, Wanted
 from saltus.flow.kernel_layout import Mode, Status
 from saltus.flow.stops import Stop
 from saltus.provenance import provenance
@@ -21,13 +20,6 @@ if TYPE_CHECKING:
     from saltus.flow.ensemble.threads import Ends, Jobs
     from saltus.systems import Model, System
 
-# Which columns of the driver's samples a name of `sample` keeps, for so many coordinates.
-KEPT: dict[str, Callable[[int], list[int]]] = {
-    "state": lambda own: list(range(2 * own)),
-    "extrema": lambda own: [2 * own, 2 * own + 1],
-    "speed": lambda own: [2 * own + 2],
-    "impact_count": lambda own: [2 * own + 3],
-}
 STOPS = {
     Status.DONE: Stop.HORIZON,
     Status.LIMITED: Stop.LIMIT,
@@ -65,18 +57,6 @@ def result_names(names: tuple[str, ...]) -> set[str]:
     extrema = [f"{which}_{names[0]}" for which in ("largest", "smallest")]
     further = [*(f"{kind}_{name}" for kind in ("sampled", "start") for name in states), *(f"overall_{name}" for name in extrema)]
     return {*FIXED, *DIMENSIONS, *states, *extrema, *further}
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is to be computed: how exactly, how long, and what is kept of it."""
-
-    tol: float
-    periods: float | None  # None where a duration is asked for
-    limits: tuple[str, ...]  # margins to stop at
-    sample: tuple[str, ...]
-    until: tuple[str, ...]
-    paths: tuple[str, ...] | None  # of the parameters to differentiate to; None without derivatives
 
 
 def to_dataset(system: System, inputs: Inputs, wanted: Wanted, jobs: Jobs, ends: Ends) -> xarray.Dataset:
@@ -172,7 +152,7 @@ def _add_stops(writer: _Writer, ends: Ends, wanted: Wanted) -> None:
     if wanted.limits:
         which = np.where(reasons == Status.LIMITED, ends.of(EndLabel.DETAIL), -1).astype(np.int8)
         writer.add("limit", which, "1", "the margin that ended it, -1 for none", **_flags(wanted.limits))
-    if "settled" in wanted.until:
+    if Until.SETTLED in wanted.until:
         period = np.where(reasons == Status.SETTLED, ends.of(EndLabel.DETAIL), 0)
         writer.add("recurrence_period", period, "1", "forcing periods after which it repeats itself, 0 where it has not settled")
 
@@ -199,19 +179,19 @@ def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
         "extrema": [
             (f"{which}_{first}", unit, f"the {which} {first} in the forcing period") for which in ("largest", "smallest")
         ],
-        "speed": [("least_speed", unit, f"{slowest}, in the forcing period")],
-        "impact_count": [("period_impact_count", "1", "impacts in the forcing period")],
+        Sample.SPEED: [("least_speed", unit, f"{slowest}, in the forcing period")],
+        Sample.IMPACT_COUNT: [("period_impact_count", "1", "impacts in the forcing period")],
     }
-    for name in KEPT:
-        if name in sample:
-            for variable, its_unit, text in variables[name]:
+    for kind in Sample:
+        if kind in sample:
+            for variable, its_unit, text in variables[kind]:
                 writer.add(variable, np.ascontiguousarray(samples[:, :, column]), its_unit, text, "period")
                 column += 1
-    if "extrema" in sample:
+    if Sample.EXTREMA in sample:
         for i, which in enumerate(("largest", "smallest")):
             text = f"the {which} {first} from the start to the end"
             writer.add(f"overall_{which}_{first}", ends.numbers[:, EndNumber.HIGHEST + i], unit, text)
-    if "speed" in sample:
+    if Sample.SPEED in sample:
         writer.add("overall_least_speed", ends.numbers[:, EndNumber.LEAST_SPEED], unit, f"{slowest}, from the start to the end")
 
 

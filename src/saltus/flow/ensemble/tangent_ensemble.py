@@ -9,9 +9,9 @@ import numpy as np
 
 from saltus.flow.ensemble.compiled_lanes import compile_everything
 from saltus.flow.ensemble.ensemble import compiled_lanes
-from saltus.flow.ensemble.ensemble_dataset import Wanted
 from saltus.flow.ensemble.lane_layout import EndLabel, JobLabel, JobNumber
 from saltus.flow.ensemble.threads import Jobs
+from saltus.flow.ensemble.wanted import Wanted
 from saltus.flow.kernel_layout import Mode, Status
 from saltus.flow.structures import limits_of, program
 from saltus.systems import System
