@@ -41,7 +41,7 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     f < 1, or f <= 1 and A_u < 0.
 
     *Corrected adiabatic invariant.* Under periodic loads these bounds do not close for f near 1, as flights gain speed while
-    the pull grows and lose it after. There L = 3 ln v + ln sum 1/alpha + O(v) falls, see `adiabatic.py`; so that damping
+    the pull grows and lose it after. There L = 3 ln v + ln sum 1/alpha + O(v) falls (`adiabatic_invariant.py`), so that damping
     captures at f = 1 too. Records of samples are not periodic: only the first bound is used with them.
 
     All bounds are interval bounds over the whole forcing period, or the whole record, and over all openings and speeds in
@@ -242,7 +242,7 @@ def _factor(traced: Trace, side: int) -> tuple[int, Expr, Expr]:
 
 
 def _cycles(following: dict[int, int]) -> list[tuple[int, ...]]:
-    """The sides that a motion visits in turn, for every side at which it may begin; none where that is not known."""
+    """The sides of successive flights of a motion, for every side at which it may begin; none where that is not known."""
     if all(after == -side for side, after in following.items()):
         return [tuple(following)]
     return [(side,) for side in following] if all(after == side for side, after in following.items()) else []

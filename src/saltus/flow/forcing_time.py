@@ -1,4 +1,4 @@
-"""Time as the flow counts it: whole forcing periods and a local time within one, so that the phase is exact over any number."""
+"""Time as the flow counts it: the number of the forcing period and a time within it, so that the phase stays exact."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def clock(time: Any, length: Any, periods: float | None, duration: float | None)
         raise ParameterError(f"the motion must start and end within 2^53 forcing periods, got {reach:g} of them")
     first, local = np.divmod(time, length)
     if periods is None:
-        whole, end = np.divmod(local + span, length)
+        passed, end = np.divmod(local + span, length)
     else:
-        whole, end = np.floor(periods), local + (periods - np.floor(periods)) * length
-    return Clock(first, local, first + whole, end, length)
+        passed, end = np.floor(periods), local + (periods - np.floor(periods)) * length
+    return Clock(first, local, first + passed, end, length)

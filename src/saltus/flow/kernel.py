@@ -1,20 +1,17 @@
 """The robust scalar flow: arcs, impacts, rest and release, accumulations of impacts, chatter.
 
-The texts of `layout.py`, `roots.py`, `steps.py`, `contact.py`, `chatter.py` and this file are compiled as one, once for every
-model: the functions that `emit.py` generates for a structure, `series`, `contact_series`, `reset` and `contact_damping`, are
-arguments. So these files are plain loops under the decorator `jit`, and share one namespace.
+The compiled parts of `kernel_layout.py`, `roots.py`, `steps.py`, `contact.py`, `chatter.py` and this file are compiled as one,
+once for every model: the functions that are generated for a structure (see `compiled.py`) are arguments. So these files are plain
+loops under the decorators of `saltus.taylor`, and share one namespace.
 
-A motion is in one of four modes. ARC: a smooth motion on one side. CONTACT: at the contact, to be decided. REST: held at the
-contact until an acceleration points outward. CHATTER: impacts without loss, too small and too many to follow one by one.
+A motion is in one of the modes of `Mode`. With a tangent (see `event_derivatives.py`) its columns are further coordinates, which
+`series` expands with the others. The steps are the motion's own, so its impacts are the same to the last bit, except where a
+column needs shorter ones. What an event makes of the columns, and how it moves, is the structure's function `tangent`; where it
+has none, it is nan.
 
-With a tangent (see `tangent.py`) its columns are further coordinates, which `series` expands with the others. The steps are the
-motion's own, so its impacts are the same to the last bit, except where a column needs shorter ones. What an event makes of the
-columns, and how it moves, is the structure's function `tangent`; where it has none, it is nan.
-
-`env` = (parameters, constants, record breakpoints, record table). `model` = (the four functions; the coordinate at contact and
-the gap's rate of change with the coordinate there, on sides +1 and -1; `tangent`). `work` = (q, v, a, g, m, w, poly, b, end):
-the Taylor coefficients of coordinates, velocities, accelerations, gap and margins, the workspace of their recurrences, a scaled
-polynomial, the contact accelerations of both sides, and the first five once more at the end of a step.
+`where`, `state` and `settings` are arrays in the places of `Where`, `State` and `Setting`; `env` = (parameters, constants, record
+breakpoints, record table); `model` holds the functions of the structure in the places of `Function`, and `work` the arrays of a
+step in those of `Work`.
 """
 
 from __future__ import annotations

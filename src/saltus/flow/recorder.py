@@ -57,7 +57,7 @@ class Events(Sequence[Event]):
 
     @property
     def details(self) -> np.ndarray:
-        """What the kernel noted with each event, as `layout.py` says: of a limit, which margin it is."""
+        """What the kernel noted with each event, see `memory_layout.py`; of a limit, which margin it is."""
         return self._labels[:, 3]
 
     def impacts(self) -> Impacts:

@@ -1,6 +1,6 @@
 """The first root of a polynomial on [0, 1]: exclusion, Bernstein subdivision, bracketed Newton.
 
-This text is compiled together with each kernel (see `compile.py`), so it uses plain loops and the decorator `jit`.
+This text is compiled together with each kernel (see `compiled.py`), so it uses plain loops and the decorator `jit`.
 """
 
 from __future__ import annotations

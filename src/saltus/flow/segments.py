@@ -1,7 +1,7 @@
 """Smooth segments with their derivatives: what the boundary-value problem of a periodic orbit is made of (see `orbits/`).
 
 A segment is the smooth motion on one side from one instant to another, whatever the sign of the gap, forwards or backwards in
-time, started by an impact or from a state. The texts of `layout.py`, `roots.py`, `steps.py`, `contact.py`, `chatter.py` and
+time, started by an impact or from a state. The compiled parts of the kernel's files (see `kernel.py`) up to `chatter.py` and of
 this file are compiled as one, once for every model. Phases are those of time 0, so records, which have none, are left out.
 """
 

@@ -49,7 +49,7 @@ def expand(where, state, env, model, work, t, origin, side, order):
 
 @lean_jit
 def growth(coefficients, first, last, size):
-    """The largest log(abs(c_k) / size) / k for first <= k <= last: minus the log of the radius that these terms tell of."""
+    """The largest log(abs(c_k) / size) / k for first <= k <= last: minus the log of the radius that these terms suggest."""
     largest = -np.inf
     for i in range(coefficients.shape[0]):
         for k in range(first, last + 1):

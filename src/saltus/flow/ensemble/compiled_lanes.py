@@ -76,7 +76,7 @@ def compile_driver_aside() -> subprocess.Popen[bytes] | None:
 @cache
 def load_helpers() -> tuple[Any, ...]:
     """What the driver calls for one lane: `lane_root`, `turning_range` and `scalar_motion`."""
-    module = load_module("visits", _text(kernel_layout, lane_layout, roots, scalar_fallback, scalar_handoff))
+    module = load_module("lane_helpers", _text(kernel_layout, lane_layout, roots, scalar_fallback, scalar_handoff))
     return tuple(pointer(getattr(module, name)) for name in ("lane_root", "turning_range", "scalar_motion"))
 
 

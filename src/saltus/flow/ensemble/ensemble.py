@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
 MOST_SYSTEMS, MOST_PROVED = 16, 1 << 18  # systems, and parameter sets of each, whose speeds of capture are remembered
-SLIVER = 1e-9  # of a forcing period: a duration that ends within less of a whole one was meant to be whole
+SLIVER = 1e-9  # A duration that ends so near, in forcing periods, to the end of one is meant to end there.
 
 
 def simulate_many(

@@ -136,8 +136,8 @@ def _is_coordinate(name: str, values: np.ndarray, inputs: Inputs) -> bool:
     """Whether the coordinate of this name holds these values."""
     if name not in inputs.coords:
         return False
-    whole = inputs.coords[name].variable.set_dims(dict(zip(inputs.dims, inputs.shape, strict=True)))
-    return bool(np.array_equal(whole.values.reshape(-1), values))
+    values_there = inputs.coords[name].variable.set_dims(dict(zip(inputs.dims, inputs.shape, strict=True)))
+    return bool(np.array_equal(values_there.values.reshape(-1), values))
 
 
 def _add_stops(writer: _Writer, ends: Ends, wanted: Wanted) -> None:
@@ -198,7 +198,7 @@ def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
 def _add_derivatives(writer: _Writer, jobs: Jobs, ends: Ends, paths: tuple[str, ...], periods: float | None) -> None:
     """The derivatives of the end state to the initial one and to parameters, (..., state, column).
 
-    The time at the start is fixed. The time at the end is, too, but for two: where whole periods were asked for and the motion
+    The time at the start is fixed. The time at the end is, too, but for two: where periods were asked for and the motion
     ends after n of them, start + n 2 pi / W moves with the frequency W; and where a margin ends it, with the margin.
     """
     states = [*writer.names, *writer.rates]

@@ -1,4 +1,4 @@
-"""What a lane cannot decide with the others, decided for it alone with the scalar kernel's roots.
+"""What a lane cannot decide together with the others, decided with the scalar kernel's search for roots.
 
 This text is compiled by itself, and called through pointers: linked into every function above it, it would be compiled again
 with each of them.

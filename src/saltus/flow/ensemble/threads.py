@@ -171,7 +171,7 @@ class Lanes:
 
 
 def lane_order(tol: float) -> int:
-    """The order that pays in lanes: 14 at 1e-6, 18 at 1e-10, 22 at 1e-14; always even (see `layout.py`).
+    """The order that pays in lanes: 14 at 1e-6, 18 at 1e-10, 22 at 1e-14; always even (see `memory_layout.py`).
 
     Two more take up to 5 % less time, but where the last coefficients nearly vanish the step is too long by a factor, and the
     error by that factor to the power of the order.
