@@ -3,7 +3,7 @@
 With the speeds v_s proportional to one speed v, the action v^2 sum v_s / abs(a_s) decays at the mean of the damping over the
 duration of a cycle, sum g_s v_s / abs(a_s) / sum v_s / abs(a_s), for any loads that press. The phase is lost.
 
-This text is compiled together with the kernel (see `kernel.py`).
+Its compiled part goes into one module with that of `kernel.py`.
 """
 
 from __future__ import annotations

@@ -101,7 +101,7 @@ def load_structure(trace: Trace) -> Structure:
 
 
 def structure_text(trace: Trace) -> str:
-    """The source of a structure's functions; equal structures have equal texts, whatever their numbers."""
+    """The source of a structure's functions; equal structures have equal sources, whatever their numbers."""
     known = constants(trace)
     sizes = {
         "DOF": len(trace.acceleration),

@@ -1,6 +1,6 @@
 """At the contact: rest and release, impacts, and what small impacts are the end of.
 
-This text is compiled together with the kernel (see `kernel.py`, which says what `env`, `model` and `work` are).
+Its compiled part goes into one module with that of `kernel.py`, whose docstring defines `env`, `model` and `work`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """On which side of its contact a state moves on: the one rule for single motions and for lanes.
 
-This text is compiled together with the lanes (see `driver.py`); `simulation.py` calls it as it is.
+Its compiled part goes into one module with that of `ensemble/driver.py`; `simulation.py` calls it as plain Python.
 """
 
 from __future__ import annotations

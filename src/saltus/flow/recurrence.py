@@ -30,7 +30,8 @@ class RecurrenceSettings:
     """The numbers by which a motion repeats itself, in orbits, attractors, charts and diagrams."""
 
     # The compiled lanes look for periods up to this one (`LONGEST_RECURRENCE` in flow/ensemble/sampling.py): a motion has settled
-    # on q periods when 2 q + 2 successive states agree with those q periods before to within 1e-10 of their size.
+    # on q periods when 2 q + 2 successive states agree with those q periods before to within `RECURRENT` there, 1e-10 of their
+    # size, or of 1 where they are smaller.
     compiled_max_period: int = 16
     # Longer periods are looked for in the states that were kept of a motion that was followed to the end: a round of them must
     # agree with the round before to within this, which is looser as there is no streak of further rounds to look at.

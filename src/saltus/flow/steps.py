@@ -1,6 +1,6 @@
 """One step: how long it may be, and what is kept of it.
 
-This text is compiled together with the kernel (see `kernel.py`).
+Its compiled part goes into one module with that of `kernel.py`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The one way in which saltus compiles, and the one file that uses what numba does not promise to keep.
 
 saltus compiles with numba, without Python's exceptions for division and with fused multiply-adds. Tested with numba 0.60.0 and
-0.68.1 (see tests/taylor/test_numba_versions.py); pyproject.toml allows what lies between.
+0.68.1 (see tests/taylor/test_private_numba.py); pyproject.toml allows these and all versions between.
 
 What numba promises is used as its documentation has it: `njit` and its options, `types`, the first-class function types, and the
 extension interface (`intrinsic`, `register_model`, `lower_builtin`, `type_callable`). These are not promised, and each has a

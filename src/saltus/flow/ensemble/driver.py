@@ -1,8 +1,8 @@
 """Many trajectories at once: a group of lanes, each with its own time, step, side and parameters, refilled as they end.
 
-The texts of `kernel_layout.py`, `lane_layout.py`, `contact_side.py`, `lane_steps.py`, `sampling.py`, `forcing_periods.py` and
-this file are compiled as one, once for every model, for the width of this machine's registers. The functions of a structure,
-`code`, come through pointers.
+The compiled parts of `kernel_layout.py`, `lane_layout.py`, `contact_side.py`, `lane_steps.py`, `sampling.py`,
+`forcing_periods.py` and this file are one module, compiled once for all models, for the width of this machine's registers. The
+functions of a structure, `code`, come through pointers.
 
 A step of all lanes: Taylor series; a step for each lane; a sweep of Horner's rule that gives the end of the step and bounds the
 gap; the root in the lanes whose gap has one for certain; impacts. A lane whose step shows anything else -- rest, slow impacts,

@@ -1,6 +1,6 @@
 """A trajectory in its lane: how it gets there, goes from one forcing period to the next, and leaves.
 
-This text is compiled together with the lanes (see `driver.py`).
+Its compiled part goes into one module with that of `driver.py`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """One step of a group of lanes: how long it may be, whether it meets the contact, and when.
 
-This text is compiled together with the lanes (see `driver.py`).
+Its compiled part goes into one module with that of `driver.py`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What is recorded of a trajectory: extrema of its first coordinate, the ends of its forcing periods, whether it repeats itself.
 
-This text is compiled together with the lanes (see `driver.py`).
+Its compiled part goes into one module with that of `driver.py`.
 """
 
 from __future__ import annotations

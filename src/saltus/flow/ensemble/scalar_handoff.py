@@ -1,6 +1,6 @@
 """A lane in the scalar kernel, for whatever is rare: rest, slow impacts, touches, limits, singularities.
 
-This text is compiled together with `scalar_fallback.py`, and called through a pointer.
+Its compiled part goes into one module with that of `scalar_fallback.py`; the driver calls it through a pointer.
 """
 
 from __future__ import annotations
