@@ -107,7 +107,7 @@ class Continuation:
         if closed:
             ahead, end, cut = self.points[0], End(CurveEnd.CLOSED), None
         if closed or not born:
-            self._note(point, ahead)
+            self._locate(point, ahead)
         self.points.append(ahead)
         self.watch(ahead)
         self.end = self.end or end or self.events.ended(self, ahead, cut)
@@ -124,7 +124,7 @@ class Continuation:
             return True
         return False
 
-    def _note(self, a: Any, b: Any) -> None:
+    def _locate(self, a: Any, b: Any) -> None:
         """Locate the special points of a step, in order."""
         found = []
         for test in self.events.tests(a):

@@ -15,7 +15,8 @@ library's sine and cosine, so that every coefficient is good to rounding; lanes 
 
 How an elementary function is added: by one entry in `FUNCTIONS` (`rules.py`), NumPy's function and its slope, as
 `"atan": Function(np.arctan, lambda u, y: 1.0 / (1.0 + u * u), increasing=True)`. Tracing, derivatives, both widths and the bounds
-follow from it, and `tests/taylor` goes through the table and compares the coefficients with power series in 40 digits.
+follow from it (of a function that does not increase, the bounds need an entry in `bounds/intervals.py`), and
+`tests/taylor/test_series.py` goes through the table and compares the coefficients with power series in 40 digits.
 
 How code is cached: a generated file lies in the user's cache directory under a digest of its text, of the sources that write its
 code and of numba's options (`cache.py`), and numba keeps the machine code beside it. Numbers are arguments, so they never compile

@@ -1,14 +1,13 @@
 """The elementary functions, each in one rule, and the Taylor recurrences of arithmetic.
 
 An elementary function y = f(u) is added to everything (tracing, derivatives, one motion, ensembles) by one entry of FUNCTIONS
-under the name that it has in the C library: NumPy's function, its slope f'(u) in terms of u and y, written
-with NumPy, and what else is known of it. The
-Taylor coefficients follow from y' = f'(u) u', as the slope is a series like any other,
+under the name that it has in the C library: NumPy's function, its slope f'(u) in terms of u and y, written with NumPy, and what
+else is known of it. The Taylor coefficients follow from y' = f'(u) u', as the slope is a series like any other,
 
     k y_k = sum_{j=1}^{k} j u_j s_{k-j},    s = f'(u).
 
-Where a recurrence without a series of its own for the slope is known, as for the logarithm, the entry gives it. The tests go
-through the table by themselves and compare each function's coefficients with 40 digits (tests/taylor/test_series.py).
+Where a recurrence is known that needs no series of the slope, as for the logarithm, the entry gives it. The tests go through the
+table and compare each function's coefficients with 40 digits (tests/taylor/test_series.py).
 """
 
 from __future__ import annotations
@@ -35,7 +34,8 @@ class Function:
     numpy: Callable[..., Any]
     slope: Callable[[Any, Any], Any]  # f'(u) of u and y
     increasing: bool = False  # wherever it is defined: its bounds over an interval are then its values at the ends
-    steep: bool = False  # whether it may bend sharply far from where it is expanded, by terms that are below rounding there
+    # Whether high Taylor terms, below rounding where it is expanded, may bend it sharply within a step: such steps are checked.
+    steep: bool = False
     recurrence: Rule | None = None  # in place of the one that follows from the slope
 
 
