@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.attractors.attractor import REST, UNDECIDED, Attractor, Attractors
 from saltus.attractors.kind import AttractorKind
-from saltus.attractors.registry import Place, Registry
+from saltus.attractors.registry import NoLabel, Registry
 from saltus.attractors.stroboscopic_section import with_clock
 from saltus.checks import Rectangle, check_count, check_number, check_states, check_window, checked_by
 from saltus.errors import ParameterError
@@ -23,14 +23,15 @@ from saltus.systems import System
 
 @dataclass(frozen=True)
 class FindSettings:
-    """How long motions are followed before their attractor is asked for."""
+    """How long motions are followed before their attractors are determined."""
 
-    # Motions may settle in so many forcing periods, and those that have not then in so many more.
+    # All motions are followed for this many forcing periods.
     first: int = 400
+    # Those that have not settled by then are followed for this many more.
     second: int = 4000
-    # So many of their last states at phase 0 are kept, to be compared with sets that do not repeat.
+    # Number of last stroboscopic states that are kept of a motion, to compare them with sets that do not repeat.
     kept: int = 256
-    # At most so many motions that never settle are given a verdict of their own, as each takes seconds.
+    # The largest number of motions that are classified because they never settle: each takes seconds.
     verdicts: int = 8
 
 
@@ -65,17 +66,18 @@ def find_attractors(
 ) -> Attractors:
     """The attractors on which motions from a window of initial states at phase 0 end, each certified, with its share of them.
 
-    Rest is one by proof (`capture_speed`, or no load that ever pulls); a cycle, by its own equations, solved to rounding, with
-    multipliers inside the unit circle; what never settles, by the verdict of `classify`, if areas shrink. What none bears out is
-    undecided, and counted, with reasons. The mirror image of an attractor of a symmetric system is another one, unless it is its
-    own, and is added even where no start leads to it. Under a constant load the equilibria are found, as cycles of period 1.
+    Rest is certified by proof (`capture_speed`, or no load that ever pulls); a periodic orbit by its own equations, solved to
+    rounding, with multipliers inside the unit circle; a motion that never settles by the verdict of `classify`, if areas shrink.
+    Motions for which none of these holds are undecided; they are counted, with the reasons. The mirror image of an attractor of a
+    symmetric system is another one, unless it is its own, and is added even where no start leads to it. Under a constant load the
+    equilibria are found, as orbits of period 1.
 
     Args:
         system: what moves: any model of one coordinate, under a load with a frequency or a constant one.
         window: of the state plane, ((least, largest coordinate), (least, largest velocity)), covered evenly by initial states; by
             default that of half widths 1.5 around the contact, or around 0 without one.
         starts: how many.
-        max_period: the longest period of a cycle, at most 16.
+        max_period: the longest period of an orbit, at most 16.
         seed: shifts the states.
         known: stable orbits, or branches of which those at the system's parameter are taken, that count as attractors too.
         also: further initial states (n, 2), which do not count in the shares.
@@ -90,11 +92,11 @@ def find_attractors(
     states, registry = initial_states(clock, starts, area, seed), Registry(clock)
     for orbit in _known(system, known):
         registry.add_orbit(orbit)
-    places = _assigned(registry, np.concatenate([states, further]), max_period, tol, progress)
+    labels = _assigned(registry, np.concatenate([states, further]), max_period, tol, progress)
     registry.add_images()
     final = final_labels(registry.members)
-    counts = np.bincount(places[:starts][places[:starts] >= 0], minlength=len(registry.members))
-    ends = np.array([final.get(int(place), UNDECIDED) for place in places], dtype=int)
+    counts = np.bincount(labels[:starts][labels[:starts] >= 0], minlength=len(registry.members))
+    ends = np.array([final.get(int(label), UNDECIDED) for label in labels], dtype=int)
     members = [member.labelled(final, starts=int(counts[member.label]), of=starts) for member in registry.members]
     members.sort(key=lambda member: member.label)
     progress(1.0, "attractors")
@@ -106,7 +108,7 @@ def _assigned(registry: Registry, states: np.ndarray, max_period: int, tol: floa
     options: dict[str, Any] = {"max_period": max_period, "kept": SETTINGS.kept, "tol": tol}
     ends = find_recurrence(registry.system, states, SETTINGS.first, **options, progress=part_of(progress, 0.0, 0.3))
     labels = registry.assign(ends)
-    left = np.flatnonzero(labels == Place.OPEN)
+    left = np.flatnonzero(labels == NoLabel.OPEN)
     if not left.size:
         return labels
     begin = ends.states[left, -1]
@@ -114,16 +116,16 @@ def _assigned(registry: Registry, states: np.ndarray, max_period: int, tol: floa
     later = registry.assign(ends)
     registry.assign_unsettled(ends, later)
     for turn in range(SETTINGS.verdicts):
-        waiting = np.flatnonzero(later == Place.OPEN)
+        waiting = np.flatnonzero(later == NoLabel.OPEN)
         if not waiting.size:
             break
         later[waiting[0]] = registry.judge(ends.states[waiting[0], -1], max_period)
         registry.assign_unsettled(ends, later)
         progress(0.7 + 0.3 * turn / SETTINGS.verdicts, "verdicts")
-    if (later == Place.OPEN).any():
+    if (later == NoLabel.OPEN).any():
         periods = SETTINGS.first + SETTINGS.second
-        registry.reasons.append(f"{int((later == Place.OPEN).sum())} motions do not settle in {periods} forcing periods")
-    labels[left] = np.where(later == Place.OPEN, Place.FAILED, later)
+        registry.reasons.append(f"{int((later == NoLabel.OPEN).sum())} motions do not settle in {periods} forcing periods")
+    labels[left] = np.where(later == NoLabel.OPEN, NoLabel.FAILED, later)
     return labels
 
 

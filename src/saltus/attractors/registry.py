@@ -19,28 +19,28 @@ from saltus.systems import System
 
 @dataclass(frozen=True)
 class RegistrySettings:
-    """By what motions are given to attractors."""
+    """The numbers by which motions are assigned to attractors."""
 
-    # So many states at phase 0 stand for a set that does not repeat.
+    # Number of stroboscopic states that represent a set that does not repeat.
     sample: int = 2048
-    # So many of the last states of a motion must lie on such a set, in the median, for the motion to belong to it.
+    # A motion belongs to such a set if this many of its last states lie on it, in the median.
     last: int = 64
-    # For so many forcing periods `classify` may follow a motion that does not settle.
+    # Number of forcing periods for which `classify` may follow a motion that does not settle.
     verdict_periods: int = 4000
-    # Areas of states do not shrink where the sum of the exponents is above minus this, and then nothing attracts.
+    # Areas of the state plane do not shrink where the sum of the exponents is above minus this: then nothing attracts.
     lossless: float = 1e-6
-    # An orbit may lie so many times NEAR beside the states of the motions that settle on it.
+    # The largest distance, in units of NEAR, between an orbit and the states of the motions that settle on it.
     beside: float = 100.0
 
 
 SETTINGS = RegistrySettings()
 
 
-class Place(IntEnum):
-    """What stands for the label of an attractor while a motion has none."""
+class NoLabel(IntEnum):
+    """What a motion has instead of the label of an attractor."""
 
     OPEN = -1  # not known yet
-    FAILED = -2  # not to be decided, for one of the reasons
+    FAILED = -2  # cannot be decided; the registry's `reasons` say why
 
 
 @dataclass
@@ -52,12 +52,12 @@ class Registry:
     reasons: list[str] = field(default_factory=list)  # why motions are undecided
 
     def assign(self, ends: Recurrence) -> np.ndarray:
-        """The label of the attractor on which each motion ends, or a `Place`, (n,)."""
-        labels = np.full(len(ends), int(Place.OPEN))
+        """The label of the attractor on which each motion ends, or a `NoLabel`, (n,)."""
+        labels = np.full(len(ends), int(NoLabel.OPEN))
         if ends.rest.any():
             labels[ends.rest] = self.add_rest()
         if ends.ended.any():
-            labels[ends.ended] = Place.FAILED
+            labels[ends.ended] = NoLabel.FAILED
             self.reasons.append(f"{int(ends.ended.sum())} motions are ended by a margin of the model or cannot go on")
         for period in np.unique(ends.period[ends.periodic]):
             rows = np.flatnonzero(ends.period == period)
@@ -70,7 +70,7 @@ class Registry:
         return labels
 
     def _settled(self, states: np.ndarray) -> int:
-        """The label of the orbit on whose states motions have settled; FAILED where its equations do not bear it out."""
+        """The label of the orbit on whose states motions have settled; FAILED where its equations have no stable solution."""
         known = self.label_of(states)
         if known is not None:
             return known
@@ -89,7 +89,7 @@ class Registry:
 
     def _fail(self, reason: str) -> int:
         self.reasons.append(reason)
-        return int(Place.FAILED)
+        return int(NoLabel.FAILED)
 
     def add_rest(self) -> int:
         """The label of rest at the contact."""
@@ -132,8 +132,8 @@ class Registry:
         return None
 
     def assign_unsettled(self, ends: Recurrence, labels: np.ndarray) -> None:
-        """Label motions that have not settled by the attractor on which, or within NEAR of which, they move."""
-        for i in np.flatnonzero(labels == Place.OPEN):
+        """Label motions that have not settled, where they move on a known attractor or within NEAR of one."""
+        for i in np.flatnonzero(labels == NoLabel.OPEN):
             last = ends.states[i, -SETTINGS.last :]
             for target in (member.target for member in self.members):
                 apart = target.distance(last)
@@ -142,7 +142,7 @@ class Registry:
                     break
 
     def judge(self, state: np.ndarray, max_period: int) -> int:
-        """The label of what a motion from a state (2,), which does not settle, moves on, by its verdict; FAILED without one."""
+        """Classify a motion that does not settle, from a state (2,): the label of its attractor, or FAILED if it has none."""
         start, longest = start_at(self.system, state), max(max_period, 16)
         verdict = classify(self.system, **start, periods=SETTINGS.verdict_periods, max_period=longest)
         if verdict.kind is AttractorKind.REST:

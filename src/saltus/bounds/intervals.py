@@ -134,10 +134,11 @@ def _wave(function: Any, peak: float) -> Callable[[Interval], Interval]:
             return np.floor((x.hi - point) / TURN + LIBRARY) >= np.ceil((x.lo - point) / TURN - LIBRARY)
 
         result = outward(np.minimum(at_lo, at_hi), np.maximum(at_lo, at_hi), LIBRARY)
-        whole = x.hi - x.lo >= TURN  # and a NaN stays one
-        result.lo, result.hi = (np.where(whole, 0.0, end) for end in (result.lo, result.hi))  # the sine of infinity is a NaN
-        low = np.where(whole | passes(peak + math.pi), -1.0, np.maximum(result.lo, -1.0))
-        return Interval(low, np.where(whole | passes(peak), 1.0, np.minimum(result.hi, 1.0)))
+        full_turn = x.hi - x.lo >= TURN  # False where a bound is NaN, so that the result stays NaN
+        # Over a full turn the bounds are -1 and 1, also where the ends are infinite and the function there is NaN.
+        result.lo, result.hi = (np.where(full_turn, 0.0, end) for end in (result.lo, result.hi))
+        low = np.where(full_turn | passes(peak + math.pi), -1.0, np.maximum(result.lo, -1.0))
+        return Interval(low, np.where(full_turn | passes(peak), 1.0, np.minimum(result.hi, 1.0)))
 
     return bounds
 

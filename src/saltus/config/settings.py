@@ -16,7 +16,7 @@ from saltus.systems import Model, System
 class Settings:
     """How a study is simulated."""
 
-    arguments: dict[str, Any]  # of `saltus.simulate`, the system apart
+    arguments: dict[str, Any]  # of `saltus.simulate`, except the system
     samples: int | None = None  # written to motion.nc, evenly spaced
 
 

@@ -14,10 +14,10 @@ class NewtonSettings:
     """When Newton's method has converged and when it is given up."""
 
     converged: float = 5e-14  # residual relative to the unknowns: a few dozen roundings of what it is computed from
-    stalled: float = 1e-10  # residual that is accepted where rounding keeps it above `converged`,
-    slowdown: float = 0.3  # which shows as the last step having left more than this share of the residual before
-    diverged: float = 1e6  # residual from which no step leads back
-    longest: float = 1.0  # no component of a step is longer than that: the equations are far from linear beyond
+    stalled: float = 1e-10  # residual that is accepted where rounding keeps it above `converged`
+    slowdown: float = 0.3  # rounding does so where a step leaves more than this share of the residual before it
+    diverged: float = 1e6  # residual above which the iteration is given up
+    longest: float = 1.0  # largest component of a step: beyond it the equations are far from linear
 
 
 NEWTON = NewtonSettings()

@@ -1,4 +1,4 @@
-"""What a problem adds to the loop of a continuation: its test functions, where equations change, and its own ends."""
+"""What a problem adds to the loop of a continuation: its test functions, where its equations change, and its own ends."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Events:
         return End(CurveEnd.NOT_LOCATED, ahead.parameter, barrier.kind) if zero is None else Cut(zero.point, zero)
 
     def interrupted(self, run: Continuation, point: Any, ahead: Any) -> End | None:
-        """The end of the curve within a step, which is then not taken."""
+        """The end of the curve if it ends within a step, which is then not taken; else None."""
         return None
 
     def tests(self, point: Any) -> Iterable[TestFunction]:
@@ -55,15 +55,15 @@ class Events:
         return ()
 
     def distinct(self, found: list[Zero]) -> list[Zero]:
-        """The special points of a step without those that are others under another name."""
+        """The special points of a step, each once: one point may be the zero of two test functions."""
         return found
 
     def ended(self, run: Continuation, ahead: Any, cut: Cut | None) -> End | None:
-        """The end at a point that was just reached."""
+        """The end of the curve if it ends at a point that was just reached; else None."""
         return None
 
     def last(self, special: Zero) -> End | None:
-        """The end at a special point."""
+        """The end of the curve if it ends at a special point that was just located; else None."""
         return None
 
     def across(self, run: Continuation, cut: Cut) -> Any:
@@ -71,9 +71,9 @@ class Events:
         return None
 
     def stalled(self, run: Continuation, point: Any, step: float) -> End:
-        """The end at a point from which a step so short is still too long."""
+        """The end of the curve at a point from which even the shortest step fails."""
         return End(CurveEnd.NO_STEP, point.parameter, detail=self.name)
 
     def nearest(self, point: Any, place: np.ndarray, other: Any) -> np.ndarray | None:
-        """A place on the equations of a point in the numbers in which it lies nearest to another point; None if it cannot."""
+        """A place, on the equations of `point`, renumbered to lie nearest to another point; None if it cannot be compared."""
         return place

@@ -9,16 +9,16 @@ from dataclasses import dataclass
 class StepSettings:
     """The control of the steps, whose lengths are in the norm of the curve."""
 
-    aim: float = 0.12  # rad between the tangents of neighbouring points that is aimed at
-    most: float = 0.5  # rad between them above which a step is taken again, shorter
+    aim: float = 0.12  # the angle between the tangents of neighbouring points that a step aims at, rad
+    most: float = 0.5  # the angle above which a step is taken again, shorter, rad
     longest: float = 0.1  # a thirtieth of the range of the parameter, or a tenth of a unit of the unknowns
     first: float = 1e-3  # the length of the first step
-    restart: float = 1e-3  # at most so long is the first step after the equations have changed
-    least: float = 1e-11  # below which steps have shrunk to nothing
+    restart: float = 1e-3  # the largest length of the first step after the equations have changed
+    least: float = 1e-11  # the length below which steps have shrunk to nothing
     shrink: float = 0.4  # the length of a step that has to be taken again, as a share of the one that failed
     grow: tuple[float, float] = (0.5, 2.0)  # the least and the largest ratio of a step to the one before
-    easy: int = 5  # iterations of the corrector above which the next step is
-    hard: float = 0.7  # at most so long, as a share of this one
+    easy: int = 5  # iterations of the corrector up to which the next step may grow
+    hard: float = 0.7  # after more iterations, the largest length of the next step as a share of this one
     most_points: int = 20_000  # points after which the curve is given up
 
     def following(self, step: float, turn: float, iterations: int) -> float:

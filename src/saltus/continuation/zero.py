@@ -8,13 +8,13 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a special point is known by."""
+    """The numbers that show that a special point is there."""
 
     residual: float  # of the equations
     brackets: tuple[float, ...]  # the width in each parameter within which the test function changes its sign
-    before: float  # the test function at the ends of the step that contains the point
-    after: float
-    value: float  # and at the point itself
+    before: float  # the test function at the beginning of the step that contains the point
+    after: float  # the test function at the end of that step
+    value: float  # the test function at the point itself
 
     @property
     def bracket(self) -> float:

@@ -22,18 +22,25 @@ Run = Continuation
 
 @dataclass(frozen=True)
 class BranchLimits:
-    """Where a branch is given up, and what tells its events from rounding."""
+    """Where a branch is given up, and how its events are told from rounding."""
 
-    most_impacts: int = 120  # impacts of one period with which orbits are still followed
-    gathering: int = 5  # so many grazings one after the other that each add impacts are taken for endlessly many,
-    gathered: float = 1e-3  # where they lie within this share of the parameter's range,
-    small: float = 1e-2  # or where the amplitude has shrunk to this share of the largest one
-    many: int = 60  # with more impacts than this
-    steepest: float = 1e8  # multiplier beyond which motions part so fast that an orbit cannot be solved for
-    smallest: float = 1e-7  # amplitude below which an orbit has shrunk to rest
-    same_fold: float = 1e-8  # parameter within which a fold and a crossing of branches are one point
-    reaches: tuple[float, ...] = tuple(10.0 ** np.arange(-8, -0.9))  # lengths along a parent's branch, until its special point
-    # is found between the ends
+    # Orbits with more impacts in a period than this are not followed.
+    most_impacts: int = 120
+    # Grazings are taken to accumulate when this many in a row have each added impacts, and one of the next two conditions holds.
+    accumulating: int = 5
+    # Either all of them lie within this share of the parameter's range,
+    accumulation_width: float = 1e-3
+    # or the amplitude has shrunk below this share of the largest one, with more impacts than `shrunk_impacts`.
+    shrunk: float = 1e-2
+    shrunk_impacts: int = 60
+    # With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved for.
+    steepest: float = 1e8
+    # An orbit of an amplitude below this has shrunk to rest.
+    smallest: float = 1e-7
+    # A fold and a crossing of branches whose parameters differ by less than this are one point.
+    same_fold: float = 1e-8
+    # Distances to both sides along a parent's branch, tried in turn until its special point lies between the two ends.
+    reaches: tuple[float, ...] = tuple(10.0 ** np.arange(-8, -0.9))
 
 
 SETTINGS = BranchLimits()
@@ -123,7 +130,7 @@ class BranchEvents(OrbitEvents):
         return End(OrbitEnd.ACCUMULATES, value, detail=str(count)) if _accumulate(run, following) else following
 
     def stalled(self, run: Run, point: OrbitPoint, step: float) -> End:
-        """The end where no step is short enough, as the orbit repels too strongly or for a reason not known."""
+        """The end where even the shortest step fails: the orbit repels too strongly, or the reason is not known."""
         largest = abs(point.orbit.multipliers[0])
         if largest > SETTINGS.steepest and not point.orbit.grazes:
             return End(OrbitEnd.REPELS, point.parameter, detail=f"{largest:.1g}")
@@ -132,13 +139,13 @@ class BranchEvents(OrbitEvents):
 
 def _accumulate(run: Run, following: OrbitPoint) -> bool:
     """Whether the last grazings have all added impacts, ever closer to one parameter or on the way to rest."""
-    grazings = [s.point for s in run.special if s.kind == SpecialKind.GR][-SETTINGS.gathering :]
+    grazings = [s.point for s in run.special if s.kind == SpecialKind.GR][-SETTINGS.accumulating :]
     counts = [point.orbit.signature.impact_count for point in (*grazings, following)]
-    if len(grazings) < SETTINGS.gathering or not (np.diff(counts) > 0).all():
+    if len(grazings) < SETTINGS.accumulating or not (np.diff(counts) > 0).all():
         return False
     span = float(np.ptp([point.parameter for point in grazings]))
-    small = following.orbit.amplitude < SETTINGS.small * max(point.orbit.amplitude for point in run.points)
-    return span < SETTINGS.gathered * following.curve.scales[0] or (small and counts[-1] > SETTINGS.many)
+    small = following.orbit.amplitude < SETTINGS.shrunk * max(point.orbit.amplitude for point in run.points)
+    return span < SETTINGS.accumulation_width * following.curve.scales[0] or (small and counts[-1] > SETTINGS.shrunk_impacts)
 
 
 def _same_place(a: Zero, b: Zero) -> bool:

@@ -12,7 +12,7 @@ from saltus.orbits.signature import Signature
 from saltus.orbits.special_point import OrbitEnd
 from saltus.orbits.tolerances import TOLERANCES
 
-PROBES = 10.0 ** -np.arange(2, 12.0)  # along the new branch, until one direction is seen to be admissible
+PROBES = 10.0 ** -np.arange(2, 12.0)  # distances along the new branch, tried in turn until one direction has admissible orbits
 
 
 def other_side(point: OrbitPoint) -> OrbitPoint | End:
@@ -104,7 +104,7 @@ def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Problem, np.ndarray]
     side = signature.along()[int(np.argmax(lengths))]
     phase_zero = 2.0 * np.pi * np.ceil(touch / (2.0 * np.pi))
     contact = np.array([float(problem.at(point.solution.values).model.contact), 0.0])
-    for periods in range(1, signature.period + 1):  # three families may meet here: then on with that of the shortest period
+    for periods in range(1, signature.period + 1):  # three families may meet here: go on with the one of the shortest period
         other = problem.with_signature(Signature((), periods, False, side))
         state = other.carried(contact, touch, phase_zero, point.solution.values)
         later = other.carried(contact, touch, phase_zero + other.closing, point.solution.values)

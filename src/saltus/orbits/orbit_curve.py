@@ -61,7 +61,7 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
         return np.append(np.full(n, (2.0 / n) ** 0.5), 1.0 / np.array(self.scales))
 
     def evaluate(self, place: np.ndarray, thorough: bool) -> Any:
-        """The orbit's equations, with a look at what lies between the impacts if `thorough`."""
+        """The orbit's equations, with the extrema between the impacts if `thorough`."""
         n = self.problem.size
         return self.problem.evaluate(place[:n], place[n:], look=thorough)
 

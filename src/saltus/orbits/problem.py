@@ -41,7 +41,7 @@ class Equations:
     there: np.ndarray  # (n, d, d)
     parameters: np.ndarray  # (n d, parameters)
     ends: np.ndarray
-    looks: np.ndarray  # (n, 4 + margins), see `segments.py`; empty if not asked for
+    looks: np.ndarray  # (n, 4 + margins): extrema within each segment, by `HUMP`, ... of `segments.py`; empty if not asked for
 
     @cached_property
     def _open(self) -> np.ndarray:
@@ -84,7 +84,7 @@ class Segments(NamedTuple):
 
 
 class Flown(NamedTuple):
-    """What `fly_segments` of the flow makes of them."""
+    """The results of `fly_segments` for such segments."""
 
     ends: np.ndarray
     columns: np.ndarray  # the derivatives of the ends
@@ -179,7 +179,7 @@ class Problem:
         return None if flown is None else flown.ends[0, at.KINDS : at.KINDS + 2 * self.own]
 
     def fly(self, segments: Segments, values: np.ndarray, look: bool = False) -> Flown | None:
-        """The smooth motion along segments, with a look at each if asked for; None where one of them cannot be followed."""
+        """The smooth motion along segments, with the extrema within each if `look`; None where one cannot be followed."""
         parameters = self._values.copy()
         parameters[self._places] = values
         env, model = self._run.structure.prepare(parameters, self._records)

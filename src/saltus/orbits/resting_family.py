@@ -38,16 +38,16 @@ from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, Use
 
 @dataclass(frozen=True)
 class RestingSettings:
-    """What tells the events of a family of resting orbits from rounding."""
+    """How the events of a family of resting orbits are told from rounding, and how long its steps are."""
 
     smallest: float = 1e-7  # amplitude below which an orbit is about to shrink to rest
     narrow: float = 1e-12  # width, relative to the parameter, within which the loss of a release is located
-    reach: float = 1e-9  # of the range: from so far ahead on the loss of a release is looked for
+    reach: float = 1e-9  # distance ahead, as a share of the range, from which on the loss of a release is looked for
     behind: float = 0.05  # rad before a release, from where its peak is looked for as the parameter changes
     brief: float = 1e-3  # rad of phase: a rest so short is the one that vanishes
-    faint: float = 1e-3  # speed and clearance by which a touch is told from other changes of the impacts
-    change: float = 0.06  # of extrema (rad) and of the phases of releases and rests in a step, that is aimed at,
-    most_change: float = 0.2  # and the most that is accepted
+    faint: float = 1e-3  # speed and clearance below which a change of the impacts is a grazing
+    change: float = 0.06  # the change of extrema (rad) and of the phases of releases and rests that a step aims at
+    most_change: float = 0.2  # the largest such change that is accepted
     first_step: float = 0.1  # the first step as a share of the longest
     short: float = 3e-6  # a step shorter than a millionth of the range is cut short by an end of the family
 

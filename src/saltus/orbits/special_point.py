@@ -1,4 +1,4 @@
-"""Special points: where the number or the stability of orbits changes along a branch, or more happens along a curve of these."""
+"""Special points: of branches, where the number or stability of orbits changes, and of curves of such points (codimension 2)."""
 
 from __future__ import annotations
 

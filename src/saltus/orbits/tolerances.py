@@ -9,11 +9,11 @@ from dataclasses import dataclass
 class OrbitTolerances:
     """Differences below which two things are one."""
 
-    touch: float = 1e-9  # A gap or a speed so small is a grazing; grazings are located more narrowly.
-    pair: float = 1e-4  # Two impacts vanish together where their phases and speeds differ by less: they go as the square root.
+    touch: float = 1e-9  # A gap or a speed below this is a grazing; grazings are located more precisely than that.
+    pair: float = 1e-4  # Two impacts vanish together whose phases and speeds differ by less: these go as a square root.
     touching_state: float = 1e-7  # States a period apart where an orbit touches, which is known only to the square root.
     grazing_orbits: float = 1e-5  # The unknowns of two orbits that coincide where both graze.
-    image: float = 1e-6  # An orbit that differs from its own image by more does so by more than rounding.
+    image: float = 1e-6  # Rounding alone makes an orbit differ from its own image by less than this.
     halves: float = 1e-7  # The halves of a symmetric orbit: solved to 1e-12, but near a grazing Newton's method leaves more.
     release: float = 1e-9  # Instants of a release, in forcing periods: releases are isolated, and known to rounding.
     load: float = 1e-12  # Values of a load and of its mirror image half a period later.

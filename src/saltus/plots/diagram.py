@@ -60,13 +60,13 @@ def _within(x: np.ndarray, low: float, high: float) -> np.ndarray:
 
 def draw_stroboscopic_states(ax: Any, tree: Any) -> None:
     """Direct simulation: where motions are at phase 0 of the load, period after period, from every start."""
-    strobes = tree["stroboscopic"]
+    section = tree["stroboscopic"]
     draw_bands(ax, tree)
-    places = strobes["position"].values
-    moving = np.nanmax(strobes["peak"].values, axis=2, initial=0.0) > AT_REST
-    values = np.broadcast_to(strobes["value"].values[:, None, None], places.shape)
+    places = section["position"].values
+    moving = np.nanmax(section["peak"].values, axis=2, initial=0.0) > AT_REST
+    values = np.broadcast_to(section["value"].values[:, None, None], places.shape)
     low, high = ax.get_xlim()
     width = ax.get_window_extent().width / ax.figure.dpi * 72.0  # points
-    size = np.clip(0.5 * width / max(len(strobes["value"]), 1), FINEST, COARSEST)
+    size = np.clip(0.5 * width / max(len(section["value"]), 1), FINEST, COARSEST)
     ax.plot(values[moving].ravel(), places[moving].ravel(), markersize=size, **POINTS)
     ax.set_xlim(low, high)

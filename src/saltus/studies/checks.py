@@ -7,14 +7,14 @@ from saltus.errors import ParameterError
 from saltus.systems import System, check_system
 
 
-def check_diagram(system: System, path: str, bounds: tuple[float, float], **efforts: int) -> tuple[float, float]:
-    """The bounds; refuses, before anything is computed, what would fail later."""
+def check_diagram(system: System, path: str, bounds: tuple[float, float], **counts: int) -> tuple[float, float]:
+    """The bounds as two numbers; raises a ParameterError, before anything is computed, for what would fail later."""
     check_system(system, "a diagram", coordinates=1)
     if system.load.frequency is None:
         raise ParameterError("a load without a frequency has no periodic orbits to draw; give the Load a frequency")
     low, high = check_bounds(bounds)
     check_path(system, path)
     check_along(system, path, (low, high), "bounds")
-    for name, effort in efforts.items():
-        check_count(name, effort, 1 if name in ("max_period", "starts") else 0)
+    for name, count in counts.items():
+        check_count(name, count, 1 if name in ("max_period", "starts") else 0)
     return low, high

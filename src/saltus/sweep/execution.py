@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Outcomes = Iterator[tuple[Index, Any]]
 
-NOTE_EVERY = 1.0  # s: the list of failures is written anew no more often than someone would look at it
+NOTE_EVERY = 1.0  # s: the list of failures is not written more often than that
 
 log = logging.getLogger("saltus.sweep")
 
@@ -107,7 +107,7 @@ class _Run:
                 self.results.write(index, checked(self.plan, index, outcome))
                 self.done += 1
                 if self.failures.pop(index, None):
-                    self._note()
+                    self._save_failures()
                 self._report_progress()
 
     def conclude(self) -> None:
@@ -133,10 +133,10 @@ class _Run:
         given_up = f"given up after {attempts} attempt{'s' * (attempts > 1)}"
         log.warning("%s; %s", failure, "it is tried again" if again else given_up)
         log.debug("%s", raised.traceback)
-        self._note()
+        self._save_failures()
 
-    def _note(self) -> None:
-        """Keep the list of failures, which may be long, from time to time."""
+    def _save_failures(self) -> None:
+        """Write the list of failures, which may be long, if the last time is long enough ago."""
         if time.monotonic() - self.noted > NOTE_EVERY:
             self.results.note(self.failures.values())
             self.noted = time.monotonic()

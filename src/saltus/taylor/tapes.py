@@ -1,8 +1,8 @@
 """Tapes: the nodes of expressions as a list, operands before what uses them, in which form they stand in a generated file.
 
 A node is a tuple of its operation and its operands' places on the tape, or of a leaf's kind and its index or value. In a tape
-for series an elementary function names, besides its argument, the series of its slope and a factor of it (see `rules.py`); the
-slope may stand behind the function, as its coefficients are needed below the order that is made only.
+for series an elementary function names, besides its argument, the series of its slope and a factor of it (see `rules.py`). The
+slope may come after the function on the tape, because only its coefficients of lower orders are needed.
 """
 
 from __future__ import annotations

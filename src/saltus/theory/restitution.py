@@ -20,9 +20,8 @@ class InelasticContact:
 
     factor: float  # theta'+ / theta'-, 0 where the motion stops
     restitution: float  # r = T+ / T- on a ground at rest
-    impulses: tuple[
-        float, float
-    ]  # over theta'-: of the constraints theta_1 >= 0 and theta_2 <= 0, rows one and two of M [[theta']]
+    # Impulses over theta'- of the constraints theta_1 >= 0 and theta_2 <= 0, the two rows of M [[theta']].
+    impulses: tuple[float, float]
 
 
 def inelastic_contact(beta0: float, mass_ratio: float, side: int) -> InelasticContact:

@@ -23,11 +23,11 @@ from saltus.systems import System, VelocityReduction, reversed_system
 class SeparatrixSettings:
     """How a separatrix is followed."""
 
-    # It begins so far from the saddle, and leaves its tangent there by the square of this.
+    # Distance from the saddle at which it begins, on the tangent: the error is of the order of its square.
     offset: float = 1e-6
-    # It ends at a saddle within this distance, once it has been ten times as far from all.
+    # It ends when it comes within this distance of a saddle, after it has been ten times as far from all saddles.
     close: float = 1e-4
-    # So much time is followed at once.
+    # The dimensionless time for which one call of `simulate` follows it.
     span: float = 2.0
 
 
@@ -64,7 +64,7 @@ def saddles(system: System, window: Rectangle = PLANE) -> tuple[Equilibrium, ...
 
 
 def separatrices(system: System, window: Rectangle = PLANE, *, span: float = 60.0, step: float = 0.02) -> tuple[Separatrix, ...]:
-    """The stable manifolds of all saddles in a window: the curves that part the basins of a constant load.
+    """The stable manifolds of all saddles in a window: the curves that separate the basins under a constant load.
 
     Each branch is followed back for at most `span` of time, until it leaves the window for good (three half widths) or comes to
     a saddle, and given every `step` of time.

@@ -22,18 +22,20 @@ from saltus.progress import part_of
 class NonsettlingSettings:
     """How motions are judged that do not settle."""
 
-    # The first estimate of the exponents takes a third of `periods`, the second one the rest, twice as many.
+    # The first estimate of the exponents takes one of three parts of `periods`, the second one the other two.
     thirds: int = 3
-    # So many states at phase 0 are given to the 0-1 test.
+    # Number of stroboscopic states that the 0-1 test gets.
     states: int = 2000
-    # Above the first value of K the 0-1 test sees chaos, and below the second one order; between them it has no opinion.
+    # The 0-1 test shows chaos where its K is above this.
     chaos: float = 0.8
+    # It shows a regular motion where its K is below this; between the two values it decides nothing.
     order: float = 0.2
-    # Companions are followed for so many forcing periods at least: an orbit is known hundreds of periods after it is reached.
+    # The least number of forcing periods for which companions are followed: an orbit is recognised hundreds of periods after it
+    # is reached.
     least: int = 2000
-    # So many motions from states beside the last one show whether the chaos has a way out.
+    # Number of companions: motions from states beside the last one, which show whether the chaos is transient.
     companions: int = 128
-    # They begin this far aside: a chaotic motion of exponent 0.03 forgets it within 500 units of time.
+    # Distance of their first states from the last one: a chaotic motion of exponent 0.03 forgets it within 500 units of time.
     aside: float = 1e-6
 
 
@@ -64,12 +66,12 @@ class _Judged:
 
     @property
     def ordered(self) -> bool:
-        """Whether the 0-1 test sees order."""
+        """Whether the 0-1 test shows a regular motion."""
         return self.opinion is not None and SETTINGS.order > self.opinion.K
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """What the sentences of the reasons have places for."""
+        """The numbers that are filled into the sentences of the reasons."""
         return {
             "size": f"{self.last.values[0]:.4g} +- {self.last.errors[0]:.1g}",
             "K": float("nan") if self.opinion is None else self.opinion.K,

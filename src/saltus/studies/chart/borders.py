@@ -31,13 +31,13 @@ CURVES = 24  # on which motions end, at most
 class BorderSettings:
     """How much work the borders of a chart may take."""
 
-    # Changes that may be looked into in vain, for each curve that is wanted.
+    # The search for curves ends after this many changes, for each curve that is wanted, that could not be explained.
     vain: int = 3
-    # Changes that may turn out to be none, the same motion going on, for each curve that is wanted: these cost little.
+    # It also ends after this many, for each curve, at which the same motion goes on: these cost little.
     harmless: int = 10
-    # Changes that are looked into one by one.
+    # The largest number of changes that are looked into one by one.
     one_by_one: int = 2000
-    # A change matters so many times more where the neighbour is monostable, at rest: that is what a designer asks for.
+    # A change counts this many times where rest is the only motion of the neighbour: that is what a designer asks for.
     beside_rest: int = 10
 
 
@@ -71,9 +71,9 @@ def with_borders(
     """A chart with the stable motions that go on into a cell where no start has led to them, and the exact borders of it.
 
     Where a cell has a motion and its neighbour none alike, the orbit is solved for and followed towards the neighbour to the
-    special point at which it is lost. The points of the widest families, above all where rest alone is beside them, are followed
-    as curves of LP, PD, BPC and GR through the plane of the chart; the changes that a curve explains are passed over, and at most
-    2000 are looked into.
+    special point at which it is lost. The points of the widest families, above all those next to cells with rest only, are
+    followed as curves of LP, PD, BPC and GR through the plane of the chart; the changes that a curve explains are passed over,
+    and at most 2000 are looked into.
 
     Args:
         system: that of the chart.
@@ -123,7 +123,7 @@ class BorderSearch:
         """Follow the most urgent change to its special point and that through the plane, until `most` curves are known."""
         curves, vain, harmless = self.borders.curves, SETTINGS.vain * most, SETTINGS.harmless * most
         while len(self.waiting) and len(curves) < most and vain and harmless:
-            self._tell(len(self.waiting))
+            self._report_progress(len(self.waiting))
             known, first = len(curves), np.arange(len(self.waiting)) == np.argmax(self._urgency(self.waiting))
             change = self.waiting.only(first)
             ending, special = self.follower.follow(change)
@@ -131,7 +131,7 @@ class BorderSearch:
             if curve is not None:
                 curves.append(curve)
             else:
-                self._note(change, ending)
+                self._record(change, ending)
                 vain, harmless = (vain, harmless - 1) if ending.outcome.is_explained else (vain - 1, harmless)
             self.waiting = self.waiting.only(~first & ~explained(self.chart, self.waiting, curves[known:]))
 
@@ -140,9 +140,9 @@ class BorderSearch:
         room = max(0, SETTINGS.one_by_one - len(self.borders.endings))
         chosen = np.argsort(-self._urgency(changes), kind="stable")[:room]
         for done, i in enumerate(chosen[np.argsort(changes.motion[chosen], kind="stable")]):
-            self._tell(len(chosen) - done)
+            self._report_progress(len(chosen) - done)
             change = changes.only(np.array([i]))
-            self._note(change, self.follower.follow(change)[0])
+            self._record(change, self.follower.follow(change)[0])
 
     def renewed(self) -> Changes:
         """The changes of a chart with added motions of which nothing is known yet; what is gone with them is forgotten."""
@@ -153,14 +153,14 @@ class BorderSearch:
         return self.waiting.only(fresh & ~explained(self.chart, self.waiting, self.borders.curves))
 
     def _urgency(self, changes: Changes) -> np.ndarray:
-        """The larger the family the more, above all with rest alone beside it."""
+        """The larger the family the more, above all where it is next to a cell with rest only."""
         beside_rest = self.chart.monostable[tuple(changes.target.T)]
         return np.asarray(self.chart.family_size[changes.motion] * np.where(beside_rest, SETTINGS.beside_rest, 1))
 
-    def _note(self, change: Changes, ending: Ending) -> None:
+    def _record(self, change: Changes, ending: Ending) -> None:
         self.borders.endings[keys_of(self.chart, change)[0]] = ending
 
-    def _tell(self, left: int) -> None:
+    def _report_progress(self, left: int) -> None:
         self.progress(1 - left / self.total, "exact borders")
 
     def _curve(self, special: SpecialPoint, change: Changes, ending: Ending) -> xarray.Dataset | None:

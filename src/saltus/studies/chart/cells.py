@@ -26,15 +26,15 @@ from saltus.theory import amplitude_limits
 class CellSettings:
     """How the cells of a chart are filled."""
 
-    # Every other initial state lies in a smaller copy of the window, down to this part of it: some motions are small.
+    # Every other initial state lies in a smaller copy of the window, down to this share of its size: some motions are small.
     innermost: float = 1e-2
     # Shares of the forcing periods after which motions that have come together go on as one.
     stages: tuple[float, ...] = (1 / 20, 1 / 20, 1 / 10, 4 / 5)
-    # Up to so many motions an ensemble gains little from having fewer, so that fewer stages are faster.
+    # Up to this number of motions an ensemble gains little from having fewer, so that fewer stages are faster.
     few_motions: int = 500
     few_stages: tuple[float, ...] = (1 / 10, 9 / 10)
-    # What is left of a cell after all stages gets so many times the forcing periods, if no more than so many motions are left:
-    # these are slow, while chaos leaves many.
+    # The motions that are left in a cell after all stages are slow if they are few, while chaos leaves many. If they are at most
+    # `patient_with`, they are followed for `patience` times the forcing periods.
     patience: int = 4
     patient_with: int = 3
     # Motions below this share of the least amplitude are not followed to where they settle.
@@ -47,8 +47,8 @@ SETTINGS = CellSettings()
 
 
 @dataclass
-class Settled:
-    """The stable motions, each once, by cell and falling amplitude; of the other starts how many ended how, by cell."""
+class CellOutcomes:
+    """The stable motions, each once, by cell and falling amplitude, and for each cell how many of the other starts ended how."""
 
     motions: np.ndarray  # of dtype MOTION
     captured: np.ndarray  # at rest, for all later loads
@@ -79,7 +79,7 @@ def beyond_limits(system: System, parameters: Mapping[str, np.ndarray], amplitud
     return {f"beyond_{limit.name}": amplitude > limit.value for limit in amplitude_limits(system, parameters)}
 
 
-def stable_motions(request: ChartRequest) -> tuple[Settled, np.ndarray]:
+def stable_motions(request: ChartRequest) -> tuple[CellOutcomes, np.ndarray]:
     """What the starts in each cell settle on, and the motions that starts from neighbouring cells add to these.
 
     So every motion is followed through the chart to where its stability ends, however little it attracts there.
@@ -87,14 +87,14 @@ def stable_motions(request: ChartRequest) -> tuple[Settled, np.ndarray]:
     states = starts(request.system, request.starts, request.window, request.seed)
     size = math.prod(request.shape)
     settled = settle(request, np.repeat(np.arange(size), len(states)), np.tile(states, (size, 1)))
-    known = news = settled.motions
+    known = new = settled.motions
     for _ in range(SETTINGS.rounds):
-        cell, states = seeds(news, known, request.shape)
+        cell, states = seeds(new, known, request.shape)
         if not len(cell):
             break
         further = settle(request, cell, states, known).motions
-        news = further[~has_alike(known, further["cell"], further, TOLERANCES.same)]
-        known = distinct(np.concatenate([known, news]))
+        new = further[~has_alike(known, further["cell"], further, TOLERANCES.same)]
+        known = distinct(np.concatenate([known, new]))
     return settled, known
 
 
@@ -107,7 +107,7 @@ def starts(system: System, count: int, window: Window, seed: int) -> np.ndarray:
     return states
 
 
-def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: np.ndarray | None = None) -> Settled:
+def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: np.ndarray | None = None) -> CellOutcomes:
     """Follow motions from states (n, 2) at phase 0 in the cells of these numbers until they settle, or come to a known one."""
     size, least = math.prod(request.shape), request.least
     captured, tiny, unsettled = (np.zeros(size, dtype=np.int64) for _ in range(3))
@@ -130,7 +130,7 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
     small = moving["amplitude"] < least
     _count(tiny, moving[small])
     _count(unsettled, moving[~small])
-    return Settled(distinct(np.concatenate(found)), captured, tiny, unsettled)
+    return CellOutcomes(distinct(np.concatenate(found)), captured, tiny, unsettled)
 
 
 def _count(number: np.ndarray, motions: np.ndarray) -> None:
@@ -193,8 +193,10 @@ def _arrived(motions: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def seeds(motions: np.ndarray, known: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Cells, (n,), and states, (n, 2), where a neighbour has a motion and the cell none alike: its state, or where that is
-    heading to if the cell behind the neighbour has such a motion too."""
+    """Further starts, as cells (n,) and states (n, 2): the motions of neighbours that a cell has no motion alike to.
+
+    The state is the neighbour's, or is extrapolated where the cell behind the neighbour has such a motion too.
+    """
     place = np.stack(np.unravel_index(motions["cell"], shape), axis=1)
     found = []
     for side in np.array(SIDES):

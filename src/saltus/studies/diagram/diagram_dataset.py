@@ -88,7 +88,7 @@ def _distances(orbits: list[PeriodicOrbit], rounds: int) -> np.ndarray:
 
 
 def _moved(orbit: RestingOrbit, rounds: int) -> float:
-    """The largest distance at 64 instants of a period: at its release alone every orbit that rests is the same."""
+    """The largest distance, at 64 instants of a period: at the release itself all orbits that rest are in the same state."""
     motion = orbit.motion((rounds + 1) * orbit.period)
     times = motion.start + orbit.duration * (np.arange(INSTANTS) + 0.5) / INSTANTS
     now, later = motion.at(times), motion.at(times + rounds * orbit.duration)
