@@ -23,9 +23,9 @@ AMPLITUDE = "load.horizontal.amplitude"
 
 
 def test_the_numbers_are_those_of_the_compiled_lanes():
-    from saltus.flow.ensemble.sampling import LONGEST_CYCLE
+    from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE
 
-    assert RECURRENCE.compiled_max_period == LONGEST_CYCLE
+    assert RECURRENCE.compiled_max_period == LONGEST_RECURRENCE
 
 
 def test_a_motion_that_repeats_itself_comes_back_to_its_state_after_its_period_and_not_before():
