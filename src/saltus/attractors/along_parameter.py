@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class MatchingSettings:
-    """By what an attractor is known again at the next value of the parameter."""
+    """The numbers by which an attractor is recognised at the next value of the parameter."""
 
-    # Two sets may be one attractor up to this distance of one another, relative to their size.
+    # Two sets may be one attractor if their distance, relative to their size, is at most this threshold.
     threshold: float = 0.3
-    # Up to so many times the threshold where they repeat after different periods, as across a period doubling.
+    # A factor of the threshold for orbits of different periods, as across a period doubling.
     other_period: float = 0.5
-    # Up to so many times the threshold where they have one period and motions from the one settle on the other.
+    # A factor of the threshold for orbits of the same period, where motions from one settle on the other.
     led: float = 3.0
-    # Motions start at the next value from so many states of each attractor.
+    # Number of states of each attractor from which motions start at the next value.
     seeds: int = 64
-    # So large a part of the states of a sampled set must be near the other one, as the rest are states of a random sample.
+    # The share of the states of a sampled set that must be near the other set: not all are, as both are random samples.
     share: float = 0.95
 
 

@@ -81,7 +81,7 @@ class Attractor:
     lowest: float
     orbit: PeriodicOrbit | None  # of a periodic one: solved by its own equations, and stable by its multipliers
     starts: int  # how many of the initial states end there
-    of: int  # out of so many
+    of: int  # the number of initial states in all
     mirror: int  # label of its mirror image: its own where it is symmetric, UNDECIDED where the system has no mirror
     evidence: str
 

@@ -18,7 +18,7 @@ class SampleSettings:
     """How densely a motion is written where the study does not say."""
 
     max_samples: int = 1_000_000  # More would make motion.nc larger than what other programs read at once.
-    per_period: int = 200  # So many does a motion write by itself in a forcing period.
+    per_period: int = 200  # Number of samples of a forcing period where the study gives none.
     max_dense_periods: int = 20_000  # The dense output of a longer motion takes more memory than a laptop has.
 
 

@@ -30,14 +30,15 @@ from saltus.systems import System, check_system
 
 @dataclass(frozen=True)
 class FindSettings:
-    """How a motion is let settle, and its orbit solved for."""
+    """How long a motion is followed until it settles, and how its orbit is solved for."""
 
-    # Orbits of up to so many forcing periods are looked for if no limit is given.
+    # The longest period that is looked for if no limit is given, in forcing periods.
     max_period: int = 12
-    # A motion is given so many forcing periods to settle, then twice as many, and so on, in so many rounds.
+    # Number of forcing periods that a motion is given to settle in the first round; each further round doubles it.
     settling: int = 160
+    # Number of such rounds.
     rounds: int = 5
-    # Newton's method may take so many iterations from a motion to its orbit.
+    # The largest number of Newton's iterations from a motion to its orbit.
     iterations: int = 25
 
 

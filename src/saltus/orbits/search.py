@@ -23,14 +23,15 @@ from saltus.systems import System, check_system
 class SearchSettings:
     """Where orbits are looked for."""
 
-    # Motions are given so many forcing periods to settle.
+    # Number of forcing periods that motions are given to settle.
     settling: int = 200
-    # Near returns are looked for in so many forcing periods at the beginning of each motion, and in as many at its end.
+    # Number of forcing periods at the beginning of each motion, and at its end, in which near returns are looked for.
     transient: int = 24
-    # Newton's method is tried for an orbit that repels from returns nearer than this, of each period from so many of the nearest,
-    # which must lie so far apart.
+    # Newton's method is tried for an orbit that repels from returns nearer than this.
     near: float = 0.15
+    # The largest number of such returns, for each period: the nearest ones.
     guesses: int = 12
+    # The least distance between two of these returns.
     apart: float = 0.05
     # A motion that stays this near to the contact is at rest, and an orbit no larger than this is rest.
     still: float = 1e-6
@@ -70,7 +71,7 @@ class Search:
     max_period: int  # forcing periods
     window: Window  # of the state plane
     seed: int
-    unsettled: np.ndarray  # (values,): how many motions did not settle on an orbit of up to so many periods: slow or chaotic;
+    unsettled: np.ndarray  # (values,): how many motions did not settle on an orbit of up to `max_period`: slow or chaotic
     at_rest: np.ndarray  # (values,): how many came to rest
     settled: Settled  # the attractors as simulation shows them
 

@@ -28,7 +28,7 @@ from saltus.orbits.tolerances import TOLERANCES
 from saltus.progress import Progress, silent
 
 FOLLOWED = (SpecialKind.LP, SpecialKind.PD, SpecialKind.BPC, SpecialKind.GR)
-TENFOLD = 10.0  # a parameter without bounds is followed to so many times its value, and to that part of it
+TENFOLD = 10.0  # a parameter without bounds is followed up to its value times this, and down to its value divided by this
 
 
 @dataclass

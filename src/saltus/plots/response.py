@@ -19,7 +19,7 @@ from saltus.plots.conventions import INK, LIMIT, LIMIT_LINE, STABLE_LINE, UNSTAB
 class ResponseSettings:
     """Where an inset may be placed, and how near marks may come to one another."""
 
-    inset_places: int = 24  # So many places along each side of the axes are tried for an inset.
+    inset_places: int = 24  # The number of places along each side of the axes that are tried for an inset.
     inset_margin: float = 0.05  # The ticks of an inset take this share of the axes.
     mark_distance: float = 1.5  # Marks of one kind that are nearer, in mm, are left to the insets and to the data.
 

@@ -160,7 +160,7 @@ class WallOrbit:
         """tau of one impact, in [0, 2 pi / Omega); q = 2, 3, ... has as many orbits, shifted by whole forcing periods."""
         family = self.family
         position, velocity = self._steady
-        behind = math.atan2(family.impedance.imag, family.impedance.real)  # the response follows a cosine by so much
+        behind = math.atan2(family.impedance.imag, family.impedance.real)  # phase by which the response lags a cosine
         crest = math.atan2(-velocity / family.frequency, position) + behind
         return float((crest + math.pi / 2 - family.phase) % (2 * math.pi) / family.frequency)
 

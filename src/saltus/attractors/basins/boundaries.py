@@ -26,22 +26,26 @@ from saltus.systems import System
 class BoundarySettings:
     """How saddles on the boundary are found, and their manifolds computed."""
 
-    # The manifolds are as fine as this, in half widths of the window, and have at most so many points on each side of a saddle.
+    # Distance between neighbouring points of a manifold, in half widths of the window.
     step: float = 0.01
+    # The largest number of points of a manifold on each side of a saddle.
     points: int = 8_000
-    # Saddles of up to so many forcing periods are looked for, and so many of the fewest are taken: where there are more, the
-    # manifold of each comes near all of the boundary.
+    # The longest period of saddles that are looked for, in forcing periods.
     max_period: int = 6
+    # The largest number of saddles, those of the shortest periods: where there are more, the manifold of each comes near all of
+    # the boundary.
     saddles: int = 4
-    # The edge is tracked from so many places of the boundary, for so many forcing periods.
+    # Number of places of the boundary from which the edge is tracked.
     edges: int = 12
+    # Number of forcing periods for which it is tracked.
     tracked: int = 40
-    # An interval across the boundary is cut by so many states, and so often: 33^9 is past rounding.
+    # Number of states that divide an interval across the boundary.
     cuts: int = 32
+    # Number of times that such an interval is divided: 33^9 is beyond rounding.
     rounds: int = 9
     # Newton's method is tried from returns that are no farther than this.
     farthest_return: float = 0.2
-    # Curves are given up to so many half widths from the middle of the window.
+    # Curves are given up to this distance from the middle of the window, in half widths.
     margin: float = 1.5
 
 

@@ -158,7 +158,7 @@ class Wada:
 
     labels: tuple[int, ...]
     radii: np.ndarray  # in cells
-    shares: np.ndarray  # of the boundary cells: those with all labels within so many cells of them
+    shares: np.ndarray  # of the boundary cells: those that have all labels within each of these radii
     boundary_cells: int
 
     @property

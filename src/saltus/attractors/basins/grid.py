@@ -31,17 +31,19 @@ if TYPE_CHECKING:
 class BasinSettings:
     """The numbers of a picture of basins."""
 
-    # So many cells are taken along an axis for which no numbers are given.
+    # Number of cells along an axis for which no numbers are given.
     cells: int = 201
     # The half width of the window around a grid of one point.
     narrowest: float = 1e-6
-    # A motion is followed for so many forcing periods at most, and has reached its attractor within this distance of it.
+    # The largest number of forcing periods for which a motion is followed.
     periods: int = 500
+    # The distance from an attractor within which a motion has reached it.
     within: float = 1e-2
-    # So many velocities are in a chunk of a store, which then takes seconds.
+    # Number of velocities in a chunk of a store, which then takes seconds.
     rows: int = 25
-    # New attractors are looked for from so many states of cells that end on no known one, and so often.
+    # Number of states from which new attractors are looked for, out of the cells whose motions end on no known one.
     new_states: int = 64
+    # Number of times that new attractors are looked for.
     rounds: int = 3
 
 

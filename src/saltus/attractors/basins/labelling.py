@@ -17,13 +17,13 @@ from saltus.systems import System
 class LabellingSettings:
     """How motions are followed until their label is known."""
 
-    # After so many forcing periods, and later longer ones, motions that have settled are labelled, and the others go on.
+    # Number of forcing periods of the first stage; after each stage settled motions are labelled. Later stages are longer.
     stage: int = 48
-    # So many of the last states of a motion that does not settle must lie on a sampled set, in the median.
+    # Number of last states of a motion that does not settle, which must lie on a sampled set in the median.
     last: int = 64
-    # So many states at phase 0 are kept at once: 67 MB, and as much again for what is made of them.
+    # The largest number of stroboscopic states that are kept at once: 67 MB, and as much again for what is computed from them.
     most_states: int = 1 << 22
-    # At least so many motions are followed together.
+    # The least number of motions that are followed together.
     fewest: int = 256
 
 

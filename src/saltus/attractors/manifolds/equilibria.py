@@ -23,13 +23,13 @@ from saltus.systems import Constant, System
 class EquilibriumSettings:
     """How equilibria are found, and their eigenvalues."""
 
-    # Equilibria are looked for between so many points of the window.
+    # Number of points of the window between which equilibria are looked for.
     grid: int = 2001
     # Derivatives are central differences of sixth order with this step.
     difference: float = 1e-3
-    # A real part up to this, which differences leave where nothing is lost, is 0.
+    # A real part of at most this is 0: the differences leave it where no energy is lost.
     neutral: float = 1e-9
-    # The pull beside the contact is looked at so far from it where the pull at the contact is 0.
+    # Where the pull at the contact is 0, it is evaluated at this distance beside it.
     inside: float = 1e-6
 
 

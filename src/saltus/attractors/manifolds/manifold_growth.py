@@ -15,15 +15,17 @@ from saltus.checks import Window
 class GrowthSettings:
     """When an image of the segment is fine enough."""
 
-    # So many rounds of refinement may each halve the gaps, but none between parameters on the segment nearer than `narrowest`.
+    # The largest number of rounds of refinement, each of which halves the gaps.
     rounds: int = 40
+    # Gaps between parameters on the segment that are narrower than this are not halved.
     narrowest: float = 1e-13
-    # Chords may bend by so much, in rad, unless they are shorter than so many steps.
+    # The largest angle between neighbouring chords, rad.
     bend: float = 0.15
+    # Chords shorter than this, in steps, may bend by more.
     short: float = 0.1
-    # The image is torn where neighbours stay farther apart than so many steps.
+    # The image is torn where neighbours stay farther apart than this, in steps.
     torn: float = 2.0
-    # Points are dropped beyond so many half widths of the window from its middle.
+    # Points farther than this from the middle of the window, in half widths, are dropped.
     reach: float = 3.0
 
 

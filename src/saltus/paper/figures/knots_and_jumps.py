@@ -19,12 +19,12 @@ from saltus.systems import System
 class KnotSettings:
     """How knots are solved for, and how long motions are followed past a fold."""
 
-    phases: int = 361  # Motions are given at so many phases of one forcing period.
-    beyond: float = 3e-3  # So far, relative, past a fold a motion is let go: nearer to it motions linger where the orbit was.
+    phases: int = 361  # The number of phases of a forcing period at which motions are given.
+    beyond: float = 3e-3  # The relative distance past a fold at which motions start: nearer to it they linger at the lost orbit.
     apart: float = 1e-5  # A point of a branch that is nearer to a fold, relative, may be the fold itself.
     distinct: float = 1e-6  # Motions that differ by less, in rad, are one motion from two points.
-    settle: int = 800  # Past a fold a motion is looked at after so many forcing periods,
-    last: int = 12  # and for so many.
+    settle: int = 800  # The number of forcing periods for which a motion past a fold is followed.
+    last: int = 12  # The number of last ones of these, from which its extrema are taken.
 
 
 SETTINGS = KnotSettings()

@@ -23,7 +23,7 @@ from saltus.systems import System
 class ChaosCriteria:
     """By which numbers the statements on chaos in Figs. 9 to 13 are judged."""
 
-    inner: int = 200  # Within a band stable motions are counted at so many values.
+    inner: int = 200  # The number of values within a band at which stable motions are counted.
     high: float = 1.0  # Frequencies above this one are beyond the primary resonance.
     low: float = 0.5  # Superharmonic resonances are below this frequency.
     large_load: float = 2.0  # The paper sees chaos in the panels from this Hhat on.

@@ -36,13 +36,13 @@ class ResponseCriteria:
 
     confirmed: float = 1e-8  # A stable motion returns to within this distance of itself by direct simulation.
     beside: float = 1e-9  # Branches are read at this relative distance on both sides of a value at which one may begin.
-    on_branch: float = 2e-2  # A simulated attractor lies within so many rad of the line drawn between the points of its branch.
+    on_branch: float = 2e-2  # A simulated attractor lies this near, in rad, to the line drawn between the points of its branch.
     equal: float = 1e-10  # Amplitudes that differ by less, in rad, are equal.
     resonance: float = 0.9  # The primary resonance of Fig. 9 is at about this frequency.
-    samples: int = 600  # At so many values, an even number, the stable motions of a range are counted.
+    samples: int = 600  # The number of values, an even one, at which the stable motions of a range are counted.
     apart: float = 0.1  # Motions or amplitudes that differ by more, in rad, plainly differ.
     large_load: float = 0.5  # Detached loops are there from this Hhat on.
-    shown_loops: int = 3  # The evidence names the ranges of so many loops of a panel.
+    shown_loops: int = 3  # The number of loops of a panel whose ranges the evidence names.
 
 
 CRITERIA = ResponseCriteria()

@@ -16,7 +16,7 @@ from saltus.studies.chart.motions import TOLERANCES
 from saltus.systems import System
 
 STABILITY_ENDS = ("LP", "PD", "BPC", "GR", "RL", "CH")  # kinds of special points; the last two are of orbits that rest
-AT_THE_END = 1e-6  # of the way: a special point so near to the end of a branch is its end
+AT_THE_END = 1e-6  # share of the way: a special point nearer than this to the end of a branch is its end
 
 
 class ChangeOutcome(StrEnum):

@@ -16,16 +16,16 @@ BRANCHING = (SpecialKind.PD, SpecialKind.BPC)  # at which other families are bor
 class BranchSettings:
     """How far branches are followed, and which of those that are born on others."""
 
-    # Families of a longer period are followed along a frequency up to so many times the range's upper end: many of them close.
+    # Along a frequency, families of longer periods are followed up to the range's upper end times this, as many of them close.
     beyond_frequency: float = 20.0
-    # Along anything else few of them close, and they are followed to so many times its upper end.
+    # Along any other parameter few of them close, and they are followed up to its upper end times this.
     beyond: float = 1.3
-    # With so many branches nothing more is followed that is born on another one.
+    # With this number of branches, no more are followed that are born on others.
     branches: int = 30
-    # On a branch that covers less than this part of the range nothing is followed that is born there.
+    # Branches born on one that covers less than this share of the range are not followed.
     narrow: float = 0.02
-    # Nor where an orbit is born whose amplitude is less than this part of its branch's largest one: near rest a branch has
-    # endless special points, each smaller than the one before.
+    # Branches are not followed whose first orbit is smaller than this share of their parent's largest one: near rest a branch has
+    # endless special points, each of a smaller orbit than the one before.
     visible: float = 0.01
     # The end of a branch is the special point of another one if parameters and amplitudes differ by no more.
     same_place: float = 1e-6

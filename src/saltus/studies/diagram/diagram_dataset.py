@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray
 
 STAYS = 1e-8  # the distance within which a stable orbit must stay where it is
-STAYS_ROUNDS = 20  # for so many of its periods
+STAYS_ROUNDS = 20  # the number of its periods for which it must
 INSTANTS = 64  # of a period at which an orbit that rests is compared with itself
 
 
