@@ -35,7 +35,7 @@ from saltus.bounds.intervals import ROUNDING, SLACK, Interval
 ODD_1 = 0.385  # above the largest x (1 - x^2), 2 / sqrt(27)
 ODD_2 = 0.2863  # above the largest x (1 - x^2)^2, 16 / (25 sqrt(5))
 TINY = 1e-12
-TRIALS = 0.8 ** np.arange(9)  # of the largest speed for which the bounds hold
+TRIALS = 0.8 ** np.arange(9)  # shares of the largest speed, tried in turn until the bounds hold
 
 
 @dataclass

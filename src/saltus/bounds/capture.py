@@ -16,10 +16,10 @@ from saltus.bounds.intervals import SLACK, Interval, enclose
 from saltus.systems import System, broadcast_arrays, check_parameters, check_system, finite_array, parameter_table
 from saltus.taylor import Expr, Trace, differentiate, number, record_table, substitute, trace
 
-CELLS = 16  # of the forcing period
+CELLS = 16  # number of intervals into which the forcing period is divided
 BATCH, CELL_BATCH = 8192, 512  # parameter sets at once, without and with cells: their arrays then stay in the cache
 ONE = 1e-14  # a product of impact factors this close to 1 is 1: no law states its numbers more exactly
-BOXES = (0.7, 0.2)  # of the bounds of the corrected invariant: shares of the speed that those at the contact suggest
+BOXES = (0.7, 0.2)  # largest speeds over which the corrected invariant is bounded, as shares of the first guess; tried in turn
 
 
 def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -> Any:

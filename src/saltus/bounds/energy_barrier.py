@@ -11,7 +11,7 @@ from saltus.bounds.intervals import SLACK, Interval
 
 WIDEST = 1e6  # openings up to this are looked at
 TRIES = 30
-STEPS = 20  # of the opening, each at most a third of it
+STEPS = 20  # largest number of steps over the opening, each at most a third of it
 
 Bounds = Callable[[Interval], Interval]
 Work = tuple[Any, Any, Any]

@@ -16,7 +16,7 @@ from saltus.continuation.test_functions import located
 from saltus.continuation.zero import Zero
 from saltus.progress import Progress, silent
 
-AHEAD = 1e-6  # of a point along its tangent, to know its direction in other numbers
+AHEAD = 1e-6  # length along a tangent of the point that gives its direction after the impacts are renumbered
 WIDE = 0.2  # share of a step by which the first point of a curve may lie beside it for the curve to close
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.continuation.curve import Curve, P
 
-NARROW = 1e-12  # to within which, relative to the parameter, ends and changes without a test function are located
+NARROW = 1e-12  # relative precision of the parameter at an end or a change that no test function locates
 
 
 class NaturalCurve(Curve[P]):

@@ -18,7 +18,7 @@ class TestFunction:
 
     kind: str
     value: Callable[[Any], float]
-    width: float = 1e-11  # of the bracket in the step that contains the zero; the point nearest to zero is nearer still
+    width: float = 1e-11  # of the bracket of the zero, as a share of the step; the best point found in it is nearer still
 
 
 def located(test: TestFunction, a: Any, b: Any) -> Zero | None:

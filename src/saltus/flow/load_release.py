@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.systems import System
 
-SAMPLES = 64  # of a forcing period for each order of the highest harmonic: the contact acceleration has no narrower peak
+SAMPLES = 64  # per forcing period and order of the highest harmonic: the contact acceleration has no narrower peak
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ from saltus.progress import Progress, silent
 from saltus.systems import System
 
 WHAT = "following the motion"  # for the progress
-MOST_EVENTS = 20_000_000  # that are kept
-MOST_IMPACTS = 1_000_000  # of a unit of time: more are an accumulation of impacts that is not being resolved
+MOST_EVENTS = 20_000_000  # largest number of events that are kept
+MOST_IMPACTS = 1_000_000  # in a unit of time: more are an accumulation of impacts that is not being resolved
 
 
 def simulate(

@@ -11,7 +11,7 @@ from saltus.flow.dense_output import DenseOutput, evaluate
 from saltus.systems import System
 
 SAMPLES = 12  # in each step, to find changes of sign: a step is shorter than a margin's own time scale
-ITERATIONS = 8  # of Ridders' method, which doubles the digits each time and halves the bracket at the least
+ITERATIONS = 8  # of Ridders' method, each of which doubles the correct digits or at least halves the bracket
 
 
 @dataclass(frozen=True)

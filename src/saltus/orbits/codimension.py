@@ -16,7 +16,7 @@ from saltus.orbits.special_point import SpecialKind
 from saltus.orbits.tolerances import TOLERANCES
 
 NARROW = 1e-15  # width of the bracket, in the step that contains the point
-CAP = 1.0  # of the room that a motion has before another grazing, which may be infinite
+CAP = 1.0  # upper limit of `room`, which would be infinite for a motion without impacts that never comes near the contact
 
 
 def curve_test(kind: SpecialKind, value: Callable[[SpecialCurvePoint], float]) -> TestFunction:

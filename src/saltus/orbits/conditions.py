@@ -26,8 +26,8 @@ from saltus.orbits.signature import Signature
 class DifferenceSettings:
     """The steps of the central differences along null vectors, which are of length 1."""
 
-    shift: float = 1e-4  # of second derivatives, whose errors are its square, and rounding over it
-    long_shift: float = 4e-3  # of third differences, whose errors are its fourth power, and rounding over its cube
+    shift: float = 1e-4  # step of second derivatives: their error is its square plus rounding divided by it
+    long_shift: float = 4e-3  # step of third differences: their error is its fourth power plus rounding divided by its cube
 
 
 SETTINGS = DifferenceSettings()

@@ -9,7 +9,7 @@ import numpy as np
 from saltus.continuation import newton
 from saltus.orbits.problem import Equations, Problem
 
-ITERATIONS = 12  # from a guess near the orbit; a motion that has not quite settled takes more
+ITERATIONS = 12  # enough from a guess near the orbit; a motion that has not quite settled needs more
 
 
 @dataclass(frozen=True)

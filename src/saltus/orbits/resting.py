@@ -24,7 +24,7 @@ from saltus.orbits.symmetry import is_symmetric, keeps_symmetry
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import System
 
-INTO = 1e-3  # of the first flight after a release, where the look at it begins: before it the gap only opens
+INTO = 1e-3  # share of the first flight after a release before which the gap only opens, so that it is not searched for minima
 RELEASED, LANDED, SIDE = 0, 1, 2  # in `excursions`
 
 

@@ -10,7 +10,7 @@ from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import Load, System
 
-SAMPLES = np.linspace(0.05, 0.95, 19)  # of a period, at which loads are compared; a harmonic of order 9 needs 19
+SAMPLES = np.linspace(0.05, 0.95, 19)  # shares of a period at which loads are compared; a harmonic of order 9 needs 19
 
 
 def is_symmetric(system: System) -> bool:

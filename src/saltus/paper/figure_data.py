@@ -10,7 +10,7 @@ import xarray as xr
 from saltus.provenance import provenance
 from saltus.systems import System
 
-TOLERANCE = 1e-12  # of every motion behind a figure
+TOLERANCE = 1e-12  # the tolerance of every motion that is shown in a figure
 
 
 def dataset(

@@ -14,7 +14,7 @@ from saltus.plots.response import draw_bands, draw_limits, draw_response, respon
 
 POINTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
 FINEST, COARSEST = 1.3, 3.5  # sizes of these points: as large as the step between values lets them be
-AT_REST = 1e-9  # of the largest: a motion that is smaller in every period is left out
+AT_REST = 1e-9  # a motion whose largest amplitude in any period is below this is at rest, and left out
 
 
 @styled

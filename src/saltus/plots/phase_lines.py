@@ -18,9 +18,9 @@ class LineSpacing:
     cells: int = 48  # along each side of the window: a motion ends where it enters a cell through which another one is drawn
     lap_cells: int = 160  # the same for a motion and its own earlier laps
     apart: float = 8 / 160  # travelled between two laps: less is the same passage of a cell
-    closing: float = 2 / 160  # by which a motion goes on past its first lap, so that one that repeats itself is drawn closed
+    closing: float = 2 / 160  # length drawn beyond the first lap, so that a motion that repeats itself is closed
     least: float = 0.08  # what is left of a motion is not drawn if it is shorter
-    first_arrow: float = 0.12  # from the start of a motion to its first arrow
+    first_arrow: float = 0.12  # length from the start of a motion to its first arrow
 
 
 SPACING = LineSpacing()

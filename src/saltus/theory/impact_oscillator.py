@@ -12,7 +12,7 @@ import numpy as np
 from saltus.errors import ParameterError
 from saltus.systems import Harmonic, System, WallOscillator
 
-SAMPLES_PER_TURN = 64  # of the faster of the two frequencies, when the maxima inside an orbit are looked for
+SAMPLES_PER_TURN = 64  # samples per period of the faster frequency, among which the maxima inside an orbit are looked for
 
 
 @dataclass(frozen=True)

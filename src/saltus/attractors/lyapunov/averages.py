@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-BATCHES = 16  # at least, of which a standard error is taken
+BATCHES = 16  # least number of batches from which a standard error is taken
 STUDENT = 2.131449545559323  # the two-sided 95 % point of Student's t with BATCHES - 1 degrees of freedom
 
 

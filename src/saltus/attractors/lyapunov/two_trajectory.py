@@ -11,7 +11,7 @@ from saltus.flow import simulate
 from saltus.progress import Progress, silent
 from saltus.systems import System
 
-DISTANCE = 1e-7  # of the two: far above the error of a period, far below what bends the map
+DISTANCE = 1e-7  # between the two motions: far above the error of a period, small enough for the map to be linear
 ACCURACY = 1e-5  # what motions at that distance, with errors of their own, may miss of an exponent
 TOLERANCE = 1e-14
 EVERY = 16  # periods between calls of the progress

@@ -34,7 +34,7 @@ class EquilibriumSettings:
 
 
 SETTINGS = EquilibriumSettings()
-SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # of a first derivative by central differences
+SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # (step, weight) of the central difference for a first derivative
 
 
 @dataclass(frozen=True)

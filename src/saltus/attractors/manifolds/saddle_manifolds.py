@@ -28,7 +28,7 @@ from saltus.systems import System, reversed_system
 
 OFFSET = 1e-6  # d: the segment lies off the manifold by its square, which shrinks from there on
 TOLERANCE = 1e-13
-HYPERBOLIC = 1e-6  # by which multipliers must differ from 1 in modulus
+HYPERBOLIC = 1e-6  # least difference of the multipliers' moduli from 1
 PLANE = ((-3.0, 3.0), (-3.0, 3.0))  # the window of the state plane in which curves are wanted where none is given
 
 

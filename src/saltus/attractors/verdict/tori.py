@@ -12,7 +12,7 @@ from saltus.bounds import Interval, Leaves, enclose, reads
 from saltus.systems import System, check_system
 from saltus.taylor import Expr, Trace, differentiate, substitute, trace
 
-CELLS = 4096  # of the forcing period
+CELLS = 4096  # number of intervals into which the forcing period is divided
 EVERYWHERE = Interval(-1e300, 1e300)
 VELOCITY = Expr("velocity", (), 0)
 

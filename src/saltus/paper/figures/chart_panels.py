@@ -20,7 +20,7 @@ WINDOW = ((-2.0, 2.0), (-2.0, 2.0))  # of the initial states
 LOWEST = -2.0  # V
 WIDEST = 0.5  # Hhat
 FAST = 2.0  # Omega from which the closed form of the onset is drawn too
-CURVES = 20  # on which motions end, at most, for one chart
+CURVES = 20  # largest number of curves on which motions end, for one chart
 
 
 def compute(panels: Mapping[str, Mapping[str, Any]], size: int, curves: int = CURVES, **options: Any) -> Any:

@@ -9,8 +9,8 @@ import numpy as np
 
 from saltus.branch_lines import branch_lines, branches_of, smooth_lines
 
-PROMINENT = 0.05  # of the highest amplitude, by which a resonance rises above the valleys beside it
-FREE_ENDS = {"closed", "bound"}  # of a branch that hangs on no other
+PROMINENT = 0.05  # least height of a resonance above the minima beside it, as a share of the highest amplitude
+FREE_ENDS = {"closed", "bound"}  # the end reasons of a branch that is connected to no other
 
 
 def within(spectrum: Any, branch: Any) -> np.ndarray:

@@ -24,7 +24,7 @@ from saltus.systems import (
 )
 from saltus.theory import energy_factor, energy_jump
 
-TIME = 0.2  # of the impacts, at which every load and ground velocity has some value
+TIME = 0.2  # at which the impacts take place: no load and no ground velocity is zero there
 
 
 def compute(impacts: int = 400) -> Any:

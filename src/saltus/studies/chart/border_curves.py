@@ -14,8 +14,8 @@ from saltus.studies.chart.motions import TOLERANCES
 if TYPE_CHECKING:
     import xarray
 
-KNOWN = 0.02  # of a cell, between a point and a curve that goes through it
-ROUNDING = 1e-9  # of a cell, between a crossing and the line through the middles of cells on which it lies
+KNOWN = 0.02  # largest distance, in cells, of a curve from a point through which it goes
+ROUNDING = 1e-9  # largest distance, in cells, of a crossing from the line through the middles of cells on which it lies
 
 
 def curve_dataset(curve: Any, paths: Sequence[str]) -> xarray.Dataset:

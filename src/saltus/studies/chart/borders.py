@@ -24,7 +24,7 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-CURVES = 24  # on which motions end, at most
+CURVES = 24  # largest number of curves on which motions end
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Borders:
     """Curves through the plane of a chart, each a Dataset along `point`, and what became of the changes on none of them."""
 
     curves: list[xarray.Dataset] = field(default_factory=list)
-    endings: dict[tuple[int, ...], Ending] = field(default_factory=dict)  # by the keys of the changes
+    endings: dict[tuple[int, ...], Ending] = field(default_factory=dict)  # by the key of the change
 
     def to_xarray(self) -> xarray.DataTree:
         """The curves as groups, and the changes on none of them in the group `ends`: `key` (see `keys_of`), the `outcome`, and

@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray
 
-REACH = 0.005  # of the range: farther from the edge of a band a special point says nothing about it
+REACH = 0.005  # largest distance, as a share of the range, at which a special point belongs to the edge of a band
 AT_BOUND = "bound"  # the mark of an edge that is the end of the range
 BAND_COLUMNS = {
     "low": "least value with chaos",

@@ -110,7 +110,8 @@ class _ChaosSearch:
 
     system: System
     path: str
-    carried: set[tuple[int, int]] = field(default_factory=set)  # from which value of the grid to which chaos was carried on
+    # Pairs of neighbouring values of the grid: motions were started at the second one from chaotic states of the first one.
+    carried: set[tuple[int, int]] = field(default_factory=set)
 
     def at(self, values: np.ndarray, states: np.ndarray, companions: int, progress: Progress = silent) -> Tried:
         """Follow motions from states (starts, 2), or (n, starts, 2) of each value's own, and judge those that do not settle."""

@@ -21,7 +21,7 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-VALUES = 25  # of the parameter at which is searched, where none are given
+VALUES = 25  # number of values of the parameter at which orbits are searched for, where none is given
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 STAYS = 1e-8  # the distance within which a stable orbit must stay where it is
 STAYS_ROUNDS = 20  # the number of its periods for which it must
-INSTANTS = 64  # of a period at which an orbit that rests is compared with itself
+INSTANTS = 64  # number of instants of a period at which an orbit that rests is compared with itself
 
 
 def diagram_tree(
