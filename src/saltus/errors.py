@@ -22,7 +22,7 @@ class ParameterError(SaltusError, ValueError):
         self.parameter = parameter
 
     def inside(self, owner: str) -> ParameterError:
-        """The same refusal as `owner` sees it, of which the parameter is a part: "model.beta0 must ..." for "beta0 must ..."."""
+        """The error with the path of the parameter as a part of `owner`: "model.beta0 must ..." for "beta0 must ..."."""
         message = str(self)
         if self.parameter is None:
             return ParameterError(f"{owner}: {message}", owner)

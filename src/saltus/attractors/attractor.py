@@ -124,7 +124,7 @@ class Attractor:
         return math.sqrt(self.fraction * (1.0 - self.fraction) / self.of) if self.of else math.nan
 
     def labelled(self, label_of: Mapping[int, int], **changes: Any) -> Attractor:
-        """The same with other labels, its mirror image's included."""
+        """A copy of the attractor with other labels, its mirror image's included."""
         target = replace(self.target, label=label_of[self.label])
         return replace(self, target=target, mirror=label_of.get(self.mirror, UNDECIDED), **changes)
 
@@ -172,7 +172,7 @@ class Attractors:
 
     @property
     def targets(self) -> tuple[Target, ...]:
-        """Where they meet the stroboscopic section."""
+        """The states of the attractors on the stroboscopic section."""
         return tuple(member.target for member in self.members)
 
     def to_xarray(self) -> xarray.Dataset:

@@ -58,7 +58,7 @@ class Curve(ABC, Generic[P]):
     @property
     @abstractmethod
     def weights(self) -> np.ndarray:
-        """Of the unknowns and the parameters in the norm, (n + k,)."""
+        """The weights of the unknowns and the parameters in the norm, (n + k,)."""
 
     @abstractmethod
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:

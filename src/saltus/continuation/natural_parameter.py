@@ -22,7 +22,7 @@ class NaturalCurve(Curve[P]):
 
     @property
     def weights(self) -> np.ndarray:
-        """Of the parameter, which is all of a place."""
+        """The weight of the parameter, which is the only number of a place."""
         return np.array([1.0 / self.scale])
 
     @abstractmethod

@@ -129,12 +129,12 @@ class Recurrence:
         return np.asarray(np.nansum(np.where(self.within_period, self.impact_counts, 0.0), axis=1).astype(int))
 
     def only(self, rows: Any) -> Recurrence:
-        """The same of some of the motions."""
+        """The results of some of the motions."""
         columns = {part.name: getattr(self, part.name) for part in fields(self)}
         return replace(self, **{name: values[rows] for name, values in columns.items() if values is not None})
 
     def after(self, periods: int, states: np.ndarray) -> Recurrence:
-        """The same as the end of motions that were already followed for so many periods, with these states, (n, kept, d)."""
+        """These results as those of longer motions, which were followed before for `periods`, with these states, (n, kept, d)."""
         return replace(self, periods=self.periods + periods, states=np.concatenate([states, self.states], axis=1))
 
 
@@ -257,7 +257,7 @@ def _outcome(system: System, result: xarray.Dataset, varied: bool) -> np.ndarray
 
 
 def _with_periods(found: Recurrence, compiled: Any, max_period: int, settings: RecurrenceSettings) -> Recurrence:
-    """The same with the periods that the compiled lanes have found, or that the kept states show."""
+    """The results with the periods that the compiled lanes have found, or that the kept states show."""
     outcome, period = found.outcome.copy(), found.period.copy()
     if compiled is None:
         period[:] = return_period(found.states, max_period, settings.near_return)

@@ -34,7 +34,7 @@ def crossing(point: OrbitPoint) -> float:
 
 
 def scaled_determinant(matrix: np.ndarray) -> float:
-    """With rows of length 1: rounding then is the same everywhere, and so is the sign."""
+    """The determinant of the matrix with its rows scaled to length 1: the same sign, with rounding errors of one size."""
     lengths = np.linalg.norm(matrix, axis=1)
     return float(np.linalg.det(matrix / lengths[:, None])) if (lengths > 0).all() else 0.0
 

@@ -56,7 +56,7 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
 
     @cached_property
     def weights(self) -> np.ndarray:
-        """Of the unknowns and the parameters in the norm."""
+        """The weights of the unknowns and the parameters in the norm."""
         n = self.problem.size
         return np.append(np.full(n, (2.0 / n) ** 0.5), 1.0 / np.array(self.scales))
 

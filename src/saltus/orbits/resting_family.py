@@ -79,7 +79,7 @@ class RestingCurve(NaturalCurve[RestingPoint]):
 
     @property
     def scale(self) -> float:  # type: ignore[override]
-        """Of the parameter."""
+        """The unit of length along the parameter."""
         return (self.bounds[1] - self.bounds[0]) / 3.0
 
     def at(self, value: float) -> RestingPoint | None:

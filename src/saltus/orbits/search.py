@@ -21,7 +21,7 @@ from saltus.systems import System, check_system
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """Where orbits are looked for."""
+    """How long motions are followed, and which of their states may lead to orbits."""
 
     # Number of forcing periods that motions are given to settle.
     settling: int = 200
@@ -158,7 +158,7 @@ def _follow(system: System, path: str, grid: np.ndarray, states: np.ndarray, max
 
 
 def _moving(system: System, late: Recurrence, rows: np.ndarray) -> tuple[np.ndarray, int]:
-    """Those of these motions that neither rest at the contact nor have ended, and how many of them rest."""
+    """Which of these motions neither rest at the contact nor have ended, and how many rest."""
     assert late.extrema is not None
     alive = rows[np.isfinite(late.states[rows]).all(axis=(1, 2))]
     moving = alive[np.abs(late.extrema[alive] - _contact(system)[0]).max(axis=(1, 2), initial=0.0) > SETTINGS.still]

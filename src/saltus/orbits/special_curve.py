@@ -29,7 +29,7 @@ class Conditioned:
 
     @property
     def residual(self) -> np.ndarray:
-        """Of the equations, and the condition's value."""
+        """The residual of the orbit's equations, and the condition's value."""
         return np.append(self.equations.residual, self.condition_value.value)
 
     def derivatives(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Onto the branches that are born at a special point: the doubled orbit at a PD, the unsymmetric ones at a BPC."""
+"""Switching to the branches that are born at a special point: the doubled orbit at a PD, the unsymmetric ones at a BPC."""
 
 from __future__ import annotations
 
@@ -110,12 +110,12 @@ class Cascade:
 
     @property
     def parameters(self) -> np.ndarray:
-        """Where the period doubles, from q to 2 q, 4 q, ..."""
+        """The parameters at which the period doubles, from q to 2 q, 4 q, ..."""
         return np.array([point.parameter for point in self.points])
 
     @property
     def periods(self) -> np.ndarray:
-        """Of the orbits that double."""
+        """The periods of the orbits that double."""
         return np.array([point.orbit.period for point in self.points])
 
     @property

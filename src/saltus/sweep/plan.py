@@ -125,7 +125,7 @@ class Plan:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Those of the dataset: the plan's own, and the plan itself as a string of JSON."""
+        """The attributes of the dataset: the plan's own, and the plan itself as a string of JSON."""
         return {**self.attrs, "plan": one_line(self.describe())}
 
     def describe(self) -> dict[str, Any]:

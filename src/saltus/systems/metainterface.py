@@ -67,7 +67,7 @@ class Metainterface(Model):
                 )
 
     def check_load(self, load: Load) -> None:
-        """With a smoothed sign there is no lower layer to load on its own (errata 18)."""
+        """Refuse loads on the lower layer with a smoothed sign, which makes no difference between the layers (errata 18)."""
         for name in ("lower_horizontal", "lower_vertical"):
             if self.smoothing is not None and not vanishes(load.channels.get(name, Constant(0.0))):
                 raise ParameterError(

@@ -47,7 +47,7 @@ class WallOrbits:
 
     @property
     def duration(self) -> float:
-        """Of an orbit: q T."""
+        """The duration of an orbit, q T."""
         return 2 * math.pi * self.period / self.frequency
 
     @property

@@ -59,7 +59,7 @@ class Layer:
         return self.stiffness - self.outward * np.cos(self.beta0 + x) + self.vertical * np.sin(self.beta0 + x)
 
     def eigenvalues(self, curvature: float) -> tuple[complex, complex]:
-        """Those of the motion linearised where d2P/dx2 = `curvature`, the faster growing one first."""
+        """The eigenvalues of the motion linearised where d2P/dx2 = `curvature`, the faster growing one first."""
         root = cmath.sqrt(self.damping**2 - 4 * self.mass * curvature)
         return (-self.damping + root) / (2 * self.mass), (-self.damping - root) / (2 * self.mass)
 

@@ -12,7 +12,7 @@ from saltus.theory.loaded_equilibria import MOMENT_ROUNDING, Equilibrium, Stabil
 
 @dataclass(frozen=True, slots=True)
 class Divergence:
-    """From which theta(0), at rest, the linearised motion does not come back to theta = 0 (bullets after `minmin`)."""
+    """The theta(0), at rest, from which the linearised motion does not return to theta = 0 (bullets after `minmin`)."""
 
     from_rest: bool  # from every small theta(0) of at least one sign: theta = 0 is unstable
     above: float | None  # from theta(0) > above; None if never

@@ -84,7 +84,7 @@ class UncertaintyExponent:
 
     @property
     def dimension(self) -> float:
-        """Of the boundary: D - alpha."""
+        """The dimension of the boundary, D - alpha."""
         return self.cells - self.alpha
 
 

@@ -41,7 +41,7 @@ class Labelling:
     tol: float
 
     def of(self, states: np.ndarray, progress: Progress = silent) -> tuple[np.ndarray, np.ndarray]:
-        """The labels of states (n, 2), UNDECIDED where none is borne out, and the times to reach the attractors, (n,) each."""
+        """The labels of states (n, 2), UNDECIDED where no label is certain, and the times to reach the attractors, (n,) each."""
         label, time = np.empty(len(states), dtype=np.int16), np.empty(len(states))
         size = max(SETTINGS.fewest, SETTINGS.most_states // self.periods)
         for start in range(0, len(states), size):
@@ -51,7 +51,7 @@ class Labelling:
         return label, time
 
     def _together(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same for as many states as fit into the memory, in stages: those that have settled go no further."""
+        """Labels and times of as many states as fit into memory, in stages: settled motions are not followed further."""
         label, time = np.full(len(states), UNDECIDED, dtype=np.int16), np.full(len(states), np.nan)
         rows, history, done = np.arange(len(states)), states[:, None], 0
         while rows.size and done < self.periods:

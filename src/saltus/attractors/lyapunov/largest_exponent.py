@@ -25,7 +25,7 @@ class Largest:
     states: np.ndarray  # (n, 2) at the end
 
     def replaced(self, rows: np.ndarray, other: Largest) -> Largest:
-        """The same with some of its motions from another run."""
+        """A copy in which some of the motions are those of another run."""
         columns = {part.name: getattr(self, part.name).copy() for part in fields(self)}
         for name, values in columns.items():
             values[rows] = getattr(other, name)

@@ -81,7 +81,7 @@ class Case:
         return Verdict(system=self.system, kind=kind, cause=cause, reason=cause.format(**numbers), **given)
 
     def undecided(self, cause: Reason, ends: Recurrence, numbers: dict[str, Any], **more: Any) -> Verdict:
-        """That nothing is known of a motion, for a cause whose sentence has these numbers."""
+        """The verdict that a motion is undecided, for a cause whose sentence is filled with these numbers."""
         return self.verdict(AttractorKind.UNDECIDED, cause, ends, numbers, **more)
 
 

@@ -84,7 +84,7 @@ def _least_at(curve: Any, vertical: np.ndarray) -> np.ndarray:
 
 
 def lost_by_curves(panel: Any) -> float:
-    """The same share as `lost` by the exact curves: the area between the onset of the first motion and the static border.
+    """The share `lost`, from the exact curves: the area between the onset of the first motion and the static border.
 
     NaN where that onset is not followed all along, or is no border of its own.
     """

@@ -54,12 +54,12 @@ def superharmonic(branch: Any, share: float = PROMINENT) -> np.ndarray:
 
 
 def amplitudes_at(branch: Any, value: float, stable: bool | None = None) -> np.ndarray:
-    """The amplitudes with which the line of a branch passes a value of the parameter, of (un)stable motions only if said so."""
+    """The amplitudes with which the line of a branch passes a value of the parameter; given `stable`, of such motions only."""
     return passing(list(smooth_lines(branch)), value, stable)
 
 
 def passing(lines: list[Any], value: float, stable: bool | None = None) -> np.ndarray:
-    """The same of the lines of one or more branches, as `smooth_lines` gives them."""
+    """The same amplitudes for the lines of one or more branches, as `smooth_lines` gives them."""
     found = [np.empty(0)]
     for holds, x, y in lines:
         if stable in (None, holds):

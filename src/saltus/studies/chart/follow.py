@@ -91,7 +91,7 @@ class Follower:
         return bool(np.abs(there - orbit.amplitude).min(initial=np.inf) < TOLERANCES.followed * orbit.amplitude)
 
     def _values(self, cell: np.ndarray) -> tuple[float, float]:
-        """Of the two parameters in the middle of a cell: along the horizontal axis, along the vertical one."""
+        """The two parameters in the middle of a cell: along the horizontal axis, along the vertical one."""
         return float(self._chart.horizontal[cell[1]]), float(self._chart.vertical[cell[0]])
 
     def _orbit(self, number: int) -> PeriodicOrbit:

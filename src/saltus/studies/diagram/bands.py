@@ -79,7 +79,7 @@ class Bands:
     tried: Tried
 
     def marked(self, special: list[tuple[str, float]]) -> Bands:
-        """The same with the kind of the special point nearest to each edge, where there is one near it."""
+        """The bands with the kind of the special point at each edge, where there is one near it."""
         reach = REACH * float(np.ptp(self.tried.values))
         marked = [
             replace(

@@ -119,7 +119,7 @@ def response_spectrum(
 
 
 def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.ndarray:
-    """Where is searched: given values, all within the bounds, or 25 spread evenly between them."""
+    """The values at which orbits are searched for: those given, all within the bounds, or 25 spread evenly between them."""
     if values is None:
         return np.linspace(*bounds, VALUES + 2)[1:-1]
     try:

@@ -82,7 +82,7 @@ def confirmed(branch: Branch) -> xarray.Dataset:
 
 
 def _distances(orbits: list[PeriodicOrbit], rounds: int) -> np.ndarray:
-    """Of each orbit from itself after so many of its periods, by the event-driven flow."""
+    """The distance of each orbit from itself after `rounds` of its periods, by the event-driven flow."""
     resting = [orbit for orbit in orbits if isinstance(orbit, RestingOrbit)]
     return np.array([_moved(orbit, rounds) for orbit in resting]) if resting else defects(orbits, rounds)
 
@@ -108,7 +108,7 @@ def _attractors(found: Search) -> xarray.Dataset:
 
 
 def _search(found: Search) -> xarray.Dataset:
-    """Where was searched, and how many of the motions led to no orbit."""
+    """The values at which orbits were searched for, and how many of the motions led to no orbit."""
     import xarray
 
     unsettled = {"long_name": "motions that did not settle: slow, of a longer period, or chaotic"}
