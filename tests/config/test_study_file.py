@@ -126,6 +126,12 @@ def test_all_settings(study):
     assert settings.samples == 11
 
 
+def test_what_a_run_is_given_takes_the_place_of_the_file_s_own(study):
+    read = study('[model]\ntype = "Metainterface"\nbeta0 = 1\n[simulate]\ntheta = 0.1\nduration = 3\ntol = 1e-8\n')
+    motion = read.run(duration=0.5, tol=1e-10)
+    assert (motion.time, motion.tol) == (0.5, 1e-10)
+
+
 @pytest.mark.parametrize(
     "content",
     [

@@ -42,7 +42,7 @@ class Study:
         return self.simulate
 
     def run(self, **more: Any) -> Any:
-        """The motion that the study asks for; `more` goes to `saltus.simulate` as it is.
+        """The motion that the study asks for; `more` goes to `saltus.simulate` as it is, in place of the file's own settings.
 
         Raises:
             ParameterError: the file has no [simulate], or the flow refuses a setting (with the file's name).
@@ -51,7 +51,8 @@ class Study:
         """
         from saltus.flow import simulate
 
-        return self.answer(Ask(kind="simulate", options=self.settings().arguments), simulate, **more)
+        own = {name: value for name, value in self.settings().arguments.items() if name not in more}
+        return self.answer(Ask(kind="simulate", options=own), simulate, **more)
 
     def answer(self, ask: Ask, function: Callable[..., Any], **more: Any) -> Any:
         """`function(system, ...)` with the arguments of a question, and `more`.
