@@ -12,6 +12,7 @@ import xarray
 
 from saltus.attractors import basins_of_attraction
 from saltus.config import load_study
+from saltus.plots import draw_stability_chart
 from saltus.studies import stability_chart
 from saltus.sweep import open_store, status
 from saltus.systems import System
@@ -98,6 +99,18 @@ def test_basins_are_those_of_python_and_their_cells_stay_in_a_store(saltus, stud
             np.testing.assert_array_equal(data[name], whole[name])
     assert status(tmp_path / "out" / "basins.zarr").done == 3
     assert "period 1, amplitude 1.02, 100 % of the cells" in result.stdout
+
+
+def test_a_chart_of_lengths_has_no_radians(saltus, study, tmp_path):
+    path = study(
+        '[model]\ntype = "WallOscillator"\nwall = 0.5\ndamping = 0.2\n[load]\nfrequency = 1\nforce = { amplitude = 0.6 }\n'
+        '[stability_chart]\nhorizontal = [0.3, 0.6]\nvertical = [0.9, 1.1]\npaths = ["load.force.amplitude", "load.frequency"]\n'
+        "starts = 2\n"
+    )
+    result = saltus("run", path, "-o", tmp_path / "out", "--no-plot")
+    assert re.search(r"in 4 of 4 cells, the largest amplitude is [\d.]+\d\.\n", result.stdout)
+    bar = draw_stability_chart(open_store(tmp_path / "out" / "stability_chart.zarr")).axes[-1]
+    assert bar.get_ylabel() == r"largest amplitude $\max_\tau|x|$"
 
 
 def test_what_is_kept_is_not_computed_again(saltus, study, tmp_path, monkeypatch):

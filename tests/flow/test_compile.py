@@ -131,3 +131,18 @@ def test_structures_with_different_expressions_are_different_files(sources):
 
 def test_structures_with_equal_expressions_are_one_file(sources):
     assert sources(SYSTEM) == sources(SYSTEM.with_({"load.force": 3.0, "model.wall": -2.0, "impact.e": 0.1}))
+
+
+def test_two_threads_that_load_the_same_code_at_once_both_get_all_of_it():
+    """A module is known by its name before it has been executed; a second thread must wait for the first one."""
+    script = (
+        "from concurrent.futures import ThreadPoolExecutor\n"
+        "from saltus.flow import simulate\n"
+        "from saltus.systems import Load, System, WallOscillator\n"
+        "system = System(model=WallOscillator(damping=0.1), load=Load(force=-0.125))\n"
+        "with ThreadPoolExecutor(4) as pool:\n"
+        "    ends = list(pool.map(lambda _: simulate(system, x=0.5, duration=5.0).x, range(4)))\n"
+        "assert len(set(ends)) == 1\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr

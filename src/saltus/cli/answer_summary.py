@@ -27,8 +27,9 @@ def _chart(data: Any) -> Iterator[str]:
         yield from _borders(data)
         return
     moving, wild = int((data["count"] > 0).sum()), int((data["unsettled"] > 0).sum())
+    unit = data["amplitude"].attrs["units"].replace("1", "")
     text = f"Stable motions beside rest in {moving} of {data['count'].size} cells"
-    yield text + (f", the largest amplitude is {float(data['amplitude'].max()):.4g} rad." if moving else ".")
+    yield text + (f", the largest amplitude is {float(data['amplitude'].max()):.4g} {unit}".rstrip() + "." if moving else ".")
     if wild:
         yield f"In {wild} cells some motion does not settle."
 

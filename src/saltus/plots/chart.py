@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import Normal, Stroke
 
 from saltus.branch_lines import border_curves
-from saltus.plots.axis_names import parameter_name
+from saltus.plots.axis_names import parameter_name, symbol, unit_in_brackets
 from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, new_figure, styled
 from saltus.plots.marks import cell_edges
 
@@ -43,8 +43,8 @@ def draw_stability_chart(data: Any) -> Any:
     ax.set_xlabel(parameter_name(path[0]))
     ax.set_ylabel(parameter_name(path[1]))
     if cells is not None:
-        ticks = cells.norm.boundaries[::2]
-        figure.colorbar(cells, ax=ax, label=r"largest amplitude $\max_\tau|\theta|$ (rad)", ticks=ticks, format="%.2g")
+        peak = rf"$\max_\tau|{symbol(chart.attrs['coordinate'])}|${unit_in_brackets(chart['amplitude'])}"
+        figure.colorbar(cells, ax=ax, label=f"largest amplitude {peak}", ticks=cells.norm.boundaries[::2], format="%.2g")
     handles = _cell_handles(chart)
     if chart is not data:
         dots = draw_lines(ax, data)

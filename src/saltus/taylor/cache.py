@@ -13,6 +13,7 @@ import os
 import re
 import sys
 import tempfile
+import threading
 from enum import IntEnum
 from pathlib import Path
 from types import ModuleType
@@ -20,6 +21,7 @@ from types import ModuleType
 from saltus.taylor import private_numba
 
 MARKER = "# --- compiled from here on"
+_loading = threading.RLock()  # A module is in `sys.modules` while it is still being executed: other threads wait for it.
 
 
 def cache_directory() -> Path:
@@ -69,22 +71,28 @@ def is_compiled(name: str) -> bool:
 def load_module(kind: str, text: str) -> ModuleType:
     """The module of a generated source: loaded, or written and compiled first."""
     name = module_name(kind, text)
-    if name not in sys.modules:
-        path = cache_directory() / f"{name.removeprefix('saltus_')}.py"
-        if not path.exists():
-            _write(path, text)
-        spec = importlib.util.spec_from_file_location(name, path)
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[name] = module  # numba finds the functions of a cached module through here
-        try:
-            with private_numba.pointers():
-                spec.loader.exec_module(module)
-        except BaseException:  # interrupted while compiling: the next call starts afresh
-            del sys.modules[name]
-            raise
-    return sys.modules[name]
+    with _loading:
+        if name not in sys.modules:
+            path = cache_directory() / f"{name.removeprefix('saltus_')}.py"
+            if not path.exists():
+                _write(path, text)
+            _execute(name, path)
+        return sys.modules[name]
+
+
+def _execute(name: str, path: Path) -> None:
+    """Make a module of a source file."""
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # numba finds the functions of a cached module through here
+    try:
+        with private_numba.pointers():
+            spec.loader.exec_module(module)
+    except BaseException:  # interrupted while compiling: the next call starts afresh
+        del sys.modules[name]
+        raise
 
 
 def _write(path: Path, text: str) -> None:
