@@ -167,7 +167,7 @@ def _distances(before: Attractors, here: Attractors, seeds: list[int]) -> dict[t
 
 
 def _apart(old: Attractor, new: Attractor, led: bool) -> float:
-    """The distance of two attractors, in which those that look like one count as nearer."""
+    """The distance of two attractors, larger for different periods, and smaller where motions from one settle on the other."""
     if AttractorKind.REST in (old.kind, new.kind):
         return 0.0 if old.kind == new.kind else np.inf
     distance = set_distance(old.target, new.target)

@@ -1,4 +1,4 @@
-"""Certifying that a motion which repeats itself is on an attracting orbit: the orbit's own equations, and a look from outside."""
+"""Certifying that a motion which repeats itself is on an attracting orbit: the orbit's own equations, and direct simulation."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from saltus.systems import System
 class CertificateSettings:
     """How well an orbit must explain a motion."""
 
-    # Its equations must be solved to this.
+    # The largest residual of its equations.
     residual: float = 1e-9
-    # It must repeat itself to this in direct simulation, and lie as near to the motion's states,
+    # The largest distance from itself after a period of direct simulation, and from the states of the motion.
     defect: float = 1e-6
-    # or this near to those of a motion that approaches slowly.
+    # The largest distance from the states of a motion that approaches it slowly.
     slow: float = 1e-3
     # A multiplier this near to 1 does not show that an orbit attracts.
     neutral: float = 1e-9

@@ -10,7 +10,7 @@ from saltus.systems import Load, Record, System, check_system
 
 
 def with_clock(system: System) -> System:
-    """The system with a forcing period: that of its load, or under a constant load one of 2 pi, to look at it by.
+    """The system with a forcing period, which fixes the stroboscopic section: its load's, or 2 pi under a constant load.
 
     Equilibria are then orbits of period 1.
 

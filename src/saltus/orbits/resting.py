@@ -218,7 +218,7 @@ def _excursions(motion: Motion, first: Release, end: float, slack: float) -> np.
 
 
 def _between(problem: Problem, motion: Motion, excursions: np.ndarray) -> tuple[Equations | None, np.ndarray]:
-    """The equations of the impacts along the smooth segments between them, with a look at each, and the gap's bends at impact."""
+    """The equations of the impacts along the smooth segments between them, and the gap's second derivatives at impact."""
     impacts, contact = motion.impacts, float(problem.system.model.contact)
     speeds = np.abs(impacts.velocity_before)
     opened = np.searchsorted(impacts.time, excursions[:, RELEASED])  # the first impact of each excursion

@@ -35,10 +35,10 @@ class Memory:
             array[cut] = values[name]
 
     def note(self, failures: Iterable[Failure]) -> None:
-        """Nobody could look at them here."""
+        """Does nothing: a list of failures in memory has no readers while the sweep runs."""
 
     def dataset(self) -> xarray.Dataset:
-        """What there is."""
+        """The dataset of all chunks that were computed."""
         import xarray
 
         variables = {

@@ -23,6 +23,6 @@ with pointers():
     _functions = (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS, GEOMETRY)
     CODE = types.Tuple([types.FunctionType(signature) for signature in _functions])
     SCALAR = types.Tuple((types.FunctionType(ADVANCE), types.Tuple(tuple(MODEL.types[i] for i in (0, 1, 2, 3, 5)))))
-    VISIT_LANE = types.UniTuple(_i, 2)(_i, SCALAR, _i1, _i1, _f1, _i1, _f1, LANES, _f2, TABLES, _f1, _i1)
-    HELPERS = types.Tuple([types.FunctionType(signature) for signature in (LANE_ROOT, TURNING_RANGE, VISIT_LANE)])
+    SCALAR_MOTION = types.UniTuple(_i, 2)(_i, SCALAR, _i1, _i1, _f1, _i1, _f1, LANES, _f2, TABLES, _f1, _i1)
+    HELPERS = types.Tuple([types.FunctionType(signature) for signature in (LANE_ROOT, TURNING_RANGE, SCALAR_MOTION)])
 RUN_LANES = types.void(CODE, SCALAR, HELPERS, _i1, _i1, _f1, _f1, JOBS, TABLES, RESULTS, _i1)

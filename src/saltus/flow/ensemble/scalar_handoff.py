@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.ensemble.function_types import VISIT_LANE
+from saltus.flow.ensemble.function_types import SCALAR_MOTION
 from saltus.flow.ensemble.lane_layout import Flag, LaneArray, LaneLabel, LaneNumber, LaneSetting, Size, Slot
 from saltus.flow.ensemble.scalar_fallback import turning_range
 from saltus.flow.kernel_layout import SETTING_COUNT, WHERE_LENGTH, Geometry, Mode, Setting, Status, Where
@@ -101,7 +101,7 @@ def is_captured(where, state, geometry, threshold):
     return rate * state[State.COORDINATES + where[Where.DOF]] < threshold
 
 
-@cached_jit(VISIT_LANE)
+@cached_jit(SCALAR_MOTION)
 def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters, tables, poly, control):
     """Move a lane by the scalar kernel until it is on an arc again, or its forcing period or its motion ends.
 
