@@ -31,9 +31,9 @@ from saltus.taylor import (
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 LONGEST_RECURRENCE = 16  # forcing periods, up to which a recurrence is looked for
-RECURRENT = 1e-10  # Two states that are so near, relative to their size or to 1, count as one.
-NEARLY_RECURRENT = 1e4  # in RECURRENT: Two states that are so near are not apart for certain.
-MOST_MOVES = 60  # of Newton's method to a turning point, more than bisection alone needs for the digits asked for
+RECURRENT = 1e-10  # largest distance of two states, relative to their size or to 1, at which they count as one
+NEARLY_RECURRENT = 1e4  # largest distance, in units of RECURRENT, at which they may still be approaching one another
+MOST_MOVES = 60  # steps of Newton's method to a turning point: more than bisection needs for the same digits
 
 
 @lean_jit
