@@ -15,7 +15,8 @@ import saltus
 from saltus import ParameterError
 from saltus.attractors import lyapunov_many, lyapunov_spectrum
 from saltus.attractors.lyapunov.area_contraction import Contraction, impact_factor
-from saltus.attractors.lyapunov.renormalisation import LONGEST_SPAN, span_count
+from saltus.attractors.lyapunov.renormalisation import span_count
+from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.theory import equilibria
 
 
@@ -279,7 +280,7 @@ def test_the_factor_of_impacts_is_that_of_the_law():
 
 def test_pieces_are_short():
     for length in (0.5, 6.4, 6.6, 63.0):
-        assert length / span_count(length) <= LONGEST_SPAN
+        assert length / span_count(length) <= LYAPUNOV.longest_span
 
 
 RECORD = saltus.Record([0.0, 1.0], [0.0, 1.0])

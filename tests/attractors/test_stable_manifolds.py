@@ -13,7 +13,7 @@ from shared_systems import forced, steady, walled
 import saltus
 from saltus.attractors.basins.grid import basins_of_attraction
 from saltus.attractors.manifolds.phase_plane import saddles, separatrices
-from saltus.attractors.manifolds.saddle_manifolds import OFFSET, Manifold, stable_manifold, unstable_manifold
+from saltus.attractors.manifolds.saddle_manifolds import MANIFOLDS, Manifold, stable_manifold, unstable_manifold
 from saltus.errors import ParameterError
 from saltus.systems.reversed import reversed_load, reversed_system
 from saltus.theory import equilibria, wall_orbits
@@ -81,7 +81,7 @@ def test_forward_it_shrinks_onto_its_first_segment_to_1e_8(which: str, request: 
             rounds = (branch.point + periods) // q  # directions are carried from point 0 on, and turn where a round is complete
             assert np.sign(along) == branch.side * np.sign(found.multiplier) ** rounds
             assert np.abs(offset - along * found.directions[point]).max() < 1e-8
-            assert np.abs(offset).max() < 10.0 * OFFSET / min(1.0, abs(found.multiplier))
+            assert np.abs(offset).max() < 10.0 * MANIFOLDS.offset / min(1.0, abs(found.multiplier))
             tried += 1
     assert tried >= 6
     assert (found.multiplier < 0.0) == (which == "turning")

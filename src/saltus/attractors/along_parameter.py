@@ -25,14 +25,10 @@ if TYPE_CHECKING:
 class MatchingSettings:
     """The numbers by which an attractor is recognised at the next value of the parameter."""
 
-    # Two sets may be one attractor if their distance, relative to their size, is at most this threshold.
-    threshold: float = 0.3
-    # A factor of the threshold for orbits of different periods, as across a period doubling.
-    other_period: float = 0.5
-    # A factor of the threshold for orbits of the same period, where motions from one settle on the other.
-    led: float = 3.0
-    # Number of states of each attractor from which motions start at the next value.
-    seeds: int = 64
+    threshold: float = 0.3  # Two sets may be one attractor if their distance, relative to their size, is at most this threshold.
+    other_period: float = 0.5  # A factor of the threshold for orbits of different periods, as across a period doubling.
+    led: float = 3.0  # A factor of the threshold for orbits of the same period, where motions from one settle on the other.
+    seeds: int = 64  # Number of states of each attractor from which motions start at the next value.
     # The share of the states of a sampled set that must be near the other set: not all are, as both are random samples.
     share: float = 0.95
 

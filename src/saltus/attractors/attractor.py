@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 UNDECIDED = -1  # the label of what ends on no known attractor
 REST = 0  # the label of rest at the contact, always
-NEAR = 1e-6  # two states at phase 0 this near to one another count as one, relative to their size or to 1
+SAME_STATE = 1e-6  # two states at phase 0 this near to one another count as one, relative to their size or to 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,14 +25,10 @@ from saltus.systems import System
 class FindSettings:
     """How long motions are followed before their attractors are determined."""
 
-    # All motions are followed for this many forcing periods.
-    first: int = 400
-    # Those that have not settled by then are followed for this many more.
-    second: int = 4000
-    # Number of last stroboscopic states that are kept of a motion, to compare them with sets that do not repeat.
-    kept: int = 256
-    # The largest number of motions that are classified because they never settle: each takes seconds.
-    verdicts: int = 8
+    first: int = 400  # All motions are followed for this many forcing periods.
+    second: int = 4000  # Those that have not settled by then are followed for this many more.
+    kept: int = 256  # Number of last stroboscopic states that are kept of a motion, to compare them with sets that do not repeat.
+    verdicts: int = 8  # The largest number of motions that are classified because they never settle: each takes seconds.
 
 
 SETTINGS = FindSettings()

@@ -19,14 +19,11 @@ from saltus.systems import System
 class CertificateSettings:
     """How well an orbit must explain a motion."""
 
-    # The largest residual of its equations.
-    residual: float = 1e-9
+    residual: float = 1e-9  # The largest residual of its equations.
     # The largest distance from itself after a period of direct simulation, and from the states of the motion.
     defect: float = 1e-6
-    # The largest distance from the states of a motion that approaches it slowly.
-    slow: float = 1e-3
-    # A multiplier this near to 1 does not show that an orbit attracts.
-    neutral: float = 1e-9
+    slow: float = 1e-3  # The largest distance from the states of a motion that approaches it slowly.
+    neutral: float = 1e-9  # A multiplier this near to 1 does not show that an orbit attracts.
 
 
 SETTINGS = CertificateSettings()

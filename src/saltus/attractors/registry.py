@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from saltus.attractors.attractor import NEAR, UNDECIDED, Attractor, Target
+from saltus.attractors.attractor import SAME_STATE, UNDECIDED, Attractor, Target
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.orbit_certificate import solved_orbit, start_at
 from saltus.attractors.stroboscopic_section import section_states
@@ -21,15 +21,12 @@ from saltus.systems import System
 class RegistrySettings:
     """The numbers by which motions are assigned to attractors."""
 
-    # Number of stroboscopic states that represent a set that does not repeat.
-    sample: int = 2048
-    # A motion belongs to such a set if this many of its last states lie on it, in the median.
-    last: int = 64
-    # Number of forcing periods for which `classify` may follow a motion that does not settle.
-    verdict_periods: int = 4000
+    sample: int = 2048  # Number of stroboscopic states that represent a set that does not repeat.
+    last: int = 64  # A motion belongs to such a set if this many of its last states lie on it, in the median.
+    verdict_periods: int = 4000  # Number of forcing periods for which `classify` may follow a motion that does not settle.
     # Areas of the state plane do not shrink where the sum of the exponents is above minus this: then nothing attracts.
     lossless: float = 1e-6
-    # The largest distance, in units of NEAR, between an orbit and the states of the motions that settle on it.
+    # The largest distance, in units of SAME_STATE, between an orbit and the states of the motions that settle on it.
     beside: float = 100.0
 
 
@@ -132,7 +129,7 @@ class Registry:
         return None
 
     def assign_unsettled(self, ends: Recurrence, labels: np.ndarray) -> None:
-        """Label motions that have not settled, where they move on a known attractor or within NEAR of one."""
+        """Label motions that have not settled, where they move on a known attractor or within SAME_STATE of one."""
         for i in np.flatnonzero(labels == NoLabel.OPEN):
             last = ends.states[i, -SETTINGS.last :]
             for target in (member.target for member in self.members):
@@ -192,4 +189,4 @@ def _cycle(states: np.ndarray) -> Target:
 
 
 def _near(states: np.ndarray) -> float:
-    return float(NEAR * max(1.0, np.abs(states).max()))
+    return float(SAME_STATE * max(1.0, np.abs(states).max()))

@@ -26,27 +26,18 @@ from saltus.systems import System
 class BoundarySettings:
     """How saddles on the boundary are found, and their manifolds computed."""
 
-    # Distance between neighbouring points of a manifold, in half widths of the window.
-    step: float = 0.01
-    # The largest number of points of a manifold on each side of a saddle.
-    points: int = 8_000
-    # The longest period of saddles that are looked for, in forcing periods.
-    max_period: int = 6
+    step: float = 0.01  # Distance between neighbouring points of a manifold, in half widths of the window.
+    points: int = 8_000  # The largest number of points of a manifold on each side of a saddle.
+    max_period: int = 6  # The longest period of saddles that are looked for, in forcing periods.
     # The largest number of saddles, those of the shortest periods: where there are more, the manifold of each comes near all of
     # the boundary.
     saddles: int = 4
-    # Number of places of the boundary from which the edge is tracked.
-    edges: int = 12
-    # Number of forcing periods for which it is tracked.
-    tracked: int = 40
-    # Number of states that divide an interval across the boundary.
-    cuts: int = 32
-    # Number of times that such an interval is divided: 33^9 is beyond rounding.
-    rounds: int = 9
-    # Newton's method is tried from returns that are no farther than this.
-    farthest_return: float = 0.2
-    # Curves are given up to this distance from the middle of the window, in half widths.
-    margin: float = 1.5
+    edges: int = 12  # Number of places of the boundary from which the edge is tracked.
+    tracked: int = 40  # Number of forcing periods for which it is tracked.
+    cuts: int = 32  # Number of states that divide an interval across the boundary.
+    rounds: int = 9  # Number of times that such an interval is divided: 33^9 is beyond rounding.
+    farthest_return: float = 0.2  # Newton's method is tried from returns that are no farther than this.
+    margin: float = 1.5  # Curves are given up to this distance from the middle of the window, in half widths.
 
 
 SETTINGS = BoundarySettings()

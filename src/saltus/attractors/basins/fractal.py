@@ -17,9 +17,18 @@ from saltus.attractors.attractor import UNDECIDED
 from saltus.checks import check_count
 from saltus.errors import ParameterError
 
-RADIUS = 5  # cells within which a cell of the boundary must meet all labels
-MOST_CELLS = 0.5  # a share of uncertain cells above this grows less than the boundary does: it meets itself
-AGREES, FAILS = 0.9, 0.5  # shares of boundary cells from which on basins agree with Wada, and up to which they do not
+
+@dataclass(frozen=True)
+class FractalSettings:
+    """What the measures of a boundary take a grid of labels to show."""
+
+    radius: int = 5  # The cells within which a cell of a Wada boundary must meet all labels.
+    most_uncertain: float = 0.5  # A larger share of uncertain cells grows less than the boundary does: it meets itself.
+    agrees: float = 0.9  # From this share of the boundary cells on, basins agree with Wada.
+    fails: float = 0.5  # Up to this share of the boundary cells, basins do not agree with Wada.
+
+
+FRACTAL = FractalSettings()
 
 
 @dataclass(frozen=True)
@@ -132,7 +141,7 @@ def _distances(grid: np.ndarray, given: Iterable[int] | None) -> np.ndarray:
 
 def _slope(reach: np.ndarray, shares: np.ndarray) -> tuple[float, float]:
     """The slope of ln f over ln eps and its standard error."""
-    used = (shares > 0.0) & (shares < MOST_CELLS)
+    used = (shares > 0.0) & (shares < FRACTAL.most_uncertain)
     if used.sum() < 3:
         used = shares > 0.0
     if used.sum() < 3:
@@ -165,9 +174,9 @@ class Wada:
     def verdict(self) -> WadaVerdict:
         """By the share at the largest radius; of fewer than three basins that they are not."""
         share = self.shares[-1] if len(self.shares) else 0.0
-        if len(self.labels) < 3 or share <= FAILS:
+        if len(self.labels) < 3 or share <= FRACTAL.fails:
             return WadaVerdict.NOT_WADA
-        return WadaVerdict.WADA if share >= AGREES else WadaVerdict.UNDECIDED
+        return WadaVerdict.WADA if share >= FRACTAL.agrees else WadaVerdict.UNDECIDED
 
     @property
     def resolution(self) -> str:
@@ -178,7 +187,7 @@ class Wada:
         )
 
 
-def wada(labels: Any, radius: int = RADIUS) -> Wada:
+def wada(labels: Any, radius: int = FRACTAL.radius) -> Wada:
     """Whether every point of the boundary of one basin is one of all basins, as far as a grid of labels shows it.
 
     Boundary cells have a neighbour, along an axis or diagonally, with another label. Around each a neighbourhood grows, up to

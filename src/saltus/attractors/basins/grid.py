@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.attractor import NEAR, REST, UNDECIDED, Attractor, Attractors, Target
+from saltus.attractors.attractor import REST, SAME_STATE, UNDECIDED, Attractor, Attractors, Target
 from saltus.attractors.attractors_dataset import about, attractor_table, coordinate, labels, variable
 from saltus.attractors.basins.basin_cells import Grid, check_basin_store, computed_cells
 from saltus.attractors.basins.boundaries import basin_boundaries
@@ -31,20 +31,14 @@ if TYPE_CHECKING:
 class BasinSettings:
     """The numbers of a picture of basins."""
 
-    # Number of cells along an axis for which no numbers are given.
-    cells: int = 201
-    # The half width of the window around a grid of one point.
-    narrowest: float = 1e-6
-    # The largest number of forcing periods for which a motion is followed.
-    periods: int = 500
-    # The distance from an attractor within which a motion has reached it.
-    within: float = 1e-2
-    # Number of velocities in a chunk of a store, which then takes seconds.
-    rows: int = 25
+    cells: int = 201  # Number of cells along an axis for which no numbers are given.
+    narrowest: float = 1e-6  # The half width of the window around a grid of one point.
+    periods: int = 500  # The largest number of forcing periods for which a motion is followed.
+    within: float = 1e-2  # The distance from an attractor within which a motion has reached it.
+    rows: int = 25  # Number of velocities in a chunk of a store, which then takes seconds.
     # Number of states from which new attractors are looked for, out of the cells whose motions end on no known one.
     new_states: int = 64
-    # Number of times that new attractors are looked for.
-    rounds: int = 3
+    rounds: int = 3  # Number of times that new attractors are looked for.
 
 
 SETTINGS = BasinSettings()
@@ -189,7 +183,7 @@ def _same(one: Target, other: Target) -> bool:
     apart = other.distance(one.states)
     if other.dense:
         return bool(np.median(apart) < other.grain)
-    return bool(apart.max() < 10.0 * NEAR * (1.0 + np.abs(one.states).max()))
+    return bool(apart.max() < 10.0 * SAME_STATE * (1.0 + np.abs(one.states).max()))
 
 
 def _relabelled(new: list[Attractor], first: int) -> list[Attractor]:

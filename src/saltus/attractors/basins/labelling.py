@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.attractors.attractor import NEAR, REST, UNDECIDED, Target
+from saltus.attractors.attractor import REST, SAME_STATE, UNDECIDED, Target
 from saltus.attractors.kind import AttractorKind
 from saltus.flow import Recurrence, find_recurrence
 from saltus.progress import Progress, silent
@@ -19,12 +19,10 @@ class LabellingSettings:
 
     # Number of forcing periods of the first stage; after each stage settled motions are labelled. Later stages are longer.
     stage: int = 48
-    # Number of last states of a motion that does not settle, which must lie on a sampled set in the median.
-    last: int = 64
+    last: int = 64  # Number of last states of a motion that does not settle, which must lie on a sampled set in the median.
     # The largest number of stroboscopic states that are kept at once: 67 MB, and as much again for what is computed from them.
     most_states: int = 1 << 22
-    # The least number of motions that are followed together.
-    fewest: int = 256
+    fewest: int = 256  # The least number of motions that are followed together.
 
 
 SETTINGS = LabellingSettings()
@@ -101,7 +99,7 @@ class Labelling:
 def _on_orbit(target: Target, ends: Recurrence) -> np.ndarray:
     """Which motions have settled on an orbit, or were near it for two rounds, and nearer in the second, (n,)."""
     last, q = ends.states[:, -1], len(target.states)
-    near = NEAR * np.maximum(1.0, np.abs(last).max(axis=1))
+    near = SAME_STATE * np.maximum(1.0, np.abs(last).max(axis=1))
     here: np.ndarray = (target.distance(last) < near) & (ends.periodic | ends.unsettled)
     rows = np.flatnonzero(here & ends.unsettled)
     rounds = target.distance(ends.states[rows, -2 * q :])

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-BATCHES = 16  # least number of batches from which a standard error is taken
-STUDENT = 2.131449545559323  # the two-sided 95 % point of Student's t with BATCHES - 1 degrees of freedom
+from saltus.attractors.lyapunov.settings import LYAPUNOV
 
 
 def weights(count: int) -> np.ndarray:
@@ -45,12 +44,12 @@ def uncertainty(series: np.ndarray) -> np.ndarray:
     Raises:
         ValueError: fewer than 16 entries.
     """
-    if len(series) < BATCHES:
-        raise ValueError(f"an error bar takes a series of at least {BATCHES} entries, got {len(series)}")
+    if len(series) < LYAPUNOV.batches:
+        raise ValueError(f"an error bar takes a series of at least {LYAPUNOV.batches} entries, got {len(series)}")
     lost = np.isneginf(series).any(axis=0)
     finite = np.where(np.isneginf(series), 0.0, series)
     widening = np.sqrt(len(series) * np.sum(weights(len(series)) ** 2))
-    return np.where(lost, 0.0, STUDENT * widening * _largest_standard_error(finite))
+    return np.where(lost, 0.0, LYAPUNOV.student * widening * _largest_standard_error(finite))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +85,9 @@ def resolution(duration: Any) -> Any:
 
 def _largest_standard_error(series: np.ndarray) -> Any:
     result, length = np.zeros(series.shape[1:]), 1
-    while len(series) // length >= 8 * BATCHES:
+    while len(series) // length >= 8 * LYAPUNOV.batches:
         length *= 2
-    while len(series) // length >= BATCHES:
+    while len(series) // length >= LYAPUNOV.batches:
         count = len(series) // length
         means = series[: count * length].reshape(count, length, *series.shape[1:]).mean(axis=1)
         result = np.maximum(result, means.std(axis=0, ddof=1) / np.sqrt(count))

@@ -11,6 +11,7 @@ import numpy as np
 from saltus.attractors.lyapunov.area_contraction import impact_factor
 from saltus.attractors.lyapunov.averages import Estimate, resolution
 from saltus.attractors.lyapunov.renormalisation import check_run
+from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.attractors.lyapunov.tangent_frames import Stretched, stretch_many
 from saltus.errors import ParameterError
 from saltus.flow import Inputs, Stop, last_states, motions_from, read_inputs, stop_names
@@ -21,8 +22,6 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-LOOK_BACK = 160  # forcing periods after the run in which a motion may show that it repeats itself
-LOSSLESS = 1.0 - 1e-14  # a product of impact factors below it is below 1
 ENDINGS = ("moving", "rest", "lost")  # what the flags of `ending` mean
 
 
@@ -102,7 +101,7 @@ class _Many:
         found = np.zeros(len(states), dtype=int)
         here = np.flatnonzero(np.isfinite(states).all(axis=1))
         if here.size and self.system.load.frequency is not None:
-            found[here] = self._follow(states, LOOK_BACK, ("settled",), here)["recurrence_period"].values
+            found[here] = self._follow(states, LYAPUNOV.look_back, ("settled",), here)["recurrence_period"].values
         return found
 
     def _follow(self, states: np.ndarray, periods: int, until: tuple[str, ...], rows: Any = slice(None)) -> Any:
@@ -122,7 +121,7 @@ def _measures(system: System, run: _Many, stretched: Stretched, captured: np.nda
     """Exponents, errors and what follows from them, a row for each motion."""
     growth = stretched.growth
     if captured.any():
-        lossy = impact_factor(system, run.parameters) < LOSSLESS
+        lossy = impact_factor(system, run.parameters) < LYAPUNOV.lossless
         growth = np.where((captured & lossy)[None, :, None], -np.inf, growth)
     found, duration = Estimate.of(growth / run.lengths[None, :, None]), len(growth) * run.lengths
     rested = captured | np.isneginf(found.value[:, 1])

@@ -9,10 +9,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from saltus.attractors.lyapunov.averages import Estimate
+from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.flow import last_states, motions_from
 from saltus.systems import System
-
-STRETCHES = 32  # whose means give error bars to both halves of the run
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +42,9 @@ def largest_exponents(
     """
     states, direction = np.array(states, dtype=float), np.tile(np.sqrt([0.5, 0.5]), (len(states), 1))
     frequency = np.broadcast_to(parameters.get("load.frequency", np.array(system.load.frequency, dtype=float)), len(states))
-    growth = np.full((STRETCHES, len(states)), np.nan)
+    growth = np.full((LYAPUNOV.stretches, len(states)), np.nan)
     options = {"periods": periods, "sensitivities": (), "sample": (), "tol": tol}
-    for stretch in range(STRETCHES):
+    for stretch in range(LYAPUNOV.stretches):
         here = np.flatnonzero(np.isfinite(states).all(axis=1))
         if not here.size:
             break
@@ -60,4 +59,4 @@ def largest_exponents(
         states[here] = np.where(going[:, None], last_states(system, ends), np.nan)
     duration = periods * 2.0 * math.pi / frequency
     found = Estimate.of(growth / duration)
-    return Largest(found.value, found.error, found.positive(STRETCHES * duration), states)
+    return Largest(found.value, found.error, found.positive(LYAPUNOV.stretches * duration), states)

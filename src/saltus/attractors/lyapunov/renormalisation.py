@@ -11,13 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors.lyapunov.averages import BATCHES
+from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.checks import check_count, check_number
 from saltus.flow import Motion
 from saltus.systems import System, check_system
-
-LONGEST_SPAN = 6.5  # units of time: a forcing period at Omega = 1, over which derivatives grow and shrink by less than 1e6
 
 
 def check_run(function: str, system: Any, periods: Any, transient: Any, tol: float) -> None:
@@ -28,7 +26,7 @@ def check_run(function: str, system: Any, periods: Any, transient: Any, tol: flo
     """
     check_system(system, function)
     check_periodic(system)
-    check_count("periods", periods, 2 * BATCHES)
+    check_count("periods", periods, 2 * LYAPUNOV.batches)
     check_count("transient", transient, 0)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
 
@@ -40,7 +38,7 @@ def period_length(system: System) -> float:
 
 def span_count(length: float) -> int:
     """Into how many spans a period of this length is cut."""
-    return max(1, math.ceil(length / LONGEST_SPAN))
+    return max(1, math.ceil(length / LYAPUNOV.longest_span))
 
 
 def first_frame(size: int) -> np.ndarray:

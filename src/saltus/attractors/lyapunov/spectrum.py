@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors.lyapunov.area_contraction import Contraction
-from saltus.attractors.lyapunov.averages import BATCHES, Estimate, average, resolution, uncertainty
+from saltus.attractors.lyapunov.averages import Estimate, average, resolution, uncertainty
 from saltus.attractors.lyapunov.renormalisation import check_run, first_frame, period_length, span_count, state_of
-from saltus.attractors.lyapunov.two_trajectory import ACCURACY, EVERY, separation_growth
+from saltus.attractors.lyapunov.settings import LYAPUNOV
+from saltus.attractors.lyapunov.two_trajectory import separation_growth
 from saltus.flow import Motion, Stop, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
@@ -51,7 +52,7 @@ class Exponents:
     @property
     def agrees(self) -> bool:
         """Whether the stroboscopic map has the same largest exponent, to within both error bars."""
-        allowed = math.hypot(float(self.errors[0]), self.stroboscopic_error) + ACCURACY
+        allowed = math.hypot(float(self.errors[0]), self.stroboscopic_error) + LYAPUNOV.accuracy
         return abs(float(self.values[0]) - self.stroboscopic) <= allowed
 
     @property
@@ -112,7 +113,7 @@ def lyapunov_spectrum(
     run.state, run.note = state_of(motion), _lost(motion)
     share = 0.6 if two_trajectories else 1.0
     run.follow(tol, part_of(progress, 0.0, share))
-    growth = np.full(BATCHES, np.nan)
+    growth = np.full(LYAPUNOV.batches, np.nan)
     if two_trajectories and run.note is None:
         growth = separation_growth(system, state_of(motion), periods, run.length, part_of(progress, share, 1.0))
     progress(1.0, "exponents")
@@ -140,7 +141,7 @@ class _Run:
                 if self.note is not None:
                     self.state = begin
                     return
-            if p % EVERY == EVERY - 1:
+            if p % LYAPUNOV.every == LYAPUNOV.every - 1:
                 progress((p + 1) / len(self.areas), "derivatives")
 
     def _advance(self, p: int, j: int, frame: np.ndarray, contraction: Contraction, tol: float) -> np.ndarray:

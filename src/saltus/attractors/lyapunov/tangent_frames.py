@@ -10,12 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.attractors.lyapunov.renormalisation import first_frame, span_count
+from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.flow import TangentEnsemble, available_cores
 from saltus.progress import Progress, silent
 from saltus.systems import System
-
-LARGEST_GROUP = 256  # motions that one thread follows together: enough that a call costs less than its work
-LOOK = 0.2  # seconds between looks at Ctrl-C and at the progress
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ def stretch_many(
     with ThreadPoolExecutor(available_cores()) as pool:
         workers = [pool.submit(work, rows) for rows in groups]
         try:
-            while wait(workers, LOOK).not_done:
+            while wait(workers, LYAPUNOV.look).not_done:
                 progress(float(done[0]) / (periods * max(1, len(states))), "derivatives")
         except BaseException:
             stopped.append(True)
@@ -70,7 +68,7 @@ def stretch_many(
 
 def _groups(rows: np.ndarray) -> list[np.ndarray]:
     """Rows in groups for the threads, a group or more for each core."""
-    least = max(available_cores(), math.ceil(len(rows) / LARGEST_GROUP))
+    least = max(available_cores(), math.ceil(len(rows) / LYAPUNOV.largest_group))
     return [group for group in np.array_split(rows, least) if group.size]
 
 

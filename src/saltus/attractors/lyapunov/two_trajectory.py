@@ -7,14 +7,10 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors.lyapunov.renormalisation import state_of
+from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.flow import simulate
 from saltus.progress import Progress, silent
 from saltus.systems import System
-
-DISTANCE = 1e-7  # between the two motions: far above the error of a period, small enough for the map to be linear
-ACCURACY = 1e-5  # what motions at that distance, with errors of their own, may miss of an exponent
-TOLERANCE = 1e-14
-EVERY = 16  # periods between calls of the progress
 
 
 def separation_growth(
@@ -27,7 +23,7 @@ def separation_growth(
     special.
     """
     here = _vector(state)
-    away = np.full(here.size, DISTANCE / np.sqrt(here.size))
+    away = np.full(here.size, LYAPUNOV.distance / np.sqrt(here.size))
     growth = np.full(periods, -np.inf)
     for p in range(periods):
         following = _mapped(system, here, length)
@@ -36,8 +32,8 @@ def separation_growth(
         if distance == 0.0:
             break
         growth[p] = np.log(distance / np.linalg.norm(away))
-        here, away = following, apart * (DISTANCE / distance)
-        if p % EVERY == EVERY - 1:
+        here, away = following, apart * (LYAPUNOV.distance / distance)
+        if p % LYAPUNOV.every == LYAPUNOV.every - 1:
             progress((p + 1) / periods, "two trajectories")
     return growth
 
@@ -53,4 +49,4 @@ def _mapped(system: System, state: np.ndarray, length: float) -> np.ndarray:
     velocity = state[len(names) :].tolist()
     start: dict[str, Any] = dict(zip(names, state[: len(names)].tolist(), strict=True))
     start["velocity"] = velocity[0] if len(names) == 1 else tuple(velocity)
-    return _vector(state_of(simulate(system, **start, duration=length, tol=TOLERANCE, dense=False)))
+    return _vector(state_of(simulate(system, **start, duration=length, tol=LYAPUNOV.tolerance, dense=False)))

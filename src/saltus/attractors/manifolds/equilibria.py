@@ -23,14 +23,10 @@ from saltus.systems import Constant, System
 class EquilibriumSettings:
     """How equilibria are found, and their eigenvalues."""
 
-    # Number of points of the window between which equilibria are looked for.
-    grid: int = 2001
-    # Derivatives are central differences of sixth order with this step.
-    difference: float = 1e-3
-    # A real part of at most this is 0: the differences leave it where no energy is lost.
-    neutral: float = 1e-9
-    # Where the pull at the contact is 0, it is evaluated at this distance beside it.
-    inside: float = 1e-6
+    grid: int = 2001  # Number of points of the window between which equilibria are looked for.
+    difference: float = 1e-3  # Derivatives are central differences of sixth order with this step.
+    neutral: float = 1e-9  # A real part of at most this is 0: the differences leave it where no energy is lost.
+    inside: float = 1e-6  # Where the pull at the contact is 0, it is evaluated at this distance beside it.
 
 
 SETTINGS = EquilibriumSettings()

@@ -15,18 +15,12 @@ from saltus.checks import Window
 class GrowthSettings:
     """When an image of the segment is fine enough."""
 
-    # The largest number of rounds of refinement, each of which halves the gaps.
-    rounds: int = 40
-    # Gaps between parameters on the segment that are narrower than this are not halved.
-    narrowest: float = 1e-13
-    # The largest angle between neighbouring chords, rad.
-    bend: float = 0.15
-    # Chords shorter than this, in steps, may bend by more.
-    short: float = 0.1
-    # The image is torn where neighbours stay farther apart than this, in steps.
-    torn: float = 2.0
-    # Points farther than this from the middle of the window, in half widths, are dropped.
-    reach: float = 3.0
+    rounds: int = 40  # The largest number of rounds of refinement, each of which halves the gaps.
+    narrowest: float = 1e-13  # Gaps between parameters on the segment that are narrower than this are not halved.
+    bend: float = 0.15  # The largest angle between neighbouring chords, rad.
+    short: float = 0.1  # Chords shorter than this, in steps, may bend by more.
+    torn: float = 2.0  # The image is torn where neighbours stay farther apart than this, in steps.
+    reach: float = 3.0  # Points farther than this from the middle of the window, in half widths, are dropped.
 
 
 SETTINGS = GrowthSettings()

@@ -23,12 +23,10 @@ from saltus.systems import System, VelocityReduction, reversed_system
 class SeparatrixSettings:
     """How a separatrix is followed."""
 
-    # Distance from the saddle at which it begins, on the tangent: the error is of the order of its square.
-    offset: float = 1e-6
+    offset: float = 1e-6  # Distance from the saddle at which it begins, on the tangent: the error is of the order of its square.
     # It ends when it comes within this distance of a saddle, after it has been ten times as far from all saddles.
     close: float = 1e-4
-    # The dimensionless time for which one call of `simulate` follows it.
-    span: float = 2.0
+    span: float = 2.0  # The dimensionless time for which one call of `simulate` follows it.
 
 
 SETTINGS = SeparatrixSettings()

@@ -26,9 +26,17 @@ from saltus.flow import last_states, motions_from, sensitivities
 from saltus.orbits import PeriodicOrbit
 from saltus.systems import System, reversed_system
 
-OFFSET = 1e-6  # d: the segment lies off the manifold by its square, which shrinks from there on
-TOLERANCE = 1e-13
-HYPERBOLIC = 1e-6  # least difference of the multipliers' moduli from 1
+
+@dataclass(frozen=True)
+class ManifoldSettings:
+    """Where manifolds begin, and how exactly they are followed."""
+
+    offset: float = 1e-6  # d: the segment lies off the manifold by its square, which shrinks from there on.
+    tolerance: float = 1e-13  # The error of a step of the motions along a manifold.
+    hyperbolic: float = 1e-6  # The least difference of the multipliers' moduli from 1.
+
+
+MANIFOLDS = ManifoldSettings()
 PLANE = ((-3.0, 3.0), (-3.0, 3.0))  # the window of the state plane in which curves are wanted where none is given
 
 
@@ -132,14 +140,14 @@ def _manifold(orbit: PeriodicOrbit, stable: bool, window: Any, periods: int, ste
 def is_saddle(orbit: PeriodicOrbit) -> bool:
     """Whether an orbit has one multiplier inside the unit circle and one outside."""
     size = np.sort(np.abs(orbit.multipliers))
-    return len(size) == 2 and bool(0.0 < size[0] < 1.0 - HYPERBOLIC and 1.0 + HYPERBOLIC < size[1] < np.inf)
+    return len(size) == 2 and bool(0.0 < size[0] < 1.0 - MANIFOLDS.hyperbolic and 1.0 + MANIFOLDS.hyperbolic < size[1] < np.inf)
 
 
 def _directions(system: System, states: np.ndarray, stable: bool) -> tuple[float, np.ndarray]:
     """The multiplier and the unit vector along the manifold at each state of the orbit, carried on by the map's derivative."""
     maps = []
     for state in states:
-        found = sensitivities(system, **start_at(system, state), periods=1, tol=TOLERANCE, dense=False)
+        found = sensitivities(system, **start_at(system, state), periods=1, tol=MANIFOLDS.tolerance, dense=False)
         if found.undefined:
             raise MotionError(f"the orbit's map has no derivative at phase 0: {found.undefined}")
         maps.append(found.state)
@@ -154,7 +162,7 @@ def _directions(system: System, states: np.ndarray, stable: bool) -> tuple[float
 
 
 def _segment(point: np.ndarray, direction: np.ndarray, ratio: float) -> Segment:
-    return lambda places: point + OFFSET * ratio ** np.asarray(places)[:, None] * direction
+    return lambda places: point + MANIFOLDS.offset * ratio ** np.asarray(places)[:, None] * direction
 
 
 def _flow(system: System, backward: bool) -> Any:
@@ -162,7 +170,7 @@ def _flow(system: System, backward: bool) -> Any:
     sign = np.array([1.0, -1.0 if backward else 1.0])
 
     def flow(states: np.ndarray, periods: int) -> np.ndarray:
-        result = motions_from(system, states * sign, periods=periods, sample=(), tol=TOLERANCE)
+        result = motions_from(system, states * sign, periods=periods, sample=(), tol=MANIFOLDS.tolerance)
         ends = sign * last_states(system, result)
         ends[result["periods"].values < periods] = np.nan
         return ends

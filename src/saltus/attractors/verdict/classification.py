@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors.lyapunov.averages import BATCHES
+from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.attractors.stroboscopic_section import with_clock
 from saltus.attractors.verdict.nonsettling import SETTINGS, judge_unsettled
 from saltus.attractors.verdict.verdict import Case, Verdict, settled
@@ -57,7 +57,7 @@ def classify(
         ParameterError: an argument without meaning.
     """
     clock, start = with_clock(system), _start(system, velocity, coordinates)
-    check_count("periods", periods, SETTINGS.thirds * 2 * BATCHES)
+    check_count("periods", periods, SETTINGS.thirds * 2 * LYAPUNOV.batches)
     check_count("transient", transient, 0)
     check_count("max_period", max_period, RECURRENCE.compiled_max_period)
     case = Case(system, clock, int(periods), int(max_period), int(seed), float(tol), progress)

@@ -13,7 +13,7 @@ from saltus.attractors.orbit_certificate import certify, start_at
 from saltus.attractors.verdict.reason import Reason
 from saltus.attractors.verdict.tori import excludes_tori
 from saltus.attractors.verdict.verdict import Case, Verdict, on_orbit, settled
-from saltus.attractors.verdict.zero_one_test import SHORTEST, ZeroOne, zero_one_test
+from saltus.attractors.verdict.zero_one_test import FEWEST_ENTRIES, ZeroOne, zero_one_test
 from saltus.flow import Recurrence
 from saltus.progress import part_of
 
@@ -22,14 +22,10 @@ from saltus.progress import part_of
 class NonsettlingSettings:
     """How motions are judged that do not settle."""
 
-    # The first estimate of the exponents takes one of three parts of `periods`, the second one the other two.
-    thirds: int = 3
-    # Number of stroboscopic states that the 0-1 test gets.
-    states: int = 2000
-    # The 0-1 test shows chaos where its K is above this.
-    chaos: float = 0.8
-    # It shows a regular motion where its K is below this; between the two values it decides nothing.
-    order: float = 0.2
+    thirds: int = 3  # The first estimate of the exponents takes one of three parts of `periods`, the second one the other two.
+    states: int = 2000  # Number of stroboscopic states that the 0-1 test gets.
+    chaos: float = 0.8  # The 0-1 test shows chaos where its K is above this.
+    order: float = 0.2  # It shows a regular motion where its K is below this; between the two values it decides nothing.
     # The least number of forcing periods for which companions are followed: an orbit is recognised hundreds of periods after it
     # is reached.
     least: int = 2000
@@ -88,7 +84,7 @@ def judge_unsettled(case: Case, ends: Recurrence) -> Verdict:
         return case.undecided(Reason.CONSERVATIVE, ends, {})
     runs, series = _runs(case, ends.states[0, -1]), ends.states[0, :, 0]
     series = series[np.isfinite(series)]
-    opinion = zero_one_test(series, seed=case.seed) if series.size >= SHORTEST else None
+    opinion = zero_one_test(series, seed=case.seed) if series.size >= FEWEST_ENTRIES else None
     periods = round(float(ends.periods[0])) + sum(run.periods for run in runs if run.note is None)
     later = _beside(case, runs[-1].state)
     evidence = _evidence(runs, opinion) | {"companions_settled": int((~later.unsettled[1:]).sum())}

@@ -12,7 +12,7 @@ from saltus.bounds import Interval, Leaves, enclose, reads
 from saltus.systems import System, check_system
 from saltus.taylor import Expr, Trace, differentiate, substitute, trace
 
-CELLS = 4096  # number of intervals into which the forcing period is divided
+PERIOD_CELLS = 4096  # number of intervals into which the forcing period is divided
 EVERYWHERE = Interval(-1e300, 1e300)
 VELOCITY = Expr("velocity", (), 0)
 
@@ -58,7 +58,7 @@ def _cells(system: System) -> Interval:
     period = system.load.period
     if period is None:
         return EVERYWHERE
-    edges = np.linspace(0.0, period, CELLS + 1)
+    edges = np.linspace(0.0, period, PERIOD_CELLS + 1)
     return Interval(edges[:-1] * (1 - 1e-12), edges[1:] * (1 + 1e-12))
 
 

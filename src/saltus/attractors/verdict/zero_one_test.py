@@ -10,8 +10,8 @@ import numpy as np
 from saltus.checks import check_number
 from saltus.errors import ParameterError
 
-SHORTEST = 100  # entries: lags reach a tenth of them
-STILL = 1e-9  # relative: a series that varies less does not vary
+FEWEST_ENTRIES = 100  # of a series: lags reach a tenth of them
+CONSTANT = 1e-9  # relative: a series that varies less does not vary
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +46,10 @@ def zero_one_test(series: Any, *, seed: int = 0, count: int = 100) -> ZeroOne:
         values = np.asarray(series, dtype=float)
     except (TypeError, ValueError):
         raise ParameterError("the 0-1 test takes a series of numbers, one a forcing period") from None
-    if values.ndim != 1 or values.size < SHORTEST or not np.isfinite(values).all():
-        raise ParameterError(f"the 0-1 test takes at least {SHORTEST} finite numbers in one row, got shape {values.shape}")
+    if values.ndim != 1 or values.size < FEWEST_ENTRIES or not np.isfinite(values).all():
+        raise ParameterError(f"the 0-1 test takes at least {FEWEST_ENTRIES} finite numbers in one row, got shape {values.shape}")
     check_number("count", count, at_least=1)
-    if np.ptp(values) <= STILL * max(1.0, float(np.abs(values).max())):
+    if np.ptp(values) <= CONSTANT * max(1.0, float(np.abs(values).max())):
         return ZeroOne(0.0, 0.0, values.size)
     lags = np.arange(1, values.size // 10 + 1)
     c = np.random.default_rng(seed).uniform(np.pi / 5, 4 * np.pi / 5, (int(count), 1))
