@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, Protocol, TypeVar,
 
 import numpy as np
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, near
 
 if TYPE_CHECKING:
     from saltus.systems import System
@@ -89,6 +89,18 @@ def check_count(name: str, value: Any, at_least: int, at_most: int | None = None
     check_number(name, value, at_least=at_least, at_most=at_most)
     if value != int(value):
         raise ParameterError(f"{name} must be a whole number, got {value!r}", name)
+
+
+def check_kind(name: str, value: Any, *kinds: type, source: str = "") -> None:
+    """Refuse what is of none of the classes; `source` are the functions that return them.
+
+    Raises:
+        ParameterError: with the name, the first of the classes, the functions and the value.
+    """
+    if not isinstance(value, kinds):
+        wanted = kinds[0].__name__
+        article, returned = "an" if wanted[0].lower() in "aeio" else "a", f", as {source} gives it" if source else ""
+        raise ParameterError(f"{name} must be {article} {wanted}{returned}, got {value!r:.80}", name)
 
 
 def check_bounds(bounds: Any) -> tuple[float, float]:
@@ -229,7 +241,12 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Check
         open_ended = [p.name for p in signature.parameters.values() if p.kind is p.VAR_KEYWORD]
 
         def refuse(*given: Any, **named: Any) -> None:
-            bound = signature.bind(*given, **named)
+            try:
+                bound = signature.bind(*given, **named)
+            except TypeError as error:
+                unknown = [name for name in named if name not in signature.parameters]
+                hint = f"; {near(unknown[0], signature.parameters)}" if unknown and not open_ended else ""
+                raise TypeError(f"{function.__name__}() {error}{hint}") from None
             bound.apply_defaults()
             arguments = dict(bound.arguments)
             for name in open_ended:

@@ -50,10 +50,13 @@ class SweepError(SaltusError, RuntimeError):
         self.failures, self.dataset = tuple(failures), dataset
 
 
-def near(name: str, known: Iterable[str]) -> str:
-    """The end of a sentence about an unknown `name`: the near names, or else all that are known."""
-    known = sorted(known)
-    close = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
+def near(name: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
+    """The end of a sentence about an unknown `name`: the near names, or else all that are known.
+
+    Names in `also` are proposed where they are near, and are not listed otherwise.
+    """
+    known = sorted(str(name) for name in known)  # the repr of an enumeration's member is not what a user writes
+    close = difflib.get_close_matches(name, [*known, *also], n=3, cutoff=0.6)
     if close:
         return "did you mean " + " or ".join(repr(c) for c in close) + "?"
     return "known here: " + (", ".join(known) if known else "none")

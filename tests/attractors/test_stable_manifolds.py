@@ -170,7 +170,7 @@ def test_only_saddles_have_manifolds(saddle: saltus.PeriodicOrbit) -> None:
         stable_manifold(saltus.find_orbit(forced(), theta=0.3))
     with pytest.raises(ParameterError, match="window must be"):
         stable_manifold(saddle, window=((1.0, 0.0), (0.0, 1.0)))
-    with pytest.raises(ParameterError, match="belongs to a periodic orbit"):
+    with pytest.raises(ParameterError, match="orbit must be a PeriodicOrbit, as find_orbit"):
         stable_manifold(forced())
 
 

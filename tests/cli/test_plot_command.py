@@ -1,5 +1,7 @@
 """`saltus plot`: a picture of every kind of result again, and what is no result."""
 
+import gc
+
 import numpy as np
 import pytest
 import xarray
@@ -61,6 +63,16 @@ def test_what_is_no_result_is_told(refused, tmp_path):
         ("other.nc", "its kind is 'rain fall'"),
     ):
         assert problem in refused("plot", tmp_path / name)
+
+
+def test_a_file_that_opens_only_half_is_told_without_a_traceback(refused, tmp_path, capfd):
+    netcdf(tmp_path / "damaged.nc", {"kind": "motion"}, x=("day", np.arange(100.0)))
+    content = bytearray((tmp_path / "damaged.nc").read_bytes())
+    content[48:600] = bytes(552)  # behind the superblock, which HDF5 reads first
+    (tmp_path / "damaged.nc").write_bytes(content)
+    assert "is no netCDF file that can be read" in refused("plot", tmp_path / "damaged.nc")
+    gc.collect()
+    assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("kind", ASKS)

@@ -44,6 +44,8 @@ def test_a_grid_is_evenly_spaced_or_a_list():
     np.testing.assert_allclose(read_values(["-10 deg", 0, "10 deg"]), np.deg2rad([-10, 0, 10]))
     np.testing.assert_array_equal(read_values([3, 1, 2]), [3, 1, 2])
     assert read_pairs([[1, "90 deg"]]) == ((1.0, np.pi / 2),)
+    with pytest.raises(ValueError, match=r"^must be pairs of numbers, such as \[\[-2, 2\], \[-2, 2\]\], of which each .* got 1$"):
+        read_pairs([1, 2])
 
 
 @pytest.mark.parametrize(

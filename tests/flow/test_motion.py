@@ -339,6 +339,7 @@ def test_motion_after_ten_thousand_periods_goes_on_as_from_time_zero():
     [
         ({}, "the state at the start needs theta=..."),
         ({"x": 0.3}, "Metainterface has no coordinate 'x'; known here: theta"),
+        ({"theta": 0.3, "period": 2}, "Metainterface has no coordinate 'period'; did you mean 'periods'?"),
         ({"thete": 0.3}, "Metainterface has no coordinate 'thete'; did you mean 'theta'?"),
         ({"theta": 0.3, "periods": None}, "say how long: either periods=... or duration=..."),
         ({"theta": 0.3, "duration": 1.0}, "say how long: either periods=... or duration=..."),

@@ -60,9 +60,10 @@ def _diagram(tree: Any) -> Iterator[str]:
             special = [branch[key].values for key in ("kind", "special_parameter") if key in branch]  # a branch may have none
             kinds = [f"{kind} {value:.6g}" for kind, value in zip(*special, strict=True)]
             more = f" and {len(kinds) - MOST_KINDS} more" if len(kinds) > MOST_KINDS else ""
+            period = int(branch["period"].max())  # where it ends at its own image, the orbit of half the period stands
             x, listed = branch["parameter"].values, ", ".join(kinds[:MOST_KINDS]) or "no special points"
             yield (
-                f"{name}: period {int(branch['period'][0])}, {path} {x.min():.6g} to {x.max():.6g}, "
+                f"{name}: period {period}, {path} {x.min():.6g} to {x.max():.6g}, "
                 f"{int(branch['stable'].sum())} of {x.size} points stable; {listed}{more}"
             )
     for low, high, rate in zip(*(tree["bands"][name].values for name in ("low", "high", "exponent")), strict=True):

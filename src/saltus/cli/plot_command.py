@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +70,8 @@ def open_result(path: Path) -> Any:
     Raises:
         ParameterError: no such file, or one that is not of saltus; a sweep that is not complete.
     """
+    import traceback
+
     import xarray
 
     if not path.exists():
@@ -78,8 +82,21 @@ def open_result(path: Path) -> Any:
         with xarray.open_datatree(path, engine="h5netcdf") as tree:
             tree.load()
     except (OSError, ValueError, KeyError, TypeError) as error:  # h5netcdf has many ways to say so
+        with _without_unraisable():
+            traceback.clear_frames(error.__traceback__)
         raise ParameterError(f"{path} is no netCDF file that can be read ({_first_line(error)})") from error
     return tree if tree.children else tree.to_dataset()
+
+
+@contextmanager
+def _without_unraisable() -> Iterator[None]:
+    """Let objects go in silence: a file that h5netcdf could open only half prints a traceback when it is closed."""
+    hook = sys.unraisablehook
+    sys.unraisablehook = lambda lost: None
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
 
 
 def _open_store(path: Path) -> Any:

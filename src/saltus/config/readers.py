@@ -147,7 +147,10 @@ def read_pairs(value: Any) -> tuple[tuple[float, float], ...]:
     """Pairs of numbers (or angles)."""
     if not isinstance(value, list) or not value:
         raise ValueError(f"must be a list of pairs of numbers, got {show(value)}")
-    return tuple(read_pair(item) for item in value)
+    try:
+        return tuple(read_pair(item) for item in value)
+    except ValueError as error:
+        raise ValueError(f"must be pairs of numbers, such as [[-2, 2], [-2, 2]], of which each {error}") from None
 
 
 def read_paths(value: Any) -> tuple[str, str]:

@@ -14,6 +14,8 @@ from saltus.flow.forcing_time import Clock, clock
 from saltus.flow.structures import limits_of
 from saltus.systems import System, check_system
 
+ARGUMENTS = ("velocity", "periods", "duration", "time")  # a misspelt one arrives among the coordinates
+
 
 @dataclass(frozen=True, kw_only=True)
 class MotionRequest:
@@ -80,7 +82,9 @@ def _start_state(system: System, velocity: Any, coordinates: Mapping[str, float]
     names = system.model.coordinates
     for name in coordinates:
         if name not in names:
-            raise ParameterError(f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names)}", name)
+            raise ParameterError(
+                f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names, ARGUMENTS)}", name
+            )
     missing = [name for name in names if name not in coordinates]
     if missing:
         raise ParameterError(f"the state at the start needs {missing[0]}=...", missing[0])

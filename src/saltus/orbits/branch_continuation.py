@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from saltus.checks import check_along, check_bounds, check_path
+from saltus.checks import check_along, check_bounds, check_kind, check_path
 from saltus.continuation import STEPS, Continuation, End, both_ways
 from saltus.errors import ParameterError
 from saltus.orbits.branch import START, Branch
@@ -45,7 +45,7 @@ def continue_orbit(
         progress: called with the share of the range that has been seen and the value of the parameter.
 
     Raises:
-        ParameterError: an unknown parameter, bounds that exclude the orbit.
+        ParameterError: what is no orbit, an unknown parameter, bounds that exclude the orbit.
     """
     low, high = _checked(orbit, path, bounds)
     first: Any
@@ -93,6 +93,7 @@ def follow_from(
 
 def _checked(orbit: PeriodicOrbit, path: str, bounds: Any) -> tuple[float, float]:
     """Bounds of a parameter that the system allows and between which the orbit lies."""
+    check_kind("orbit", orbit, PeriodicOrbit, RestingOrbit, source="find_orbit or search_orbits")
     low, high = check_bounds(bounds)
     check_path(orbit.system, path)
     value = orbit.system.get(path)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from saltus.checks import check_kind
 from saltus.errors import ParameterError, near
 from saltus.systems.impact import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
@@ -33,8 +34,7 @@ class System:
 
     def __post_init__(self) -> None:
         for name, kind in (("model", Model), ("load", Load), ("impact", ImpactLaw)):
-            if not isinstance(getattr(self, name), kind):
-                raise ParameterError(f"System.{name} must be a {kind.__name__}, got {getattr(self, name)!r}", name)
+            check_kind(name, getattr(self, name), kind)
         for channel in self.load.channels:
             if channel not in self.model.channels:
                 known = [*self.model.channels, "frequency"]

@@ -18,7 +18,7 @@ from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.find import find_attractors
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.checks import Window, check_axis, check_count, check_number, check_window, checked_by
+from saltus.checks import Window, check_axis, check_count, check_kind, check_number, check_window, checked_by
 from saltus.errors import ParameterError
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System, reversed_system
@@ -59,6 +59,8 @@ def _check(
     progress: object,
     **coordinates: Any,
 ) -> None:
+    if found is not None:
+        check_kind("found", found, Attractors, source="find_attractors")
     grid = _grid(with_clock(system), velocity, coordinates, found)
     check_count("periods", periods, 32)
     check_number("within", within, above=0.0)

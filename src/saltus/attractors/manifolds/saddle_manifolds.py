@@ -20,7 +20,7 @@ import numpy as np
 from saltus.attractors.manifolds.manifold_growth import Growth, GrowthEnd, Level, Segment
 from saltus.attractors.orbit_certificate import start_at
 from saltus.attractors.stroboscopic_section import section_states
-from saltus.checks import Rectangle, check_count, check_number, check_window
+from saltus.checks import Rectangle, check_count, check_kind, check_number, check_window
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import last_states, motions_from, sensitivities
 from saltus.orbits import PeriodicOrbit
@@ -117,8 +117,7 @@ def unstable_manifold(
 
 
 def _manifold(orbit: PeriodicOrbit, stable: bool, window: Any, periods: int, step: float, points: int) -> Manifold:
-    if not isinstance(orbit, PeriodicOrbit):
-        raise ParameterError(f"a manifold belongs to a periodic orbit, got {orbit!r}; find_orbit and search_orbits return them")
+    check_kind("orbit", orbit, PeriodicOrbit, source="find_orbit or search_orbits")
     check_count("periods", periods, 1)
     check_count("points", points, 100)
     check_number("step", step, above=0.0, at_most=1.0)

@@ -10,6 +10,7 @@ import numpy as np
 
 from saltus.errors import ParameterError, near
 from saltus.flow.ensemble.ensemble_dataset import rate_name, result_names
+from saltus.flow.request import ARGUMENTS
 from saltus.systems import System, broadcast_arrays, check_parameters, finite_array, numbers, parameter_table
 
 
@@ -54,7 +55,9 @@ def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, 
     names = system.model.coordinates
     for name in coordinates:
         if name not in names:
-            raise ParameterError(f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names)}", name)
+            raise ParameterError(
+                f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names, ARGUMENTS)}", name
+            )
     for name in names:
         if name not in coordinates:
             raise ParameterError(f"the state at the start needs {name}=...")
