@@ -15,7 +15,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.systems import System, VelocityReduction
-from saltus.theory import Equilibrium
+from saltus.theory import LoadedEquilibrium
 
 OFFSET = 1e-5  # from the saddle; the manifold leaves its tangent by the square of this
 CLOSE = 1e-4  # distance at which a manifold is said to end at a saddle
@@ -39,7 +39,7 @@ class Manifold:
 
 def manifold(
     system: System,
-    saddle: Equilibrium,
+    saddle: LoadedEquilibrium,
     *,
     stable: bool,
     outward: bool,

@@ -135,6 +135,12 @@ def test_a_wrong_public_name_is_answered_with_the_near_ones() -> None:
         _ = saltus.simulat
 
 
+def test_a_class_has_its_name_alone() -> None:
+    names = [node.name for path in FILES for node in ast.parse(path.read_text()).body if isinstance(node, ast.ClassDef)]
+    assert len(names) > 150
+    assert not {name for name in names if names.count(name) > 1}
+
+
 # --- size ------------------------------------------------------------------------------------------------------------------
 
 

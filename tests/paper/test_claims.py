@@ -6,7 +6,7 @@ import pytest
 from picture_checks import check_provenance, clipped
 
 from saltus.errors import SaltusError
-from saltus.paper import FIGURES, Verdict
+from saltus.paper import FIGURES, Agreement
 from saltus.paper.claims.claim import judge, judge_claim, measured, printed_unit, tally, to_markdown
 from saltus.paper.claims.claim_tables import ClaimEntry, ListForm, claim_tables
 from saltus.paper.release_check import failures
@@ -25,11 +25,11 @@ def judged(*outcomes, statement="s", **entry):
 @pytest.mark.parametrize(
     ("printed", "value", "verdict"),
     [
-        ("2.405", 2.40575, Verdict.AGREES),  # cut, not rounded
-        ("2.405", 2.40449, Verdict.AGREES),
-        ("2.405", 2.4065, Verdict.DISAGREES),
-        ("110", 100.0, Verdict.DISAGREES),
-        ("110", 109.2, Verdict.AGREES),
+        ("2.405", 2.40575, Agreement.AGREES),  # cut, not rounded
+        ("2.405", 2.40449, Agreement.AGREES),
+        ("2.405", 2.4065, Agreement.DISAGREES),
+        ("110", 100.0, Agreement.DISAGREES),
+        ("110", 109.2, Agreement.AGREES),
     ],
 )
 def test_a_number_agrees_within_one_unit_of_its_last_digit(printed, value, verdict):
@@ -45,23 +45,23 @@ def test_the_unit_of_a_printed_number_is_that_of_its_last_digit():
 def test_a_number_that_only_the_erratum_gives_agrees_with_the_erratum():
     table = {"printed": "1.384", "corrected": "1.13346", "erratum": 9}
     claim = judged(1.133459, **table)
-    assert claim.verdict is Verdict.ERRATUM
+    assert claim.verdict is Agreement.ERRATUM
     assert claim.verdict_text == "agrees with erratum 9"
-    assert judged(1.2, **table).verdict is Verdict.DISAGREES
+    assert judged(1.2, **table).verdict is Agreement.DISAGREES
 
 
 @pytest.mark.parametrize(
     ("printed", "corrected", "verdict"),
     [
-        (1e-12, None, Verdict.AGREES),
-        (1e-3, None, Verdict.DISAGREES),
-        (1e-3, 1e-12, Verdict.ERRATUM),
-        (1e-3, 1e-4, Verdict.DISAGREES),
-        (1e-12, 1.0, Verdict.AGREES),
-        (True, None, Verdict.AGREES),
-        (False, True, Verdict.ERRATUM),
-        (False, False, Verdict.DISAGREES),
-        (float("nan"), None, Verdict.DISAGREES),
+        (1e-12, None, Agreement.AGREES),
+        (1e-3, None, Agreement.DISAGREES),
+        (1e-3, 1e-12, Agreement.ERRATUM),
+        (1e-3, 1e-4, Agreement.DISAGREES),
+        (1e-12, 1.0, Agreement.AGREES),
+        (True, None, Agreement.AGREES),
+        (False, True, Agreement.ERRATUM),
+        (False, False, Agreement.DISAGREES),
+        (float("nan"), None, Agreement.DISAGREES),
     ],
 )
 def test_a_formula_is_judged_by_its_residual(printed, corrected, verdict):
@@ -69,7 +69,7 @@ def test_a_formula_is_judged_by_its_residual(printed, corrected, verdict):
 
 
 def test_a_corrected_formula_without_an_erratum_disagrees():
-    assert judged(1.0, 0.0).verdict is Verdict.DISAGREES
+    assert judged(1.0, 0.0).verdict is Agreement.DISAGREES
 
 
 def test_the_table_escapes_bars_and_counts_verdicts():
@@ -121,6 +121,6 @@ def test_every_erratum_is_proved_by_a_computed_claim_nothing_disagrees_and_no_pi
         if figure.draw is not None:
             assert clipped(figure.draw(data)) == [], figure.name
     assert len({claim.id for claim in claims}) == len(claims)
-    assert [claim.id for claim in claims if claim.verdict is Verdict.DISAGREES] == []
-    assert {claim.erratum for claim in claims if claim.verdict is Verdict.ERRATUM} == ERRATA
+    assert [claim.id for claim in claims if claim.verdict is Agreement.DISAGREES] == []
+    assert {claim.erratum for claim in claims if claim.verdict is Agreement.ERRATUM} == ERRATA
     assert all(claim.evidence and claim.statement and claim.where for claim in claims)

@@ -10,7 +10,7 @@ import pytest
 import sweep_script
 
 from saltus.errors import SweepError
-from saltus.sweep import Status, run, status
+from saltus.sweep import StoreStatus, run, status
 from saltus.sweep import store_files as files
 from saltus.sweep.store import opened
 
@@ -26,7 +26,7 @@ def reference(tree, tmp_path_factory):
     return tree(store)
 
 
-def _killed(script, store, rng, chunks, workers=0) -> Status | None:
+def _killed(script, store, rng, chunks, workers=0) -> StoreStatus | None:
     """Kill a run at a random moment after so many chunks; how far it came, None if not even to make the store."""
     process = script("go_on", store, workers, 0.0)
     while (line := process.stdout.readline().strip()) and (line == "go" or int(line) < chunks):

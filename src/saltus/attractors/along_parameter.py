@@ -155,13 +155,6 @@ def set_distance(one: Target, other: Target) -> float:
     return apart / size if size > 0.0 else 0.0 if apart == 0.0 else np.inf
 
 
-def _distances(before: Attractors, here: Attractors, seeds: list[int]) -> dict[tuple[int, int], float]:
-    """How far each attractor is from each of those before, by their labels, with so many seeds of each of these."""
-    parts = np.split(here.carried, np.cumsum(seeds)[:-1]) if seeds else []
-    led = {old.label: set(part.tolist()) for old, part in zip(before, parts, strict=True)}
-    return {(old.label, new.label): _apart(old, new, led[old.label] == {new.label}) for old in before for new in here}
-
-
 def _apart(old: Attractor, new: Attractor, led: bool) -> float:
     """The distance of two attractors, larger for different periods, and smaller where motions from one settle on the other."""
     if AttractorKind.REST in (old.kind, new.kind):

@@ -22,7 +22,7 @@ from saltus.systems import System
 
 
 @dataclass(frozen=True)
-class FindSettings:
+class FindAttractorsSettings:
     """How long motions are followed before their attractors are determined."""
 
     first: int = 400  # All motions are followed for this many forcing periods.
@@ -31,7 +31,7 @@ class FindSettings:
     verdicts: int = 8  # The largest number of motions that are classified because they never settle: each takes seconds.
 
 
-SETTINGS = FindSettings()
+SETTINGS = FindAttractorsSettings()
 
 
 def _check(

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from saltus.sweep import Status
+    from saltus.sweep import StoreStatus
 
 BAR_WIDTH = 40  # columns of the bar
 FAILURES_NAMED = 5  # failed chunks that are named
@@ -42,7 +42,7 @@ def print_status(path: Path) -> None:
     console.print(ending(found), markup=False, soft_wrap=True)
 
 
-def rows(found: Status) -> Iterator[tuple[str, str]]:
+def rows(found: StoreStatus) -> Iterator[tuple[str, str]]:
     """The lines of the table: heads and values."""
     yield "chunks", f"{found.done} of {found.total} done ({100 * found.done // found.total} %)"
     yield "grid", ", ".join(f"{size} along {name}" for name, size in found.sizes.items())
@@ -57,7 +57,7 @@ def rows(found: Status) -> Iterator[tuple[str, str]]:
         yield "", f"and {found.failed - FAILURES_NAMED} more"
 
 
-def ending(found: Status) -> str:
+def ending(found: StoreStatus) -> str:
     """Whether the sweep goes on, and how it can be gone on with."""
     if found.complete:
         return "The sweep is complete."

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from saltus.flow.contact import contact_accelerations, rate_of
-from saltus.flow.kernel_layout import GAUSS_NODES, GAUSS_WEIGHTS, Function, Where, Work
+from saltus.flow.kernel_layout import GAUSS_NODES, GAUSS_WEIGHTS, ModelPart, Where, Work
 from saltus.flow.memory_layout import State
 from saltus.flow.roots import horner
 from saltus.taylor import lean_jit
@@ -28,7 +28,7 @@ def chatter_sums(where, env, model, work, h, x, factor, t, origin):
         side = 1.0 - 2.0 * i
         pull = abs(horner(b[i], order, x * h))
         share = (1.0 if side == where[Where.SIDE] else factor) / pull
-        damping += share * model[Function.CONTACT_DAMPING](t + x * h, origin, side, env, where[Where.PIECE])
+        damping += share * model[ModelPart.CONTACT_DAMPING](t + x * h, origin, side, env, where[Where.PIECE])
         duration += share
     return damping, duration
 
@@ -38,7 +38,7 @@ def chatter_decay(where, state, env, model, work, h, origin):
     """Advance the chatter speed over a step: the action, v^2 times the duration sum v_s/abs(a_s), decays as the mean damping."""
     t, side = state[State.TIME], float(where[Where.SIDE])
     contact_accelerations(where, env, model, work, t, origin)
-    next_side, after = model[Function.RESET](
+    next_side, after = model[ModelPart.RESET](
         t, origin, -state[State.CHATTER_SPEED] / rate_of(model, side), side, env, where[Where.PIECE]
     )
     factor = rate_of(model, next_side) * after / state[State.CHATTER_SPEED]

@@ -14,10 +14,10 @@ from saltus.flow.kernel_layout import (
     SLOWLY,
     TINY,
     ZERO,
-    Function,
     Geometry,
     GrazingDetail,
     Mode,
+    ModelPart,
     Setting,
     Status,
     Where,
@@ -33,7 +33,7 @@ from saltus.taylor import lean_jit
 @lean_jit
 def rate_of(model, side):
     """The gap's rate of change with the coordinate at contact, on a side."""
-    return model[Function.GEOMETRY][Geometry.RATE_UP] if side > 0.0 else model[Function.GEOMETRY][Geometry.RATE_DOWN]
+    return model[ModelPart.GEOMETRY][Geometry.RATE_UP] if side > 0.0 else model[ModelPart.GEOMETRY][Geometry.RATE_DOWN]
 
 
 @lean_jit
@@ -45,7 +45,7 @@ def set_state(where, state, position, velocity):
 @lean_jit
 def hold(where, state, model, q):
     """Put the system at rest at contact."""
-    set_state(where, state, model[Function.GEOMETRY][Geometry.CONTACT], 0.0)
+    set_state(where, state, model[ModelPart.GEOMETRY][Geometry.CONTACT], 0.0)
     for k in range(q.shape[1]):
         q[0, k] = 0.0
     q[0, 0] = state[State.COORDINATES]
@@ -65,7 +65,7 @@ def contact_accelerations(where, env, model, work, t, origin):
     """Fill `b` with the Taylor series in time of the gap's second derivative at rest at contact, on side +1 and on side -1."""
     b, w = work[Work.CONTACT], work[Work.RECURRENCES]
     for i in range(min(where[Where.SIDES], 2)):
-        model[Function.CONTACT_SERIES](t, origin, 1.0 - 2.0 * i, env, where[Where.PIECE], b[i], w, where[Where.ORDER])
+        model[ModelPart.CONTACT_SERIES](t, origin, 1.0 - 2.0 * i, env, where[Where.PIECE], b[i], w, where[Where.ORDER])
 
 
 @lean_jit
@@ -94,7 +94,7 @@ def leave_or_stay(where, state, env, model, work, origin):
 def contact_pull(side, env, model, piece, work, t, origin):
     """The second derivative of the gap at rest at contact on one side, and its rate of change."""
     b, w = work[Work.CONTACT], work[Work.RECURRENCES]
-    model[Function.CONTACT_SERIES](t, origin, side, env, piece, b[0], w, 1)
+    model[ModelPart.CONTACT_SERIES](t, origin, side, env, piece, b[0], w, 1)
     return b[0, 0], b[0, 1]
 
 
@@ -112,14 +112,14 @@ def accumulation(where, env, model, work, speed, t, origin, tol):
     here, slope_here = contact_pull(side, env, model, piece, work, t, origin)
     if here >= 0.0:
         return Mode.ARC, 0.0
-    next_side, after = model[Function.RESET](t, origin, -speed / rate_of(model, side), side, env, piece)
+    next_side, after = model[ModelPart.RESET](t, origin, -speed / rate_of(model, side), side, env, piece)
     there, slope_there = contact_pull(next_side, env, model, piece, work, t, origin)
     if there >= 0.0 or after != after:
         return Mode.ARC, 0.0
     next_speed = rate_of(model, next_side) * after
     first, second = next_speed / speed, 0.0
     if first > 0.0:
-        third_side, last = model[Function.RESET](t, origin, -after, next_side, env, piece)
+        third_side, last = model[ModelPart.RESET](t, origin, -after, next_side, env, piece)
         second = rate_of(model, third_side) * last / next_speed
     loss = 1.0 - first * second
     cycle = 2.0 * speed * (1.0 / abs(here) + first / abs(there))
@@ -146,7 +146,7 @@ def rest_columns(where, state, env, model, work, events, t, origin, tol):
     """
     mode, _ = accumulation(where, env, model, work, TINY, t, origin, tol)
     detail = RestDetail.AT_ONCE if mode == Mode.REST else RestDetail.NEVER_AGAIN
-    model[Function.TANGENT](EventCode.RESTING, detail, t, origin, float(where[Where.SIDE]), env, where[Where.PIECE], state)
+    model[ModelPart.TANGENT](EventCode.RESTING, detail, t, origin, float(where[Where.SIDE]), env, where[Where.PIECE], state)
     events[0][where[Where.EVENTS] - 1, 3] = detail
     record_shift(where, state, events)
 
@@ -158,7 +158,7 @@ def release_columns(where, state, env, model, events, t, origin):
     detail = ReleaseDetail.AT_A_ROOT if where[Where.SKIP] <= 3 else ReleaseDetail.AT_NONE
     if where[Where.SKIP] == 2 and piece > 0 and abs(breaks[piece - 1] - origin - t) < 1e-12 * max(1.0, abs(origin)):
         detail = ReleaseDetail.AT_A_JUMP
-    model[Function.TANGENT](EventCode.RELEASE, detail, t, origin, float(where[Where.SIDE]), env, piece, state)
+    model[ModelPart.TANGENT](EventCode.RELEASE, detail, t, origin, float(where[Where.SIDE]), env, piece, state)
     for j in range(where[Where.COLUMNS]):
         if math.isnan(state[State.COORDINATES + where[Where.OWN] + j]):
             state[State.COORDINATES + 2 * where[Where.DOF] + j] = math.nan
@@ -199,7 +199,7 @@ def end_accumulation(where, state, env, model, work, steps, events, origin, left
     record_event(where, events, EventCode.RESTING, 0, 0, t + left, 0.0, 0.0)
     if where[Where.COLUMNS] > 0:
         side, piece = float(where[Where.SIDE]), where[Where.PIECE]
-        model[Function.TANGENT](EventCode.RESTING, RestDetail.AFTER_IMPACTS, t, origin, side, env, piece, state)
+        model[ModelPart.TANGENT](EventCode.RESTING, RestDetail.AFTER_IMPACTS, t, origin, side, env, piece, state)
         record_shift(where, state, events)
     hold(where, state, model, q)
     state[State.TIME] = min(t + left, t_end)
@@ -232,7 +232,7 @@ def decide(where, state, settings, env, model, work, steps, events, origin, t_en
 @lean_jit
 def impact(where, state, env, model, events, t, origin, before):
     """Apply the reset at time `t` to the velocity `before`. Returns PAUSED, or NO_IMPACT with the velocity left in the state."""
-    side, piece, contact = float(where[Where.SIDE]), where[Where.PIECE], model[Function.GEOMETRY][Geometry.CONTACT]
+    side, piece, contact = float(where[Where.SIDE]), where[Where.PIECE], model[ModelPart.GEOMETRY][Geometry.CONTACT]
     state[State.TIME] = t
     set_state(where, state, contact, before)
     where[Where.MODE], where[Where.SKIP], where[Where.HELD] = Mode.CONTACT, 0, 0
@@ -241,12 +241,12 @@ def impact(where, state, env, model, events, t, origin, before):
         record_event(where, events, EventCode.GRAZING, where[Where.SIDE], GrazingDetail.TRIPLE, t, before, 0.0)
         forget(where, state)
         return Status.PAUSED
-    next_side, after = model[Function.RESET](t, origin, before, side, env, piece)
+    next_side, after = model[ModelPart.RESET](t, origin, before, side, env, piece)
     if not rate_of(model, next_side) * after >= 0.0:
         return Status.NO_IMPACT
     record_event(where, events, EventCode.IMPACT, where[Where.SIDE], int(next_side), t, before, after)
     if where[Where.COLUMNS] > 0:
-        model[Function.TANGENT](EventCode.IMPACT, 0, t, origin, side, env, piece, state)
+        model[ModelPart.TANGENT](EventCode.IMPACT, 0, t, origin, side, env, piece, state)
         record_shift(where, state, events)
     where[Where.SIDE] = int(next_side)
     set_state(where, state, contact, after)

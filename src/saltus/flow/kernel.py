@@ -10,7 +10,7 @@ column needs shorter ones. What an event makes of the columns, and how it moves,
 has none, it is nan.
 
 `where`, `state` and `settings` are arrays in the places of `Where`, `State` and `Setting`; `env` = (parameters, constants, record
-breakpoints, record table); `model` holds the functions of the structure in the places of `Function`, and `work` the arrays of a
+breakpoints, record table); `model` holds the functions of the structure in the places of `ModelPart`, and `work` the arrays of a
 step in those of `Work`.
 """
 
@@ -27,9 +27,9 @@ from saltus.flow.kernel_layout import (
     EXACT,
     ROUGHER,
     SHORTEST,
-    Function,
     GrazingDetail,
     Mode,
+    ModelPart,
     Setting,
     Status,
     Where,
@@ -118,7 +118,7 @@ def arc(where, state, settings, env, model, work, steps, events, origin, target)
     if hit >= 0:
         record_event(where, events, EventCode.LIMIT, side, hit, state[State.TIME], velocity, velocity)
         if where[Where.COLUMNS] > 0:
-            model[Function.TANGENT](EventCode.LIMIT, hit, state[State.TIME], origin, float(side), env, where[Where.PIECE], state)
+            model[ModelPart.TANGENT](EventCode.LIMIT, hit, state[State.TIME], origin, float(side), env, where[Where.PIECE], state)
             record_shift(where, state, events)
         return Status.LIMITED
     unit = min(settings[Setting.LENGTH], 1.0) if settings[Setting.LENGTH] > 0.0 else 1.0

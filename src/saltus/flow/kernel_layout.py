@@ -98,7 +98,7 @@ class Work(IntEnum):
     STEP_END = 8  # the first five once more at the end of a step
 
 
-class Function(IntEnum):
+class ModelPart(IntEnum):
     """Places in the tuple `model`: what the kernel calls for a structure, and the geometry of its contact."""
 
     SERIES = 0

@@ -8,7 +8,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow.contact_side import side_of_state
-from saltus.flow.kernel_layout import STRUCTURE_SIZES, Function, Mode, Setting, Where
+from saltus.flow.kernel_layout import STRUCTURE_SIZES, Mode, ModelPart, Setting, Where
 from saltus.flow.memory_layout import State
 from saltus.flow.request import MotionRequest
 from saltus.flow.structures import Program, check_gap, taylor_order
@@ -80,7 +80,7 @@ def _mode_and_side(request: MotionRequest, run: Program) -> tuple[int, int]:
     if model.sides:
         check_gap(model)
     position, speed = float(request.position[0]), float(request.speeds[0])
-    mode, side = side_of_state.py_func(len(model.sides), position, speed, run.model[Function.GEOMETRY])
+    mode, side = side_of_state.py_func(len(model.sides), position, speed, run.model[ModelPart.GEOMETRY])
     if mode == Mode.BEYOND:
         name = model.coordinates[0]
         raise ParameterError(f"{name} = {position:g} lies beyond the contact at {name} = {float(model.contact):g}", name)

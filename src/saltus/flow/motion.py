@@ -18,7 +18,7 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-    from saltus.flow.recorder import Events
+    from saltus.flow.recorder import MotionEvents
 
 
 class EventKind(StrEnum):
@@ -85,7 +85,7 @@ class Motion:
     limit: str | None  # the margin that stopped it
     chatter_speed: float | None  # of the gap just after impacts on `side`, if it ends in chatter; theta and theta' are then 0
     periods: int  # whole forcing periods since time 0
-    events: Events
+    events: MotionEvents
     impacts: Impacts
     dense: DenseOutput | None
     samples: Samples | None

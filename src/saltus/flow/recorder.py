@@ -26,7 +26,7 @@ EVENT_KINDS = (
 )  # in the order of the kernel's numbers
 
 
-class Events(Sequence[Event]):
+class MotionEvents(Sequence[Event]):
     """The events of a motion in order of time, made one by one from the kernel's arrays."""
 
     def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray) -> None:
@@ -41,19 +41,19 @@ class Events(Sequence[Event]):
     def __getitem__(self, index: slice) -> Sequence[Event]: ...
     def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
-            return Events(self._times[index], self._labels[index], self._values[index])
+            return MotionEvents(self._times[index], self._labels[index], self._values[index])
         kind, side = self._labels[index, 1:3]
         before, after = self._values[index, 1:].tolist()
         return Event(float(self._times[index]), EVENT_KINDS[kind], int(side), before, after)
 
     def __repr__(self) -> str:
         counts = {kind.value: int(np.sum(self._labels[:, 1] == i)) for i, kind in enumerate(EVENT_KINDS)}
-        return f"Events({', '.join(f'{n} {kind}' for kind, n in counts.items() if n)})"
+        return f"MotionEvents({', '.join(f'{n} {kind}' for kind, n in counts.items() if n)})"
 
-    def of(self, kind: EventKind) -> Events:
+    def of(self, kind: EventKind) -> MotionEvents:
         """The events of one kind."""
         chosen = self._labels[:, 1] == EVENT_KINDS.index(kind)
-        return Events(self._times[chosen], self._labels[chosen], self._values[chosen])
+        return MotionEvents(self._times[chosen], self._labels[chosen], self._values[chosen])
 
     @property
     def details(self) -> np.ndarray:
@@ -117,10 +117,10 @@ class Recorder:
         self._samples.append((times, *piece.states(times)))
         self._next = max(stop, self._next)
 
-    def all_events(self) -> Events:
+    def all_events(self) -> MotionEvents:
         """Everything that happened."""
         labels, values = (np.concatenate([chunk[i] for chunk in self._events]) for i in (0, 1))
-        return Events(labels[:, 0] * self._length + values[:, 0], labels, values[:, :3])
+        return MotionEvents(labels[:, 0] * self._length + values[:, 0], labels, values[:, :3])
 
     def event_shifts(self) -> np.ndarray:
         """How the time of each event moves with each column of the tangent, (events, columns); nan where that is not known."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from saltus.flow.contact import rate_of, set_state
 from saltus.flow.function_types import IMPACT_EQUATIONS, SEGMENTS
-from saltus.flow.kernel_layout import ROUGHER, Function, Geometry, Setting, Where, Work
+from saltus.flow.kernel_layout import ROUGHER, Geometry, ModelPart, Setting, Where, Work
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.roots import DEPTH, NARROW, NOISE, horner, newton, scale_gap, split, to_bernstein, variations
 from saltus.flow.steps import column_step, expand, leaps, move, step_size, work_arrays
@@ -81,7 +81,7 @@ def look(where, model, work, side, t, h, order, roots, seen):
     for i in range(roots_within(poly, order, roots, NOISE * size)):
         x = horner(q[0], order, roots[i] * h)
         seen[TOP], seen[BOTTOM] = max(seen[TOP], x), min(seen[BOTTOM], x)
-        gap = rate * (x - model[Function.GEOMETRY][Geometry.CONTACT])
+        gap = rate * (x - model[ModelPart.GEOMETRY][Geometry.CONTACT])
         turn = 0.0
         for k in range(order, 0, -1):
             turn = turn * roots[i] + k * poly[k]
@@ -105,9 +105,9 @@ def start_by_impact(where, state, env, model, work, t, side, speed):
     for j in range(2 * where[Where.DOF]):
         state[coordinates + j] = 0.0
     state[velocities], state[velocities + 1] = inward * speed, inward
-    next_side, after = model[Function.RESET](t, 0.0, inward * speed, side, env, 0)
-    model[Function.TANGENT](EventCode.RESET_SLOPES, 0, t, 0.0, side, env, 0, state)
-    set_state(where, state, model[Function.GEOMETRY][Geometry.CONTACT], after)
+    next_side, after = model[ModelPart.RESET](t, 0.0, inward * speed, side, env, 0)
+    model[ModelPart.TANGENT](EventCode.RESET_SLOPES, 0, t, 0.0, side, env, 0, state)
+    set_state(where, state, model[ModelPart.GEOMETRY][Geometry.CONTACT], after)
     drift = state[velocities + where[Where.DOF] + 1]
     expand(where, state, env, model, work, t, 0.0, next_side, 0)
     state[coordinates + 2] = -state[velocities]  # the column of the start: what the equation of motion adds to it
@@ -163,7 +163,7 @@ def follow(where, state, settings, env, model, work, begin, end, side, looking, 
             x = state[State.COORDINATES]
             if looking:
                 seen[TOP], seen[BOTTOM] = max(seen[TOP], x), min(seen[BOTTOM], x)
-            return quotient if count == 0 else (x - model[Function.GEOMETRY][Geometry.CONTACT]) / (end - begin)
+            return quotient if count == 0 else (x - model[ModelPart.GEOMETRY][Geometry.CONTACT]) / (end - begin)
         t += h
     return math.nan
 

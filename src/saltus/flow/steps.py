@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.kernel_layout import DEFECT, GAP, SAFETY, SMALLEST, Function, Where
+from saltus.flow.kernel_layout import DEFECT, GAP, SAFETY, SMALLEST, ModelPart, Where
 from saltus.flow.memory_layout import State
 from saltus.flow.roots import horner
 from saltus.taylor import jit, lean_jit
@@ -43,7 +43,7 @@ def expand(where, state, env, model, work, t, origin, side, order):
         q[i, 0], v[i, 0] = state[first_q + i], state[first_v + i]
         if i < where[Where.OWN]:
             size = max(size, abs(q[i, 0]), abs(v[i, 0]))
-    model[Function.SERIES](t, origin, side, env, where[Where.PIECE], q, v, a, g, m, w, order)
+    model[ModelPart.SERIES](t, origin, side, env, where[Where.PIECE], q, v, a, g, m, w, order)
     return size
 
 
@@ -84,7 +84,7 @@ def leaps(where, env, model, work, t, origin, side, h, size, tol):
     order = where[Where.ORDER]
     for i in range(where[Where.DOF]):
         q_end[i, 0], v_end[i, 0] = horner(q[i], order, h), horner(v[i], order, h)
-    model[Function.SERIES](t + h, origin, side, env, where[Where.PIECE], q_end, v_end, a_end, g_end, m_end, w, 0)
+    model[ModelPart.SERIES](t + h, origin, side, env, where[Where.PIECE], q_end, v_end, a_end, g_end, m_end, w, 0)
     defect = 0.0
     for i in range(where[Where.OWN]):
         defect = max(defect, abs(a_end[i, 0] - horner(a[i], order, h)))

@@ -29,7 +29,7 @@ from saltus.systems import System, check_system
 
 
 @dataclass(frozen=True)
-class FindSettings:
+class FindOrbitSettings:
     """How long a motion is followed until it settles, and how its orbit is solved for."""
 
     # The longest period that is looked for if no limit is given, in forcing periods.
@@ -42,7 +42,7 @@ class FindSettings:
     iterations: int = 25
 
 
-SETTINGS = FindSettings()
+SETTINGS = FindOrbitSettings()
 
 
 def find_orbit(

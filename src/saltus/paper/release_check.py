@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from saltus.paper.claims.claim import Claim, Verdict
+from saltus.paper.claims.claim import Agreement, Claim
 from saltus.paper.claims.claim_tables import claim_tables
 from saltus.paper.reproduction import reproduce
 
@@ -18,7 +18,7 @@ from saltus.paper.reproduction import reproduce
 def failures(claims: Iterable[Claim]) -> list[str]:
     """A line for each claim that disagrees with the paper and its errata, and for each one of the tables that was not judged."""
     found = {claim.id: claim for claim in claims}
-    wrong = [f"{id} disagrees: {claim.evidence}" for id, claim in found.items() if claim.verdict is Verdict.DISAGREES]
+    wrong = [f"{id} disagrees: {claim.evidence}" for id, claim in found.items() if claim.verdict is Agreement.DISAGREES]
     known = [(part, id) for part, entries in claim_tables().items() for id in entries]
     return wrong + [f"{id} of {part} was not judged" for part, id in known if id not in found]
 

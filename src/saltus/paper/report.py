@@ -12,10 +12,10 @@ from pathlib import Path
 import saltus
 from saltus.files import write_text
 from saltus.paper import up_to_date as state
-from saltus.paper.claims.claim import Claim, Verdict, tally, to_markdown
+from saltus.paper.claims.claim import Agreement, Claim, tally, to_markdown
 from saltus.paper.figures.figure import PaperFigure
 
-KINDS = {Verdict.AGREES: "agrees", Verdict.ERRATUM: "erratum", Verdict.DISAGREES: "disagrees"}
+KINDS = {Agreement.AGREES: "agrees", Agreement.ERRATUM: "erratum", Agreement.DISAGREES: "disagrees"}
 
 
 def compute_claims(figure: PaperFigure, folder: Path) -> list[Claim]:

@@ -3,12 +3,12 @@ from .cluster import on_cluster
 from .execution import SweepInterrupted, run
 from .plan import Plan, Variable
 from .store import check_store, open_store
-from .store_status import Status, read_plan, status
+from .store_status import StoreStatus, read_plan, status
 
 __all__ = [
     "Failure",
     "Plan",
-    "Status",
+    "StoreStatus",
     "SweepInterrupted",
     "Variable",
     "check_store",

@@ -15,7 +15,7 @@ from saltus.errors import ParameterError, SweepError
 from saltus.progress import Progress, silent
 from saltus.sweep.chunk_grid import Index
 from saltus.sweep.chunk_results import Failure, Raised, attempt, checked
-from saltus.sweep.memory import Memory
+from saltus.sweep.memory import MemoryResults
 from saltus.sweep.plan import Plan
 from saltus.sweep.store import Store, opened
 
@@ -67,8 +67,8 @@ def run(
         SweepInterrupted: Ctrl-C. In all these cases the chunks written before are kept.
     """
     path = _check(plan, store, workers, scheduler, progress, retries)
-    with nullcontext(Memory(plan)) if path is None else opened(plan, path) as results:
-        sweep = _Run(plan, results, progress, retries)
+    with nullcontext(MemoryResults(plan)) if path is None else opened(plan, path) as results:
+        sweep = _SweepRun(plan, results, progress, retries)
         try:
             sweep.fill(workers, scheduler)
         except BaseException as error:
@@ -82,10 +82,10 @@ def run(
         return results.dataset()
 
 
-class _Run:
+class _SweepRun:
     """One run: the queue of missing chunks, the failures, and since when it computes."""
 
-    def __init__(self, plan: Plan, results: Store | Memory, progress: Progress, retries: int) -> None:
+    def __init__(self, plan: Plan, results: Store | MemoryResults, progress: Progress, retries: int) -> None:
         self.plan, self.results, self.progress, self.retries = plan, results, progress, retries
         self.queue = deque(results.missing())
         self.total = plan.chunks.total

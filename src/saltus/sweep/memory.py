@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-class Memory:
+class MemoryResults:
     """The arrays of a plan, in memory; see `saltus.sweep.store.Store`."""
 
     path = None

@@ -16,7 +16,7 @@ from saltus.sweep.chunk_results import Failure
 
 
 @dataclass(frozen=True)
-class Status:
+class StoreStatus:
     """How far a sweep is.
 
     `done` and `failed` count chunks, of `total`; a failed chunk is one that raised when it was last tried. `bytes` is the size of
@@ -47,7 +47,7 @@ class Status:
         return self.done == self.total
 
 
-def status(path: Path | str) -> Status:
+def status(path: Path | str) -> StoreStatus:
     """How far the sweep is whose store is at `path`.
 
     Raises:
@@ -63,7 +63,7 @@ def status(path: Path | str) -> Status:
         if not all(times):
             missing.add(index)
         updated = max(updated, *times)
-    return Status(
+    return StoreStatus(
         path=path,
         kind=str(plan["attrs"].get("kind") or plan["attrs"].get("title") or "sweep"),
         function=plan["function"],

@@ -3,7 +3,7 @@ from .energy import potential_energy, potential_slope, total_energy
 from .high_frequency import high_frequency_onset
 from .impact_oscillator import WallOrbit, WallOrbits, wall_orbits
 from .layer import Layer, layers, open_layer
-from .loaded_equilibria import Equilibrium, Stability, equilibria, undeformed_stability
+from .loaded_equilibria import LoadedEquilibrium, Stability, equilibria, undeformed_stability
 from .mechanism_limits import AmplitudeLimit, amplitude_limits
 from .pendulum import pendulum_acceleration
 from .piecewise_linear import LinearMotion, linear_motion
@@ -43,10 +43,10 @@ from .static_divergence import Divergence, divergence, linear_equilibria
 __all__ = [
     "AmplitudeLimit",
     "Divergence",
-    "Equilibrium",
     "InelasticContact",
     "Layer",
     "LinearMotion",
+    "LoadedEquilibrium",
     "Peaks",
     "QuasiStaticBorder",
     "Stability",

@@ -23,7 +23,7 @@ class Stability(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Equilibrium:
+class LoadedEquilibrium:
     """A state of rest under constant loads."""
 
     theta: float  # rad
@@ -39,7 +39,7 @@ class Equilibrium:
         return self.stability is Stability.STABLE
 
 
-def equilibria(system: System) -> tuple[Equilibrium, ...]:
+def equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
     """Every equilibrium of the full equation within the kinematic limit 2 (pi - beta0), by increasing theta.
 
     They are the zeros of P'(theta) (`pot_balance0`), stable where P'' > 0, and theta = 0 while the loads hold both layers
@@ -52,7 +52,7 @@ def equilibria(system: System) -> tuple[Equilibrium, ...]:
     found = [_deformed(lower, x) for x in zeros_of_slope(lower)] + [_deformed(upper, x) for x in zeros_of_slope(upper)]
     undeformed = undeformed_stability(system)
     if undeformed is not None:
-        found.append(Equilibrium(0.0, undeformed, 0.0, None, None, True))
+        found.append(LoadedEquilibrium(0.0, undeformed, 0.0, None, None, True))
     return tuple(sorted(found, key=lambda e: e.theta))
 
 
@@ -108,10 +108,12 @@ def _past_contact(layer: Layer, end: float, sign: int) -> float:
     return x
 
 
-def _deformed(layer: Layer, x: float) -> Equilibrium:
+def _deformed(layer: Layer, x: float) -> LoadedEquilibrium:
     curvature = float(layer.curvature(x))
     stability = Stability.STABLE if curvature > 0 else Stability.UNSTABLE
     if x in layer.inflections():
         stability = Stability.FOLD
     within = x <= math.pi - layer.beta0
-    return Equilibrium(layer.side * x, stability, float(layer.potential(x)), curvature, layer.eigenvalues(curvature), within)
+    return LoadedEquilibrium(
+        layer.side * x, stability, float(layer.potential(x)), curvature, layer.eigenvalues(curvature), within
+    )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
-from saltus.theory.loaded_equilibria import MOMENT_ROUNDING, Equilibrium, Stability, slope_sign, undeformed_stability
+from saltus.theory.loaded_equilibria import MOMENT_ROUNDING, LoadedEquilibrium, Stability, slope_sign, undeformed_stability
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class Divergence:
     below: float | None  # from theta(0) < below; None if never
 
 
-def linear_equilibria(system: System) -> tuple[Equilibrium, ...]:
+def linear_equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
     """The equilibria of `gov_eqn_constant_loading_lin`, by increasing theta: theta_B, 0 and theta_A, where they exist:
 
         theta_A = V cos(beta0) / (k + V sin(beta0)) > 0,   theta_B = -V cos(beta0) / (1 + V sin(beta0)) < 0   (`non-trivial`)
@@ -34,7 +34,7 @@ def linear_equilibria(system: System) -> tuple[Equilibrium, ...]:
     found = [e for layer in layers(system) if (e := _linear_equilibrium(layer)) is not None]
     undeformed = undeformed_stability(system)
     if undeformed is not None:
-        found.append(Equilibrium(0.0, undeformed, 0.0, None, None, True))
+        found.append(LoadedEquilibrium(0.0, undeformed, 0.0, None, None, True))
     return tuple(sorted(found, key=lambda e: e.theta))
 
 
@@ -61,12 +61,12 @@ def _threshold(layer: Layer) -> float | None:
     return push / kappa if kappa < -MOMENT_ROUNDING * layer.scale else None
 
 
-def _linear_equilibrium(layer: Layer) -> Equilibrium | None:
+def _linear_equilibrium(layer: Layer) -> LoadedEquilibrium | None:
     kappa, push = float(layer.curvature(0.0)), float(layer.push(0.0))
     if min(abs(kappa), abs(push)) <= MOMENT_ROUNDING * layer.scale or push / kappa < 0:
         return None
     x = push / kappa
     stability = Stability.STABLE if kappa > 0 else Stability.UNSTABLE
-    return Equilibrium(
+    return LoadedEquilibrium(
         layer.side * x, stability, -(push**2) / (2 * kappa), kappa, layer.eigenvalues(kappa), x <= math.pi - layer.beta0
     )

@@ -12,7 +12,7 @@ from saltus.attractors.lyapunov.spectrum import Exponents, lyapunov_spectrum
 from saltus.attractors.orbit_certificate import certify, start_at
 from saltus.attractors.verdict.reason import Reason
 from saltus.attractors.verdict.tori import excludes_tori
-from saltus.attractors.verdict.verdict import Case, Verdict, on_orbit, settled
+from saltus.attractors.verdict.verdict import Verdict, VerdictRequest, on_orbit, settled
 from saltus.attractors.verdict.zero_one_test import FEWEST_ENTRIES, ZeroOne, zero_one_test
 from saltus.flow import Recurrence
 from saltus.progress import part_of
@@ -42,7 +42,7 @@ SETTINGS = NonsettlingSettings()
 class _Judged:
     """What is known of a motion that has not settled."""
 
-    case: Case
+    case: VerdictRequest
     ends: Recurrence
     last: Exponents  # of the last and longest run
     opinion: ZeroOne | None
@@ -78,7 +78,7 @@ class _Judged:
         }
 
 
-def judge_unsettled(case: Case, ends: Recurrence) -> Verdict:
+def judge_unsettled(case: VerdictRequest, ends: Recurrence) -> Verdict:
     """The verdict on a motion that has not settled."""
     if case.system.load.period is None:
         return case.undecided(Reason.CONSERVATIVE, ends, {})
@@ -97,7 +97,7 @@ def judge_unsettled(case: Case, ends: Recurrence) -> Verdict:
     return _chaotic(judged) if all(run.positive for run in runs) else _regular(judged)
 
 
-def _runs(case: Case, state: np.ndarray) -> list[Exponents]:
+def _runs(case: VerdictRequest, state: np.ndarray) -> list[Exponents]:
     """Exponents of a run and of one twice as long that goes on from there."""
     third, at = case.periods // SETTINGS.thirds, start_at(case.system, state)
     runs: list[Exponents] = []
@@ -131,14 +131,14 @@ def _evidence(runs: list[Exponents], opinion: ZeroOne | None) -> dict[str, Any]:
     }
 
 
-def _beside(case: Case, state: dict[str, Any]) -> Recurrence:
+def _beside(case: VerdictRequest, state: dict[str, Any]) -> Recurrence:
     """How motions end that begin at a state, the first, and beside it."""
     around = np.random.default_rng(case.seed).uniform(-SETTINGS.aside, SETTINGS.aside, (SETTINGS.companions, 2))
     states = _row(case, state) + np.concatenate([[[0.0, 0.0]], around])
     return case.follow(states, max(case.periods, SETTINGS.least), 4 * case.max_period, (0.9, 1.0))
 
 
-def _row(case: Case, state: dict[str, Any]) -> np.ndarray:
+def _row(case: VerdictRequest, state: dict[str, Any]) -> np.ndarray:
     return np.array([state[case.system.model.coordinates[0]], state["velocity"]])
 
 

@@ -52,7 +52,7 @@ class Verdict:
 
 
 @dataclass(frozen=True)
-class Case:
+class VerdictRequest:
     """One question: a motion's system, and how long and how exactly it is looked at."""
 
     system: System
@@ -85,7 +85,7 @@ class Case:
         return self.verdict(AttractorKind.UNDECIDED, cause, ends, numbers, **more)
 
 
-def settled(case: Case, ends: Recurrence, start: np.ndarray) -> Verdict | None:
+def settled(case: VerdictRequest, ends: Recurrence, start: np.ndarray) -> Verdict | None:
     """The verdict on a motion from a state (2,) that has come to rest, ended or repeats itself; None where it goes on."""
     if ends.rest[0]:
         numbers, point = {"periods": round(float(ends.periods[0]))}, np.array([float(case.system.model.contact), 0.0])
@@ -99,7 +99,7 @@ def settled(case: Case, ends: Recurrence, start: np.ndarray) -> Verdict | None:
     return on_orbit(case, ends, found, "it repeats itself" + (f" every {period} forcing periods" if period > 1 else ""))
 
 
-def _ended(case: Case, ends: Recurrence, start: np.ndarray) -> Verdict:
+def _ended(case: VerdictRequest, ends: Recurrence, start: np.ndarray) -> Verdict:
     """The verdict on a motion that ends, as `simulate` sees it."""
     periods = round(float(ends.periods[0]))
     try:
@@ -111,7 +111,7 @@ def _ended(case: Case, ends: Recurrence, start: np.ndarray) -> Verdict:
     return case.undecided(Reason.NOT_FOLLOWED, ends, {"periods": periods})
 
 
-def on_orbit(case: Case, ends: Recurrence, found: Certificate, seen: str, **more: Any) -> Verdict:
+def on_orbit(case: VerdictRequest, ends: Recurrence, found: Certificate, seen: str, **more: Any) -> Verdict:
     """The verdict on a motion with an orbit under it, certified or not, of which so much has been seen."""
     more["evidence"] = more.get("evidence", {}) | found.evidence
     if found.orbit is None or not found.sound:

@@ -112,7 +112,7 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
     where, state, limits = scalar_state(lane, sizes, at, m, flags, settings, lanes)
     trajectory = lanes[LaneArray.LABELS][lane, LaneLabel.TRAJECTORY]
     env = (parameters[trajectory], lanes[LaneArray.CONSTANTS][lane], tables[0], tables[1])
-    model = (functions[0], functions[1], functions[2], functions[3], geometry, functions[4])  # in the places of `Function`
+    model = (functions[0], functions[1], functions[2], functions[3], geometry, functions[4])  # in the places of `ModelPart`
     steps = (
         np.empty((BUFFER_LENGTH, 2), np.int64),
         np.empty((BUFFER_LENGTH, 2)),

@@ -16,7 +16,7 @@ from saltus.errors import SaltusError, near
 from saltus.paper.claims.claim_tables import ClaimEntry, claim_tables
 
 
-class Verdict(StrEnum):
+class Agreement(StrEnum):
     """What the computation says of a claim."""
 
     AGREES = "agrees"
@@ -33,7 +33,7 @@ class Claim:
     statement: str  # in our own words
     paper: str
     value: str
-    verdict: Verdict
+    verdict: Agreement
     evidence: str
     erratum: int | None = None
 
@@ -44,7 +44,7 @@ class Claim:
     @property
     def verdict_text(self) -> str:
         """The verdict with the erratum's number."""
-        return f"{self.verdict} {self.erratum}" if self.verdict is Verdict.ERRATUM else str(self.verdict)
+        return f"{self.verdict} {self.erratum}" if self.verdict is Agreement.ERRATUM else str(self.verdict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,14 +103,14 @@ def judge_claim(id: str, entry: ClaimEntry, measured: Measured) -> Claim:
     )
 
 
-def _compared(entry: ClaimEntry, measured: Measured) -> tuple[str, str, Verdict]:
+def _compared(entry: ClaimEntry, measured: Measured) -> tuple[str, str, Agreement]:
     """Numbers agree within one unit of the last printed digit, so that a digit may have been rounded or cut."""
     unit = f" {entry.unit}" if entry.unit else ""
-    verdict = Verdict.DISAGREES
+    verdict = Agreement.DISAGREES
     if _same_number(measured.outcome, entry.printed):
-        verdict = Verdict.AGREES
+        verdict = Agreement.AGREES
     elif _same_number(measured.outcome, entry.corrected):
-        verdict = Verdict.ERRATUM
+        verdict = Agreement.ERRATUM
     return f"{entry.printed}{unit}", f"{measured.outcome:.6g}{unit}", verdict
 
 
@@ -123,11 +123,11 @@ def printed_unit(printed: str) -> float:
     return float(Decimal(1).scaleb(int(Decimal(printed).as_tuple().exponent)))
 
 
-def _checked(entry: ClaimEntry, measured: Measured) -> tuple[str, str, Verdict]:
+def _checked(entry: ClaimEntry, measured: Measured) -> tuple[str, str, Agreement]:
     """A residual vanishes within the tolerance; the erratum counts only where the claim as printed fails."""
     printed, corrected = measured.outcome, measured.corrected
     agrees, mended = (one is not None and _holds(one, entry.tolerance) for one in (printed, corrected))
-    verdict = Verdict.AGREES if agrees else Verdict.ERRATUM if mended and entry.erratum else Verdict.DISAGREES
+    verdict = Agreement.AGREES if agrees else Agreement.ERRATUM if mended and entry.erratum else Agreement.DISAGREES
     if corrected is None:
         return "as stated", _outcome_text(printed), verdict
     return f"as printed: {_outcome_text(printed)}", f"corrected: {_outcome_text(corrected)}", verdict
@@ -159,6 +159,6 @@ def to_markdown(claims: Iterable[Claim]) -> str:
 def tally(claims: Iterable[Claim]) -> str:
     """How many claims carry each verdict, in words."""
     claims = list(claims)
-    counts = {verdict: sum(c.verdict is verdict for c in claims) for verdict in Verdict}
-    parts = [f"{counts[Verdict.AGREES]} agree", f"{counts[Verdict.ERRATUM]} agree with an erratum"]
-    return f"{len(claims)} claims: {', '.join(parts)}, {counts[Verdict.DISAGREES]} disagree."
+    counts = {verdict: sum(c.verdict is verdict for c in claims) for verdict in Agreement}
+    parts = [f"{counts[Agreement.AGREES]} agree", f"{counts[Agreement.ERRATUM]} agree with an erratum"]
+    return f"{len(claims)} claims: {', '.join(parts)}, {counts[Agreement.DISAGREES]} disagree."

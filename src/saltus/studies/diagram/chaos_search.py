@@ -96,7 +96,7 @@ def chaotic_bands(
     return Bands(path, bands, tried)
 
 
-class _Followed(NamedTuple):
+class _FollowedRows(NamedTuple):
     """Motions after some forcing periods, (n, starts, ...)."""
 
     moving: np.ndarray  # neither at rest nor settled
@@ -148,7 +148,7 @@ class _ChaosSearch:
         for line, start in zip(*kept, strict=True):
             tried.chaotic[line, start], tried.undecided[line, start] = stays[line], not stays[line]
 
-    def _follow(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent) -> _Followed:
+    def _follow(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent) -> _FollowedRows:
         """Follow motions from states (n, starts, 2) at each of the values (n,)."""
         shape, kept = states.shape[:2], SETTINGS.kept
         ends = find_recurrence(
@@ -167,7 +167,7 @@ class _ChaosSearch:
         shown = np.where(moving, kept, np.maximum(ends.period, 1))  # of what has settled one period alone
         early = np.arange(last.shape[1]) < last.shape[1] - shown[:, None]
         last[early], peaks[early] = np.nan, np.nan
-        return _Followed(moving.reshape(shape), last.reshape(*shape, *last.shape[1:]), peaks.reshape(*shape, peaks.shape[1]))
+        return _FollowedRows(moving.reshape(shape), last.reshape(*shape, *last.shape[1:]), peaks.reshape(*shape, peaks.shape[1]))
 
     def spread(self, tried: Tried) -> None:
         """Carry chaos on to neighbouring values of the grid: motions begun on it, as long as they find more."""
