@@ -10,7 +10,7 @@ import pytest
 from lane_cases import FAMILIES, end_state
 
 import saltus.flow.ensemble.threads as lanes_run
-from saltus.taylor.vectors import WIDTH
+from saltus.taylor.lane_vectors import WIDTH
 
 OPTIONS = {"sample": ("state", "extrema", "impact_count", "speed"), "last": 3, "tol": 1e-12}
 MANY = 2600  # more than two chunks
@@ -82,12 +82,13 @@ def test_tangents_change_nothing_but_rounding():
 WIDE = """
 import sys
 import numpy as np
-from lane_cases import FAMILIES, end_state, stop_names
-from saltus.taylor.vectors import WIDTH
+from lane_cases import FAMILIES, end_state
+from saltus.flow import stop_names
+from saltus.taylor.lane_vectors import WIDTH
 cases = FAMILIES["paper"](np.random.default_rng(8), 400)
 ensemble = cases.in_lanes(tol=1e-14, sample=("state", "extrema"))
 state, extrema = end_state(ensemble, cases.system), np.stack([ensemble.largest_theta, ensemble.smallest_theta])
-np.savez(sys.argv[1], width=WIDTH, state=state, extrema=extrema, stop=stop_names(ensemble), crossings=ensemble.impact_count)
+np.savez(sys.argv[1], width=WIDTH, state=state, extrema=extrema, stop=stop_names(ensemble), impact_count=ensemble.impact_count)
 """
 
 
@@ -95,7 +96,9 @@ def run_with_width(width, folder):
     """The same ensemble in a process of its own, with a register of `width` doubles."""
     environment = os.environ | {
         "SALTUS_LANES": str(width),
-        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")]),
+        "PYTHONPATH": os.pathsep.join(
+            [str(Path(__file__).parent), str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
+        ),
     }
     file = folder / f"width{width}.npz"
     subprocess.run([sys.executable, "-c", WIDE, str(file)], env=environment, check=True, timeout=600)
