@@ -1,7 +1,7 @@
 """Capture at rest: what is proved holds on the exact flow, reaches the barriers that closed forms give, and is not empty."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -266,8 +266,7 @@ def test_many_parameter_sets_at_once_are_each_as_alone(monkeypatch):
     together = capture_speed(BASE, cases)
     alone = [float(capture_speed(one(cases, i))) for i in range(12)]
     assert together == pytest.approx(alone, rel=1e-12)
-    monkeypatch.setattr(module, "BATCH", 5)
-    monkeypatch.setattr(module, "CELL_BATCH", 3)
+    monkeypatch.setattr(module, "CAPTURE", replace(module.CAPTURE, batch=5, cell_batch=3))
     assert capture_speed(BASE, cases) == pytest.approx(together, rel=1e-12)
 
 

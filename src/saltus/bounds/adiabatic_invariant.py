@@ -34,7 +34,7 @@ from saltus.bounds.intervals import ROUNDING, SLACK, Interval
 
 ODD_1 = 0.385  # above the largest x (1 - x^2), 2 / sqrt(27)
 ODD_2 = 0.2863  # above the largest x (1 - x^2)^2, 16 / (25 sqrt(5))
-TINY = 1e-12
+LEAST_GROWTH = 1e-12  # least growth in a first guess, which divides by it
 TRIALS = 0.8 ** np.arange(9)  # shares of the largest speed, tried in turn until the bounds hold
 
 
@@ -181,7 +181,7 @@ def _highest(c: list[Any]) -> Any:
 def first_guess(forms: list[Form], loss: Any) -> Any:
     """A speed near which largest_start is likely to succeed, from the bounds at the contact; (1, n)."""
     with np.errstate(all="ignore"):
-        growth = [np.maximum(_growth(f, f.here, 0.0), TINY) for f in forms]
+        growth = [np.maximum(_growth(f, f.here, 0.0), LEAST_GROWTH) for f in forms]
         damped = reduce(np.minimum, [f.decay for f in forms]).mean(axis=0, keepdims=True)
         decay = damped / reduce(np.maximum, growth).mean(axis=0, keepdims=True)
         pull = reduce(np.minimum, [_least(f.pull) for f in forms])

@@ -10,16 +10,26 @@ from typing import Any
 import numpy as np
 
 from saltus.bounds.adiabatic_invariant import budget, first_guess, largest_start, normal_form
-from saltus.bounds.energy_barrier import WIDEST, climb
+from saltus.bounds.energy_barrier import CLIMB, climb
 from saltus.bounds.gap_equation import SPEED, Leaves, Opening, reads
 from saltus.bounds.intervals import SLACK, Interval, enclose
 from saltus.systems import System, broadcast_arrays, check_parameters, check_system, finite_array, parameter_table
 from saltus.taylor import Expr, Trace, differentiate, number, record_table, substitute, trace
 
-CELLS = 16  # number of intervals into which the forcing period is divided
-BATCH, CELL_BATCH = 8192, 512  # parameter sets at once, without and with cells: their arrays then stay in the cache
-ONE = 1e-14  # a product of impact factors this close to 1 is 1: no law states its numbers more exactly
-BOXES = (0.7, 0.2)  # largest speeds over which the corrected invariant is bounded, as shares of the first guess; tried in turn
+
+@dataclass(frozen=True)
+class CaptureSettings:
+    """How a proof is divided, and where it begins."""
+
+    cells: int = 16  # The number of intervals into which the forcing period is divided.
+    batch: int = 8192  # Parameter sets at once where the time has no cells: their arrays then stay in the cache.
+    cell_batch: int = 512  # Parameter sets at once where the time has cells, for the same reason.
+    one: float = 1e-14  # A product of impact factors this close to 1 is 1: no law states its numbers more exactly.
+    # The largest speeds over which the corrected invariant is bounded, as shares of the first guess; they are tried in turn.
+    boxes: tuple[float, ...] = (0.7, 0.2)
+
+
+CAPTURE = CaptureSettings()
 
 
 def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -> Any:
@@ -80,8 +90,8 @@ def proved_speeds(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray
         return result
     records = _record_ranges(system, traced)
     law = _Law(traced)
-    for start in range(0, result.size, BATCH):
-        part = slice(start, start + BATCH)
+    for start in range(0, result.size, CAPTURE.batch):
+        part = slice(start, start + CAPTURE.batch)
         leaves = Leaves([Interval(c[None, part]) for c in columns], records)
         result[part] = law.capture(leaves, result[part].size)
     return result
@@ -129,7 +139,7 @@ class _Law:
         """The speeds below which capture is proved, (n,)."""
         with np.errstate(all="ignore"):
             always = replace(leaves, time=self._time(leaves, 1))
-            speed = self._proved(always, np.zeros((1, n)), np.full((1, n), WIDEST))
+            speed = self._proved(always, np.zeros((1, n)), np.full((1, n), CLIMB.widest))
             if self.by_speed:  # the factors of the slowest impacts, then those of all that are slower than what they give
                 speed = self._proved(always, speed, speed)
         return speed[0]
@@ -150,8 +160,8 @@ class _Law:
             speed, steady = self._energy(cycle, impacts, always, limit / wide)
             chosen = np.flatnonzero((~steady | ~(speed > 0)) & (impacts.loss >= 0))
             if not self.recorded and (self.frequency is not None or not self.timed):
-                for start in range(0, chosen.size, CELL_BATCH):
-                    part = chosen[start : start + CELL_BATCH]
+                for start in range(0, chosen.size, CAPTURE.cell_batch):
+                    part = chosen[start : start + CAPTURE.cell_batch]
                     found = self._by_invariant(cycle, impacts, always, limit / wide, part)
                     speed[:, part] = np.fmax(speed[:, part], found)
             least = np.minimum(least, np.where(impacts.loss >= 0, speed * narrow, 0.0))
@@ -167,13 +177,13 @@ class _Law:
         first, last = factors[0], factors[-1]
         ratio = np.where((first > 0) & (last > 0), np.sqrt(first / last), 1.0)
         e = np.maximum(first / ratio, last * ratio)
-        e = np.where(np.abs(e - 1) <= ONE, 1.0, e)
+        e = np.where(np.abs(e - 1) <= CAPTURE.one, 1.0, e)
         stretch = dict(zip(cycle, (np.ones_like(ratio), ratio), strict=False))
         return _Impacts(np.where(e <= 1, np.minimum(-np.log(e) * (1 - SLACK), 10.0), np.nan), stretch)
 
     def _energy(self, cycle: tuple[int, ...], impacts: _Impacts, always: Leaves, limit: Any) -> tuple[Any, Any]:
         """The speed from the bounds of the energy, and whether the accelerations do not depend on the time; (1, n)."""
-        everywhere = replace(always, opening=Interval(0.0, WIDEST), speed=Interval(-WIDEST, WIDEST))
+        everywhere = replace(always, opening=Interval(0.0, CLIMB.widest), speed=Interval(-CLIMB.widest, CLIMB.widest))
         steady, alive = np.full(limit.shape, not self.recorded), impacts.loss >= 0
         for side in cycle:
             here = replace(always, stretch=Interval(impacts.stretch[side]))
@@ -211,7 +221,7 @@ class _Law:
         forms = [normal_form(side, None if len(cycle) == 1 else bounds[1 - i]) for i, side in enumerate(bounds)]
         loss, period = impacts.loss[:, chosen[alive]], np.atleast_1d(here[0].time.hi)[-1:]
         top = np.minimum(first_guess(forms, loss), limit[:, chosen[alive]])
-        for v in (fraction * top for fraction in BOXES):
+        for v in (fraction * top for fraction in CAPTURE.boxes):
             boxes = [self.sides[s].boxed(x, f.pull, v) for s, x, f in zip(cycle, here, forms, strict=True)]
             budgets = [budget(form, box, v) for form, box in zip(forms, boxes, strict=True)]
             found = largest_start(budgets, loss, period, v)
@@ -221,7 +231,7 @@ class _Law:
         return result
 
     def _in_cells(self, leaves: Leaves) -> Leaves:
-        return replace(leaves, time=self._time(leaves, CELLS if self.timed else 1))
+        return replace(leaves, time=self._time(leaves, CAPTURE.cells if self.timed else 1))
 
 
 def _factor(traced: Trace, side: int) -> tuple[int, Expr, Expr]:

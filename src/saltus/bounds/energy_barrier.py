@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from saltus.bounds.intervals import SLACK, Interval
 
-WIDEST = 1e6  # openings up to this are looked at
-TRIES = 30
-STEPS = 20  # largest number of steps over the opening, each at most a third of it
-
 Bounds = Callable[[Interval], Interval]
 Work = tuple[Any, Any, Any]
+
+
+@dataclass(frozen=True)
+class ClimbSettings:
+    """How far and in how many steps a gap is opened."""
+
+    widest: float = 1e6  # The largest opening that is looked at.
+    tries: int = 30  # The largest number of times that the first step is divided by 4, until it may be taken.
+    steps: int = 20  # The largest number of steps over the opening, each at most a third of it.
+
+
+CLIMB = ClimbSettings()
 
 
 def climb(pull: Bounds, slope: Bounds, allowed: Any) -> Work:
@@ -31,13 +40,13 @@ def climb(pull: Bounds, slope: Bounds, allowed: Any) -> Work:
     """
     done: Work = (np.zeros_like(allowed), np.zeros_like(allowed), np.zeros_like(allowed))
     step = np.ones_like(allowed)
-    for _ in range(TRIES):  # until the whole of it can be one step
+    for _ in range(CLIMB.tries):  # until the whole of it can be one step
         _, holds = _step(pull, slope, allowed, done, step)
         if holds.all():
             break
         step = np.where(holds, step, step / 4)
     first = step = step / 2
-    for _ in range(STEPS):
+    for _ in range(CLIMB.steps):
         new, holds = _step(pull, slope, allowed, done, step)
         done = tuple(np.where(holds, x, y) for x, y in zip(new, done, strict=True))
         step = np.where(holds, np.minimum(2 * step, np.maximum(done[0] / 3, first)), step / 2)
@@ -55,4 +64,4 @@ def _step(pull: Bounds, slope: Bounds, allowed: Any, done: Work, step: Any) -> t
     reach, spread = step / 2 * change.magnitude(), step * step / 8 * (change.hi - change.lo)
     low, high = (middle.lo - reach) * (1 - SLACK), (middle.hi + reach) * (1 + SLACK)
     new = (opening + step, lo + (step * middle.lo - spread) * (1 - SLACK), hi + (step * middle.hi + spread) * (1 + SLACK))
-    return new, (low > 0) & (hi + high * step < allowed * (lo + low * step)) & (new[0] <= WIDEST)
+    return new, (low > 0) & (hi + high * step < allowed * (lo + low * step)) & (new[0] <= CLIMB.widest)

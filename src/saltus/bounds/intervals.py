@@ -19,7 +19,7 @@ ROUNDING = 2.0**-51  # relative, four times that of + - * / and sqrt: a literal 
 LIBRARY = 2.0**-48  # relative, of the elementary functions: NumPy promises 4 units in the last place
 SLACK = 1e-9  # relative, far above the rounding of the few steps after the intervals
 TURN = 2 * math.pi
-EXACT = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # factors that do not round
+EXACT_FACTORS = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # factors that do not round
 
 
 class Interval:
@@ -43,7 +43,7 @@ class Interval:
     def __mul__(self, other: Any) -> Interval:
         if isinstance(other, (int, float)):
             lo, hi = (self.lo, self.hi) if other >= 0 else (self.hi, self.lo)
-            return Interval(lo * other, hi * other) if abs(other) in EXACT else outward(lo * other, hi * other)
+            return Interval(lo * other, hi * other) if abs(other) in EXACT_FACTORS else outward(lo * other, hi * other)
         a, b, c, d = self.lo * other.lo, self.lo * other.hi, self.hi * other.lo, self.hi * other.hi
         return outward(np.minimum(np.minimum(a, b), np.minimum(c, d)), np.maximum(np.maximum(a, b), np.maximum(c, d)))
 

@@ -16,10 +16,6 @@ from saltus.continuation.test_functions import located
 from saltus.continuation.zero import Zero
 from saltus.progress import Progress, silent
 
-AHEAD = 1e-6  # length along a tangent of the point that gives its direction after the impacts are renumbered
-WIDE = 0.2  # share of a step by which the first point of a curve may lie beside it for the curve to close
-
-
 Bounds = Mapping[str, tuple[float, float]]  # the least and the largest value of each parameter, by its name
 
 
@@ -181,9 +177,9 @@ class Continuation:
             return False
         along = place - a.place
         share = float(along @ (b.curve.weights**2 * across)) / length**2
-        if not (0.0 < share <= 1.0 and b.curve.norm(along - share * across) < WIDE * length):
+        if not (0.0 < share <= 1.0 and b.curve.norm(along - share * across) < STEPS.closing * length):
             return False
-        moved = self.events.nearest(first, first.place + AHEAD * first.tangent, b)
+        moved = self.events.nearest(first, first.place + STEPS.ahead * first.tangent, b)
         assert moved is not None
         return float((moved - place) @ (b.curve.weights**2 * b.tangent)) > 0.0  # else it comes back along itself
 

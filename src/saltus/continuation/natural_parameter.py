@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.continuation.curve import Curve, P
 
-NARROW = 1e-12  # relative precision of the parameter at an end or a change that no test function locates
+LOCATED_WITHIN = 1e-12  # relative precision of the parameter at an end or a change that no test function locates
 
 
 class NaturalCurve(Curve[P]):
@@ -70,7 +70,7 @@ def bisected(point: P, beyond: float, holds: Callable[[P], bool]) -> tuple[P, fl
 
     It holds at the given point, and does not at the parameter `beyond`, where there may be no solution at all.
     """
-    while abs(beyond - point.parameter) > NARROW * max(abs(point.parameter), abs(beyond)):
+    while abs(beyond - point.parameter) > LOCATED_WITHIN * max(abs(point.parameter), abs(beyond)):
         middle = 0.5 * (point.parameter + beyond)
         found = point.curve.at(middle)
         if found is not None and holds(found):

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.continuation.curve import Point
-
-MOST_STRETCHED = 3.0  # times the last step, beyond which its curvature says nothing about the next one
+from saltus.continuation.step_length import STEPS
 
 
 def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
@@ -20,7 +19,7 @@ def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
         return straight
     chord = point.place - before.place
     length = _arc(before, point, chord)
-    if not 0.0 < step <= MOST_STRETCHED * length:
+    if not 0.0 < step <= STEPS.most_stretched * length:
         return straight
     u = step / length
     bend = point.tangent * length - chord  # the cubic is the tangent and what bends it: of second and of third order

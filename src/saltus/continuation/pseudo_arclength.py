@@ -11,8 +11,7 @@ import numpy as np
 from saltus.continuation.corrector import Corrected, Evaluation, newton
 from saltus.continuation.curve import Curve, P
 from saltus.continuation.predictor import predicted
-
-FAR = 0.3  # share of a step by which its end may lie away from the tangent's: farther away it may be on another branch
+from saltus.continuation.step_length import STEPS
 
 
 class EquationCurve(Curve[P]):
@@ -76,7 +75,7 @@ class EquationCurve(Curve[P]):
     def advance(self, before: P | None, point: P, step: float) -> P | None:
         """The point a step further; None where Newton's method does not converge or leads far away from the tangent."""
         ahead = self.solve(predicted(before, point, step), point.tangent)
-        if ahead is None or self.norm(ahead.place - point.place - step * point.tangent) >= FAR * step:
+        if ahead is None or self.norm(ahead.place - point.place - step * point.tangent) >= STEPS.far * step:
             return None
         return ahead
 

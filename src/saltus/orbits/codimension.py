@@ -15,13 +15,13 @@ from saltus.orbits.special_curve import SpecialCurvePoint
 from saltus.orbits.special_point import SpecialKind
 from saltus.orbits.tolerances import TOLERANCES
 
-NARROW = 1e-15  # width of the bracket, in the step that contains the point
+BRACKET_WIDTH = 1e-15  # width of the bracket, in the step that contains the point
 CAP = 1.0  # upper limit of `room`, which would be infinite for a motion without impacts that never comes near the contact
 
 
 def curve_test(kind: SpecialKind, value: Callable[[SpecialCurvePoint], float]) -> TestFunction:
     """A test function along a curve of special points."""
-    return TestFunction(kind, value, NARROW)
+    return TestFunction(kind, value, BRACKET_WIDTH)
 
 
 def curve_tests(kind: str, symmetric: bool) -> list[TestFunction]:

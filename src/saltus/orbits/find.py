@@ -32,14 +32,11 @@ from saltus.systems import System, check_system
 class FindOrbitSettings:
     """How long a motion is followed until it settles, and how its orbit is solved for."""
 
-    # The longest period that is looked for if no limit is given, in forcing periods.
-    max_period: int = 12
+    max_period: int = 12  # The longest period that is looked for if no limit is given, in forcing periods.
     # Number of forcing periods that a motion is given to settle in the first round; each further round doubles it.
     settling: int = 160
-    # Number of such rounds.
-    rounds: int = 5
-    # The largest number of Newton's iterations from a motion to its orbit.
-    iterations: int = 25
+    rounds: int = 5  # Number of such rounds.
+    iterations: int = 25  # The largest number of Newton's iterations from a motion to its orbit.
 
 
 SETTINGS = FindOrbitSettings()

@@ -9,7 +9,7 @@ import numpy as np
 from saltus.continuation import newton
 from saltus.orbits.problem import Equations, Problem
 
-ITERATIONS = 12  # enough from a guess near the orbit; a motion that has not quite settled needs more
+NEWTON_ITERATIONS = 12  # enough from a guess near the orbit; a motion that has not quite settled needs more
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Solution:
         return float(np.abs(self.equations.residual).max())
 
 
-def solve(problem: Problem, unknowns: np.ndarray, values: np.ndarray, iterations: int = ITERATIONS) -> Solution | None:
+def solve(problem: Problem, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS) -> Solution | None:
     """The orbit near a first guess at fixed parameters, or None where Newton's method does not converge."""
 
     def evaluate(place: np.ndarray, thorough: bool) -> Equations | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.flow import Motion, Validity, simulate
 from saltus.flow import segments as at
-from saltus.orbits.newton import ITERATIONS, Solution, solve
+from saltus.orbits.newton import NEWTON_ITERATIONS, Solution, solve
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
@@ -30,7 +30,7 @@ class PeriodicOrbit:
 
     @classmethod
     def near(
-        cls, problem: Problem, unknowns: np.ndarray, values: np.ndarray, iterations: int = ITERATIONS
+        cls, problem: Problem, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
     ) -> PeriodicOrbit | None:
         """The orbit near a guess at fixed parameters, or None where Newton's method does not converge."""
         found = solve(problem, unknowns, values, iterations)

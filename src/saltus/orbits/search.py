@@ -23,22 +23,15 @@ from saltus.systems import System, check_system
 class SearchSettings:
     """How long motions are followed, and which of their states may lead to orbits."""
 
-    # Number of forcing periods that motions are given to settle.
-    settling: int = 200
+    settling: int = 200  # Number of forcing periods that motions are given to settle.
     # Number of forcing periods at the beginning of each motion, and at its end, in which near returns are looked for.
     transient: int = 24
-    # Newton's method is tried for an orbit that repels from returns nearer than this.
-    near: float = 0.15
-    # The largest number of such returns, for each period: the nearest ones.
-    guesses: int = 12
-    # The least distance between two of these returns.
-    apart: float = 0.05
-    # A motion that stays this near to the contact is at rest, and an orbit no larger than this is rest.
-    still: float = 1e-6
-    # A settled motion whose state is this near to a known one is on the same orbit.
-    same_state: float = 1e-5
-    # Orbits are the same whose extrema and speeds of impact agree to this.
-    same_orbit: float = 1e-6
+    near: float = 0.15  # Newton's method is tried for an orbit that repels from returns nearer than this.
+    guesses: int = 12  # The largest number of such returns, for each period: the nearest ones.
+    apart: float = 0.05  # The least distance between two of these returns.
+    still: float = 1e-6  # A motion that stays this near to the contact is at rest, and an orbit no larger than this is rest.
+    same_state: float = 1e-5  # A settled motion whose state is this near to a known one is on the same orbit.
+    same_orbit: float = 1e-6  # Orbits are the same whose extrema and speeds of impact agree to this.
 
 
 SETTINGS = SearchSettings()

@@ -27,12 +27,9 @@ WINDOW: Rectangle = ((-3.0, 3.0), (-3.0, 3.0))
 class StartSettings:
     """Where motions begin unless their states are given."""
 
-    # Number of states, spread evenly over the window.
-    spread: int = 24
-    # Factor by which more places are tried than states are wanted, as a wall may take a part of the window.
-    tried: int = 100
-    # From beside each stable equilibrium, at these shares of the way to the next one.
-    beside: tuple[float, ...] = (0.35, 0.75)
+    spread: int = 24  # Number of states, spread evenly over the window.
+    tried: int = 100  # Factor by which more places are tried than states are wanted, as a wall may take a part of the window.
+    beside: tuple[float, ...] = (0.35, 0.75)  # From beside each stable equilibrium, at these shares of the way to the next one.
 
 
 STARTS = StartSettings()

@@ -14,8 +14,8 @@ from saltus.studies.chart.motions import TOLERANCES
 if TYPE_CHECKING:
     import xarray
 
-KNOWN = 0.02  # largest distance, in cells, of a curve from a point through which it goes
-ROUNDING = 1e-9  # largest distance, in cells, of a crossing from the line through the middles of cells on which it lies
+ON_CURVE = 0.02  # largest distance, in cells, of a curve from a point through which it goes
+ON_LINE = 1e-9  # largest distance, in cells, of a crossing from the line through the middles of cells on which it lies
 
 
 def curve_dataset(curve: Any, paths: Sequence[str]) -> xarray.Dataset:
@@ -58,7 +58,7 @@ def explained(chart: ChartMotions, changes: Changes, curves: Sequence[xarray.Dat
         for *place, amplitude in crossings(chart, curve):
             offset = np.array(place) - changes.source
             along, across = (offset * step).sum(axis=1), np.abs(offset * (1 - np.abs(step))).sum(axis=1)
-            here = (across < ROUNDING) & (along > -1.0) & (along < 2.0)
+            here = (across < ON_LINE) & (along > -1.0) & (along < 2.0)
             known |= here & same_period & _is_similar(motions["amplitude"], amplitude)
     return known
 
@@ -76,7 +76,7 @@ def passes_through(chart: ChartMotions, curve: xarray.Dataset, spot: Sequence[fl
     chord, away = np.diff(points, axis=0), np.array(spot) / scale - points[:-1]
     length = np.maximum((chord**2).sum(axis=1), 1e-300)
     share = np.clip((away * chord).sum(axis=1) / length, 0.0, 1.0)
-    return bool(np.linalg.norm(away - share[:, None] * chord, axis=1).min(initial=np.inf) < KNOWN)
+    return bool(np.linalg.norm(away - share[:, None] * chord, axis=1).min(initial=np.inf) < ON_CURVE)
 
 
 def unseen_folds(chart: ChartMotions, curves: Sequence[xarray.Dataset]) -> np.ndarray:
@@ -93,8 +93,8 @@ def unseen_folds(chart: ChartMotions, curves: Sequence[xarray.Dataset]) -> np.nd
     for i, (*spot, amplitude) in enumerate(points):
         if curves[number[i]].attrs["kind"] != "LP" or amplitude < (1 + TOLERANCES.curve) * chart.least:
             continue
-        here = (np.abs(place - spot) < 1 + ROUNDING).all(axis=1) & (chart.motions["period"] == period[i])
-        strip = (number != number[i]) & (np.abs(points[:, :2] - spot) < 1 + ROUNDING).all(axis=1)
+        here = (np.abs(place - spot) < 1 + ON_LINE).all(axis=1) & (chart.motions["period"] == period[i])
+        strip = (number != number[i]) & (np.abs(points[:, :2] - spot) < 1 + ON_LINE).all(axis=1)
         strip &= np.isin(period, (period[i], 2 * period[i], period[i] / 2)) & _is_similar(points[:, 2], amplitude)
         if not (here & _is_similar(chart.motions["amplitude"], amplitude)).any() and not strip.any():
             found.append(points[i : i + 1, :2])

@@ -24,19 +24,16 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-CURVES = 24  # largest number of curves on which motions end
-
 
 @dataclass(frozen=True)
 class BorderSettings:
     """How much work the borders of a chart may take."""
 
+    curves: int = 24  # The largest number of curves on which motions end.
     # The search for curves ends after this many changes, for each curve that is wanted, that could not be explained.
     vain: int = 3
-    # It also ends after this many, for each curve, at which the same motion goes on: these cost little.
-    harmless: int = 10
-    # The largest number of changes that are looked into one by one.
-    one_by_one: int = 2000
+    harmless: int = 10  # It also ends after this many, for each curve, at which the same motion goes on: these cost little.
+    one_by_one: int = 2000  # The largest number of changes that are looked into one by one.
     # A change counts this many times where rest is the only motion of the neighbour: that is what a designer asks for.
     beside_rest: int = 10
 
@@ -66,7 +63,7 @@ class Borders:
 
 
 def with_borders(
-    system: System, chart: xarray.Dataset, *, curves: int = CURVES, progress: Progress = silent
+    system: System, chart: xarray.Dataset, *, curves: int = SETTINGS.curves, progress: Progress = silent
 ) -> tuple[xarray.Dataset, Borders]:
     """A chart with the stable motions that go on into a cell where no start has led to them, and the exact borders of it.
 

@@ -37,10 +37,8 @@ class CellSettings:
     # `patient_with`, they are followed for `patience` times the forcing periods.
     patience: int = 4
     patient_with: int = 3
-    # Motions below this share of the least amplitude are not followed to where they settle.
-    negligible: float = 0.5
-    # Rounds of starts from neighbours: more than the cells along a side of any chart.
-    rounds: int = 400
+    negligible: float = 0.5  # Motions below this share of the least amplitude are not followed to where they settle.
+    rounds: int = 400  # Rounds of starts from neighbours: more than the cells along a side of any chart.
 
 
 SETTINGS = CellSettings()

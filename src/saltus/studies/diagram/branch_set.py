@@ -18,12 +18,9 @@ class BranchSettings:
 
     # Along a frequency, families of longer periods are followed up to the range's upper end times this, as many of them close.
     beyond_frequency: float = 20.0
-    # Along any other parameter few of them close, and they are followed up to its upper end times this.
-    beyond: float = 1.3
-    # With this number of branches, no more are followed that are born on others.
-    branches: int = 30
-    # Branches born on one that covers less than this share of the range are not followed.
-    narrow: float = 0.02
+    beyond: float = 1.3  # Along any other parameter few of them close, and they are followed up to its upper end times this.
+    branches: int = 30  # With this number of branches, no more are followed that are born on others.
+    narrow: float = 0.02  # Branches born on one that covers less than this share of the range are not followed.
     # Branches are not followed whose first orbit is smaller than this share of their parent's largest one: near rest a branch has
     # endless special points, each of a smaller orbit than the one before.
     visible: float = 0.01

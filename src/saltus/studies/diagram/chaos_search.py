@@ -22,8 +22,7 @@ from saltus.systems import System
 class ChaosSettings:
     """How motions are judged to be chaotic, and how the edges of bands are located."""
 
-    # Forcing periods that a motion is given to come to rest or to repeat itself.
-    settling: int = 400
+    settling: int = 400  # Forcing periods that a motion is given to come to rest or to repeat itself.
     # Periods of a stretch of the exponent, instead of 12, where that leaves open whether the exponent is positive.
     longer_stretch: int = 60
     # Forcing periods for which all companions of a motion must go on without settling: long transients of chaos are none.
@@ -31,16 +30,11 @@ class ChaosSettings:
     # Companions of the motions at a value of the grid, all of which must be chaotic; at the halvings of an edge fewer do.
     companions: int = 64
     companions_at_edges: int = 12
-    # Distance between the beginnings of companions, or those from one motion would all be that motion.
-    apart: float = 1e-7
-    # Stroboscopic states that are kept of each motion.
-    kept: int = 64
-    # States of a chaotic motion from which motions at the neighbouring values are begun.
-    seeds: int = 4
-    # Halvings of the bracket of an edge.
-    halvings: int = 7
-    # The error of a step.
-    tol: float = 1e-10
+    apart: float = 1e-7  # Distance between the beginnings of companions, or those from one motion would all be that motion.
+    kept: int = 64  # Stroboscopic states that are kept of each motion.
+    seeds: int = 4  # States of a chaotic motion from which motions at the neighbouring values are begun.
+    halvings: int = 7  # Halvings of the bracket of an edge.
+    tol: float = 1e-10  # The error of a step.
 
 
 SETTINGS = ChaosSettings()

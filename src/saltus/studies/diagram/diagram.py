@@ -21,7 +21,7 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-VALUES = 25  # number of values of the parameter at which orbits are searched for, where none is given
+SEARCHED_VALUES = 25  # number of values of the parameter at which orbits are searched for, where none is given
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def response_spectrum(
 def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.ndarray:
     """The values at which orbits are searched for: those given, all within the bounds, or 25 spread evenly between them."""
     if values is None:
-        return np.linspace(*bounds, VALUES + 2)[1:-1]
+        return np.linspace(*bounds, SEARCHED_VALUES + 2)[1:-1]
     try:
         grid = np.array([float(value) for value in values])
     except (TypeError, ValueError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,9 +16,17 @@ from saltus.theory import amplitude_limits
 if TYPE_CHECKING:
     import xarray
 
-STAYS = 1e-8  # the distance within which a stable orbit must stay where it is
-STAYS_ROUNDS = 20  # the number of its periods for which it must
-INSTANTS = 64  # number of instants of a period at which an orbit that rests is compared with itself
+
+@dataclass(frozen=True)
+class ConfirmationSettings:
+    """What direct simulation must show of an orbit."""
+
+    distance: float = 1e-8  # The distance within which a stable orbit must stay where it is.
+    rounds: int = 20  # The number of its periods for which it must.
+    instants: int = 64  # The number of instants of a period at which an orbit that rests is compared with itself.
+
+
+CONFIRMATION = ConfirmationSettings()
 
 
 def diagram_tree(
@@ -72,12 +81,12 @@ def confirmed(branch: Branch) -> xarray.Dataset:
     stable = np.flatnonzero(data["stable"].values)
     kept = np.full(len(orbits), np.nan)
     if stable.size:
-        kept[stable] = _distances([orbits[i] for i in stable], STAYS_ROUNDS)
-    lost = ~(kept[stable] < STAYS)
+        kept[stable] = _distances([orbits[i] for i in stable], CONFIRMATION.rounds)
+    lost = ~(kept[stable] < CONFIRMATION.distance)
     data["stable"][stable[lost]] = 0
     data.attrs["unconfirmed"] = int(lost.sum())
     data["defect"] = ("point", _distances(orbits, 1), {"long_name": "distance after one period, by the event-driven flow"})
-    data["kept"] = ("point", kept, {"long_name": f"distance after {STAYS_ROUNDS} periods, where stable"})
+    data["kept"] = ("point", kept, {"long_name": f"distance after {CONFIRMATION.rounds} periods, where stable"})
     return data
 
 
@@ -90,7 +99,7 @@ def _distances(orbits: list[PeriodicOrbit], rounds: int) -> np.ndarray:
 def _moved(orbit: RestingOrbit, rounds: int) -> float:
     """The largest distance, at 64 instants of a period: at the release itself all orbits that rest are in the same state."""
     motion = orbit.motion((rounds + 1) * orbit.period)
-    times = motion.start + orbit.duration * (np.arange(INSTANTS) + 0.5) / INSTANTS
+    times = motion.start + orbit.duration * (np.arange(CONFIRMATION.instants) + 0.5) / CONFIRMATION.instants
     now, later = motion.at(times), motion.at(times + rounds * orbit.duration)
     return float(np.abs(np.asarray(now) - np.asarray(later)).max())
 
