@@ -5,6 +5,7 @@ import signal
 import socket
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -75,7 +76,7 @@ def test_a_chunk_that_kills_every_worker_is_told_and_the_rest_goes_on(cluster, w
 
 def test_a_scheduler_that_goes_away_is_told(waves_plan, tmp_path, monkeypatch):
     """What was written before is kept, and the sweep goes on elsewhere."""
-    monkeypatch.setattr(cluster_module, "PATIENCE", 0.5)
+    monkeypatch.setattr(cluster_module, "CLUSTER", replace(cluster_module.CLUSTER, patience=0.5))
     plan = waves_plan(arguments={"pause": 0.05})
     cluster = distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0", host="127.0.0.1"
@@ -93,7 +94,7 @@ def test_a_scheduler_that_goes_away_is_told(waves_plan, tmp_path, monkeypatch):
 
 
 def test_an_address_without_a_scheduler_is_told(waves_plan, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster_module, "PATIENCE", 0.5)
+    monkeypatch.setattr(cluster_module, "CLUSTER", replace(cluster_module.CLUSTER, patience=0.5))
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
@@ -104,7 +105,7 @@ def test_an_address_without_a_scheduler_is_told(waves_plan, tmp_path, monkeypatc
 
 
 def test_a_cluster_without_workers_is_told(waves_plan, monkeypatch):
-    monkeypatch.setattr(cluster_module, "PATIENCE", 0.5)
+    monkeypatch.setattr(cluster_module, "CLUSTER", replace(cluster_module.CLUSTER, patience=0.5))
     with (
         distributed.LocalCluster(
             n_workers=0, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0", host="127.0.0.1"

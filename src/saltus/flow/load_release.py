@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.systems import System
 
-SAMPLES = 64  # per forcing period and order of the highest harmonic: the contact acceleration has no narrower peak
+RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: the contact acceleration has no narrower peak
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def _grid(system: System) -> np.ndarray:
     period = system.load.period
     assert period is not None
     orders = [getattr(term, "order", 1) for s in system.load.channels.values() for term in getattr(s, "terms", (s,))]
-    count = SAMPLES * max(orders, default=1)
+    count = RELEASE_SAMPLES * max(orders, default=1)
     return np.arange(count) * (period / count)
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from saltus.flow.motion import Motion
 
-SAMPLES = 200  # a forcing period
+PERIOD_SAMPLES = 200  # samples of a forcing period where no times are given
 
 
 def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
@@ -52,5 +52,5 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
 
 
 def _default_times(motion: Motion, period: float | None) -> np.ndarray:
-    count = 10 * SAMPLES if period is None else int(np.ceil(SAMPLES * (motion.time - motion.start) / period))
+    count = 10 * PERIOD_SAMPLES if period is None else int(np.ceil(PERIOD_SAMPLES * (motion.time - motion.start) / period))
     return np.linspace(motion.start, motion.time, max(2, count + 1))

@@ -14,7 +14,7 @@ from saltus.flow.motion import Event, EventKind, Impacts, Samples
 from saltus.flow.request import MotionRequest
 from saltus.flow.validity import Validity, ValidityCheck
 
-MOST_STEPS = 10_000_000  # kept whole; about 2 GB
+KEPT_STEPS = 10_000_000  # largest number of steps of a motion that is kept whole; about 2 GB
 BUFFER = 4096  # steps, and events, that one call of the kernel may record
 EVENT_KINDS = (
     EventKind.IMPACT,
@@ -101,9 +101,9 @@ class Recorder:
         if self._times is None:
             self._pieces.append(piece)
             self._kept += piece.start.size
-            if self._kept > MOST_STEPS:
+            if self._kept > KEPT_STEPS:
                 raise MotionError(
-                    f"more than {MOST_STEPS} steps before time {piece.end:.6g}, too many to be kept; give samples=times to keep "
+                    f"more than {KEPT_STEPS} steps before time {piece.end:.6g}, too many to be kept; give samples=times to keep "
                     "the states at those times instead, or dense=False to keep the events alone"
                 )
             return

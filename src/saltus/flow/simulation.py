@@ -23,7 +23,7 @@ from saltus.systems import System
 
 WHAT = "following the motion"  # for the progress
 MOST_EVENTS = 20_000_000  # largest number of events that are kept
-MOST_IMPACTS = 1_000_000  # in a unit of time: more are an accumulation of impacts that is not being resolved
+IMPACT_RATE = 1_000_000  # most impacts in a unit of time: more are an accumulation that is not being resolved
 
 
 def simulate(
@@ -108,10 +108,10 @@ def _advance(system: System, run: Program, now: KernelState, recorder: Recorder,
         if status not in (Status.FULL, Status.PAUSED):
             _refuse(system, status, now)
             return status
-        if recorder.total > counted + MOST_IMPACTS:
+        if recorder.total > counted + IMPACT_RATE:
             if time < checked_at + unit:
                 raise MotionError(
-                    f"more than {MOST_IMPACTS} impacts from time {checked_at:.6g} to {time:.6g}: they accumulate too slowly "
+                    f"more than {IMPACT_RATE} impacts from time {checked_at:.6g} to {time:.6g}: they accumulate too slowly "
                     "to be followed; raise the loss at impact, or ask for a shorter time"
                 )
             checked_at, counted = time, recorder.total

@@ -10,8 +10,8 @@ import numpy as np
 from saltus.flow.dense_output import DenseOutput, evaluate
 from saltus.systems import System
 
-SAMPLES = 12  # in each step, to find changes of sign: a step is shorter than a margin's own time scale
-ITERATIONS = 8  # of Ridders' method, each of which doubles the correct digits or at least halves the bracket
+STEP_SAMPLES = 12  # in each step, to find changes of sign: a step is shorter than a margin's own time scale
+RIDDERS_ITERATIONS = 8  # of Ridders' method, each of which doubles the correct digits or at least halves the bracket
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,8 @@ class ValidityCheck:
         moving = np.flatnonzero((dense.side != 0) & (dense.length > 0))
         if not self._first or not moving.size:
             return
-        step = np.repeat(moving, SAMPLES + 1)
-        tau = (dense.length[moving, None] * np.linspace(0.0, 1.0, SAMPLES + 1)).ravel()
+        step = np.repeat(moving, STEP_SAMPLES + 1)
+        tau = (dense.length[moving, None] * np.linspace(0.0, 1.0, STEP_SAMPLES + 1)).ravel()
         for name, value in _margins(self._system, dense, tau, step, _grid(dense, moving)).items():
             first, beyond = _beyond(self._system, dense, name, value, tau, step)
             self._beyond[name] += beyond
@@ -102,7 +102,7 @@ def _sign_change(
     """Where a margin changes its sign between the samples `left` and `right`, by Ridders' method for all at once."""
     low, high, at_low, at_high = tau[left], tau[right], value[left], value[right]
     root = low
-    for _ in range(ITERATIONS):
+    for _ in range(RIDDERS_ITERATIONS):
         middle = 0.5 * (low + high)
         at_middle = _margins(system, dense, middle, step[left])[name]
         spread = np.sqrt(at_middle**2 - at_low * at_high)
@@ -119,9 +119,9 @@ def _sign_change(
 
 
 def _grid(dense: DenseOutput, moving: np.ndarray) -> list[np.ndarray]:
-    """Coordinates, velocities and accelerations at SAMPLES + 1 even times of every moving step: matrix products, for speed."""
+    """Coordinates, velocities and accelerations at even times of every moving step: matrix products, for speed."""
     coefficients, h = dense.series[moving], dense.length[moving]
-    fraction = np.linspace(0.0, 1.0, SAMPLES + 1)
+    fraction = np.linspace(0.0, 1.0, STEP_SAMPLES + 1)
     state = []
     for _ in range(3):
         powers = np.arange(coefficients.shape[2])

@@ -18,7 +18,7 @@ from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, new_fi
 from saltus.plots.marks import cell_edges
 
 COLOURS = "viridis_r"  # large amplitudes dark, beside the white of rest small ones light
-LEVELS = 12
+AMPLITUDE_LEVELS = 12  # number of steps of the colours of the amplitude
 CHAOS = "#c9c9c9"
 HATCH = "......"  # over cells with several motions
 BORDERS: dict[str, Any] = {"LP": "-", "PD": (0, (5, 1.5)), "BPC": (0, (5, 1.2, 1, 1.2)), "GR": (0, (1, 1.1))}
@@ -87,7 +87,7 @@ def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:
     if not np.isfinite(of["amplitude"]).any():
         return None
     highest = float(np.nanmax(of["amplitude"])) if top is None else top
-    levels = highest * np.linspace(0.0, 1.0, LEVELS + 1) ** 2  # finer where amplitudes are small
+    levels = highest * np.linspace(0.0, 1.0, AMPLITUDE_LEVELS + 1) ** 2  # finer where amplitudes are small
     norm = mpl.colors.BoundaryNorm(levels, 256)
     cells = ax.pcolormesh(*edges, of["amplitude"], cmap=COLOURS, norm=norm, rasterized=True, zorder=1)
     _hatch(ax, x, y, of["count"] >= 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,18 @@ from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure, styled
 from saltus.plots.response import draw_bands, draw_limits, draw_response, response_legend
 
 POINTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
-FINEST, COARSEST = 1.3, 3.5  # sizes of these points: as large as the step between values lets them be
-AT_REST = 1e-9  # a motion whose largest amplitude in any period is below this is at rest, and left out
+
+
+@dataclass(frozen=True)
+class StateSettings:
+    """Which stroboscopic states are drawn, and how large: as large as the step between values lets them be."""
+
+    finest: float = 1.3  # The least size of a point.
+    coarsest: float = 3.5  # The largest size of a point.
+    at_rest: float = 1e-9  # A motion whose largest amplitude in any period is below this is at rest, and left out.
+
+
+DRAWN_STATES = StateSettings()
 
 
 @styled
@@ -63,10 +74,10 @@ def draw_stroboscopic_states(ax: Any, tree: Any) -> None:
     section = tree["stroboscopic"]
     draw_bands(ax, tree)
     places = section["position"].values
-    moving = np.nanmax(section["peak"].values, axis=2, initial=0.0) > AT_REST
+    moving = np.nanmax(section["peak"].values, axis=2, initial=0.0) > DRAWN_STATES.at_rest
     values = np.broadcast_to(section["value"].values[:, None, None], places.shape)
     low, high = ax.get_xlim()
     width = ax.get_window_extent().width / ax.figure.dpi * 72.0  # points
-    size = np.clip(0.5 * width / max(len(section["value"]), 1), FINEST, COARSEST)
+    size = np.clip(0.5 * width / max(len(section["value"]), 1), DRAWN_STATES.finest, DRAWN_STATES.coarsest)
     ax.plot(values[moving].ravel(), places[moving].ravel(), markersize=size, **POINTS)
     ax.set_xlim(low, high)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -11,9 +12,18 @@ from saltus.plots.conventions import FAINT, SEPARATRIX_LINE, STABLE
 from saltus.plots.marks import fixed_points, limit_lines
 from saltus.plots.phase_lines import draw_arrows
 
-CORE = 0.032  # motions this close in energy to theta = 0 are left out: their impacts would fill it with ink
-EYE = 0.0012  # the same at a deformed equilibrium, where they spiral
-AWAY, BACK = 0.03, 0.004  # window widths at which a trajectory has left its start, and has come back to it
+
+@dataclass(frozen=True)
+class PortraitSettings:
+    """What of a trajectory is drawn."""
+
+    core: float = 0.032  # Motions this close in energy to theta = 0 are left out: their impacts would fill it with ink.
+    eye: float = 0.0012  # The same distance at a deformed equilibrium, around which motions spiral.
+    away: float = 0.03  # The distance, in window widths, at which a trajectory has left its start.
+    back: float = 0.004  # The distance, in window widths, at which it has come back to its start.
+
+
+PORTRAIT = PortraitSettings()
 
 
 def draw_portrait(ax: Any, data: Any, xlim: tuple[float, float], ylim: tuple[float, float], spacing: float = 0.8) -> None:
@@ -36,13 +46,13 @@ def draw_portrait(ax: Any, data: Any, xlim: tuple[float, float], ylim: tuple[flo
 
 
 def _hidden(data: Any) -> np.ndarray:
-    """The samples of decaying motions that have come closer to their attractor than CORE or EYE."""
+    """The samples of decaying motions that have come closer to their attractor than `core` or `eye`."""
     points, stable = data["equilibrium"].values, data["stable"].values.astype(bool)
     theta, energy = data["theta"].values, data["energy"].values
     hidden = np.zeros(theta.shape, dtype=bool)
     for low, high in pairwise([-np.inf, *points[~stable], np.inf]):
         for i in np.flatnonzero(stable & (points > low) & (points < high)):
-            floor = float(data["equilibrium_energy"][i]) + (EYE if points[i] else CORE)
+            floor = float(data["equilibrium_energy"][i]) + (PORTRAIT.eye if points[i] else PORTRAIT.core)
             hidden |= (theta > low) & (theta < high) & (energy < floor)
     decays = np.nanmax(energy, axis=1) - np.nanmin(energy, axis=1) > 1e-9
     return hidden & decays[:, None]
@@ -52,8 +62,8 @@ def _first_return(x: np.ndarray, y: np.ndarray) -> int:
     """The sample at which a closed trajectory, in units of the panel, is back at its start, or the last one."""
     known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     distance = np.hypot(x[known] - x[0], y[known] - y[0])
-    away = np.flatnonzero(distance > AWAY)
+    away = np.flatnonzero(distance > PORTRAIT.away)
     if away.size == 0:
         return 0
-    back = np.flatnonzero(distance[away[0] :] < BACK)
+    back = np.flatnonzero(distance[away[0] :] < PORTRAIT.back)
     return int(known[away[0] + back[0]]) if back.size else int(known[-1])

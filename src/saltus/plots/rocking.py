@@ -8,7 +8,7 @@ import numpy as np
 
 from saltus.plots.conventions import FAINT, INK, STABLE, shades
 
-SHORT, SLENDER = (0, (1, 1.3)), (0, (5, 2))
+SHORT_DASHES, SLENDER_DASHES = (0, (1, 1.3)), (0, (5, 2))
 
 
 def draw_periods(ax: Any, data: Any) -> None:
@@ -17,7 +17,7 @@ def draw_periods(ax: Any, data: Any) -> None:
         name = rf"$\alpha={np.rad2deg(float(data['alpha'][i])):.0f}^\circ$"
         ax.plot(data["share"], data["exact"][i], color=colour, lw=1.2, label=name)
         ax.plot(data["dot"], data["simulated"][i], color=colour, ls="none", marker="o", ms=3)
-    ax.plot(data["share"], data["slender"][0], color=INK, ls=SLENDER, lw=0.9, label="arccosh", zorder=1)
+    ax.plot(data["share"], data["slender"][0], color=INK, ls=SLENDER_DASHES, lw=0.9, label="arccosh", zorder=1)
     ax.set_xlim(0, 1)
     ax.set_ylim(0, 22)
     ax.set_yticks(range(0, 21, 5))
@@ -29,11 +29,11 @@ def draw_periods(ax: Any, data: Any) -> None:
 def draw_errors(ax: Any, data: Any) -> None:
     """Relative errors of both approximations."""
     for i, colour in enumerate(shades(data.sizes["alpha"])):
-        for name, dashes in (("short", SHORT), ("slender", SLENDER)):
+        for name, dashes in (("short", SHORT_DASHES), ("slender", SLENDER_DASHES)):
             error = abs(data[name][i] / data["exact"][i] - 1).values
             ax.plot(data["share"], error, color=colour, ls=dashes, lw=1.2)
-    ax.plot([], [], color=INK, ls=SHORT, label=r"$4\sqrt{2|\theta_0|/\sin\alpha}$")
-    ax.plot([], [], color=INK, ls=SLENDER, label="arccosh")
+    ax.plot([], [], color=INK, ls=SHORT_DASHES, label=r"$4\sqrt{2|\theta_0|/\sin\alpha}$")
+    ax.plot([], [], color=INK, ls=SLENDER_DASHES, label="arccosh")
     ax.set_yscale("log")
     ax.set_xlim(0, 1)
     ax.set_ylim(4e-7, 3)

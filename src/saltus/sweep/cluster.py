@@ -9,6 +9,7 @@ import contextlib
 import time
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from saltus.errors import SweepError
@@ -17,9 +18,17 @@ from saltus.sweep.chunk_results import Raised, attempt
 from saltus.sweep.interrupt import deferred_interrupts
 from saltus.sweep.plan import Plan
 
-PATIENCE = 5.0  # s, for the scheduler to answer, and for it to have a worker
-POLL = 0.01  # s, between two looks at whether a chunk has come, or an interrupt
-AHEAD = 2  # chunks for each of the cluster's threads: one in work, one waiting; more would only fill memory
+
+@dataclass(frozen=True)
+class ClusterSettings:
+    """How long a cluster is waited for, and how much it is given at once."""
+
+    patience: float = 5.0  # The time for the scheduler to answer, and again for it to have a worker, s.
+    poll: float = 0.01  # The time between two looks at whether a chunk has come, or an interrupt, s.
+    ahead: int = 2  # Chunks for each of the cluster's threads: one in work, one waiting; more would only fill memory.
+
+
+CLUSTER = ClusterSettings()
 
 
 def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[Index, Any]]:
@@ -40,7 +49,7 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
         with deferred_interrupts() as raise_if_interrupted:
             while queue or flying:
                 raise_if_interrupted()
-                while queue and len(flying) < max(AHEAD, AHEAD * sum(client.nthreads().values())):
+                while queue and len(flying) < max(CLUSTER.ahead, CLUSTER.ahead * sum(client.nthreads().values())):
                     index = queue.popleft()
                     # Not pure: Dask would keep what a failed chunk raised, and not try it again.
                     future = client.submit(attempt, plan.function, plan.arguments, plan.block(index), pure=False)
@@ -48,7 +57,7 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
                     done.add(future)
                 while not done.has_ready():
                     raise_if_interrupted()
-                    time.sleep(POLL)
+                    time.sleep(CLUSTER.poll)
                 future, result = next(done)
                 if isinstance(result, BaseException):  # the status may be that of a worker lost since, the result is not
                     raise OSError("the task was given up")
@@ -70,13 +79,13 @@ def _connect(address: str) -> Any:
     except ImportError:
         raise SweepError('a Dask cluster needs the package distributed: pip install "saltus[cluster]"') from None
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client = Client(address, timeout=CLUSTER.patience, set_as_default=False)
     except (OSError, ValueError) as error:
         raise SweepError(
             f"no Dask scheduler answers at {address} ({_first_line(error)}); is it running, and reachable?"
         ) from error
     try:
-        client.wait_for_workers(1, timeout=PATIENCE)
+        client.wait_for_workers(1, timeout=CLUSTER.patience)
     except TimeoutError:
         client.close(timeout=1)
         raise SweepError(f"the Dask scheduler at {address} has no workers; start some with `dask worker {address}`") from None

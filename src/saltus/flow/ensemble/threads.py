@@ -22,7 +22,7 @@ from saltus.taylor import CACHE_LINE, WIDTH, pointer
 
 CHUNK = 1024  # trajectories that one call of the driver runs: some milliseconds a forcing period
 WHAT = "following the motions"  # for the progress
-PATIENCE = 0.1  # seconds between looks at Ctrl-C and at the progress
+LOOK_INTERVAL = 0.1  # seconds between looks at Ctrl-C and at the progress
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Lanes:
         with ThreadPoolExecutor(threads) as pool:
             try:  # an interrupt while they are begun must stop them too, or the pool would wait for their end
                 workers = [pool.submit(self._work, jobs, ends, chunks, lock, control) for control in controls]
-                while wait(workers, PATIENCE).not_done:
+                while wait(workers, LOOK_INTERVAL).not_done:
                     if total > 0:
                         progress(min(1.0, sum(int(c[1]) for c in controls) / total), WHAT)
             except BaseException:

@@ -16,10 +16,10 @@ from saltus.plots import DOUBLE_COLUMN, chart_legend, draw_chart, draw_closed_fo
 from saltus.studies import bordered_chart
 from saltus.theory import high_frequency_onset
 
-WINDOW = ((-2.0, 2.0), (-2.0, 2.0))  # of the initial states
-LOWEST = -2.0  # V
+CHART_WINDOW = ((-2.0, 2.0), (-2.0, 2.0))  # of the initial states
+LOWEST_LOAD = -2.0  # V
 WIDEST = 0.5  # Hhat
-FAST = 2.0  # Omega from which the closed form of the onset is drawn too
+CLOSED_FORM_FROM = 2.0  # Omega from which the closed form of the onset is drawn too
 CURVES = 20  # largest number of curves on which motions end, for one chart
 
 
@@ -40,8 +40,8 @@ def panel(
 ) -> Any:
     """A `saltus.studies.bordered_chart` of the paper's system."""
     here = under_force(frequency, 0.1, beta0=beta0, damping=damping)
-    horizontal, vertical = np.linspace(0.0, widest, size), np.linspace(LOWEST, 0.0, size)
-    tree = bordered_chart(here, curves=curves, horizontal=horizontal, vertical=vertical, **({"window": WINDOW} | options))
+    horizontal, vertical = np.linspace(0.0, widest, size), np.linspace(LOWEST_LOAD, 0.0, size)
+    tree = bordered_chart(here, curves=curves, horizontal=horizontal, vertical=vertical, **({"window": CHART_WINDOW} | options))
     tree["static"].attrs |= {"what": "quasi-static borders", "saltus_version": tree["chart"].attrs["saltus_version"]}
     tree.attrs = {"system": here.to_json(), "beta0_degrees": beta0, "damping": damping, "frequency": frequency}
     return tree
@@ -79,9 +79,9 @@ def draw(data: Any, columns: int, height: float) -> Any:
 def _closed_form(ax: Any, tree: Any) -> bool:
     """Mark the onset's closed form (erratum 28) where the load is fast; returns whether it is."""
     frequency = float(tree.attrs["frequency"])
-    if frequency < FAST:
+    if frequency < CLOSED_FORM_FROM:
         return False
-    vertical = np.linspace(LOWEST, -0.1, 20)
+    vertical = np.linspace(LOWEST_LOAD, -0.1, 20)
     beta0, damping = math.radians(float(tree.attrs["beta0_degrees"])), float(tree.attrs["damping"])
     onset = [high_frequency_onset(frequency, beta0=beta0, vertical=v, damping=damping, order=2) for v in vertical]
     draw_closed_form(ax, np.array(onset), vertical)

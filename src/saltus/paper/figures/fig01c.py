@@ -14,13 +14,13 @@ from saltus.plots import SINGLE_COLUMN, draw_space, new_figure, styled
 from saltus.theory import potential_energy
 
 STARTS = [(2.3, 0.0), (-2.38, 0.0), (2.5, 0.0)]
-DURATION = 70.0
+MOTION_DURATION = 70.0
 
 
 def compute(samples: int = 1600) -> Any:
     """The data of Fig. 4c (k = 1, m = 0, C = 0.1, e = 1) from three starts, one for each attractor; energies; potential."""
     damped = constant_load(damping=0.1)
-    data = portrait(damped, STARTS, DURATION, 2.6, samples)
+    data = portrait(damped, STARTS, MOTION_DURATION, 2.6, samples)
     theta = np.linspace(-2.5, 2.5, 251)
     data = data.assign_coords(potential_theta=("potential_point", theta, {"units": "rad"}))
     data["potential"] = ("potential_point", potential_energy(damped, theta), {"units": "K2", "long_name": "potential energy"})
@@ -49,7 +49,7 @@ def measure(data: Any) -> dict[str, Measured]:
             len(reached) == 3 and bool(max(min(abs(stable - end)) for end in ends) < 0.1),
             starts=[s[0] for s in STARTS],
             ends=ends.round(3).tolist(),
-            duration=DURATION,
+            duration=MOTION_DURATION,
             circled=[len(c) for c in circled(space)],
         ),
         "fig01c-energy": measured(bool(rise < 1e-13), rise=rise, loss=np.nanmax(energy) - np.nanmin(energy)),

@@ -18,12 +18,14 @@ STARTS: dict[str, list[tuple[float, float]]] = {
     "a": [(-0.13, 0.0), (-0.42, 0.0), (0.5, 0.0), (1.0, 0.0), (1.7, 0.0), (-0.72, 0.0), (-1.1, 0.0), (-2.05, 0.0)],
     "b": [(0.25, 0.0), (0.42, 0.0), (0.62, 0.0), (-0.68, 0.0), (-1.05, 0.0), (0.84, 0.0), (1.0, 0.0), (-2.1, 0.0), (-2.25, 0.0)],
 }
-DURATION = 40.0
+MOTION_DURATION = 40.0
 
 
 def compute(samples: int = 1200) -> Any:
     """Both portraits; k = 1 for comparison of its separatrix."""
-    groups = {name: portrait(constant_load(stiffness=k), STARTS[name], DURATION, 4.0, samples) for name, k in STIFFNESS.items()}
+    groups = {
+        name: portrait(constant_load(stiffness=k), STARTS[name], MOTION_DURATION, 4.0, samples) for name, k in STIFFNESS.items()
+    }
     groups["symmetric"] = portrait(constant_load(), [(0.3, 0.0)], 1.0, 4.0, 10)
     return tree(groups, what="phase portraits of non-symmetric conservative systems, V = -1.5 / sin(beta0)", tol=TOLERANCE)
 

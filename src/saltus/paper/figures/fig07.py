@@ -14,16 +14,16 @@ from saltus.plots import DOUBLE_COLUMN, draw_family, new_figure, panel_label, st
 from saltus.systems import Load, Metainterface, System
 from saltus.theory import peaks, reciprocal
 
-ANGLES = (2.0, 4.0, 6.0, 8.0, 10.0)  # degrees
+LOAD_ANGLES = (2.0, 4.0, 6.0, 8.0, 10.0)  # degrees
 LOADS = (0.0, 0.25, 0.5, 0.75, 1.0)
-LARGEST = 1e3
+STIFFEST = 1e3  # k
 
 
 def compute(samples: int = 49) -> Any:
     """P_R over k for both panels, and at four values of k from the simulated motion; theta0 < 0, so the upper layer starts."""
-    stiffness = np.geomspace(1.0, LARGEST, samples)
+    stiffness = np.geomspace(1.0, STIFFEST, samples)
     groups = {
-        "a": _panel(stiffness, [(-0.5, -np.deg2rad(angle)) for angle in ANGLES]),
+        "a": _panel(stiffness, [(-0.5, -np.deg2rad(angle)) for angle in LOAD_ANGLES]),
         "b": _panel(stiffness, [(-load, -np.deg2rad(5.0)) for load in LOADS]),
         "balance": _balance(),
     }
@@ -45,7 +45,7 @@ def simulated_peak(system: Any, theta0: float) -> float:
 
 def _panel(stiffness: np.ndarray, curves: list[tuple[float, float]]) -> Any:
     ratio = np.array([[peaks(system(k, v), start).ratio for k in stiffness] for v, start in curves])
-    dots = np.array([1.0, 10.0, 100.0, LARGEST])
+    dots = np.array([1.0, 10.0, 100.0, STIFFEST])
     simulated = np.empty((len(curves), dots.size))
     for i, (vertical, start) in enumerate(curves):
         for j, k in enumerate(dots):
@@ -123,9 +123,9 @@ def measure(data: Any) -> dict[str, Measured]:
         ),
         "fig07-unloaded": measured(float(np.abs(unloaded - unloaded["stiffness_ratio"] ** -0.5).max())),
         "fig07-simulated": measured(deviation, motions=sum(data[p]["simulated"].size for p in "ab")),
-        "fig07-monotonic": measured(falls, curves=data["a"].sizes["curve"] + data["b"].sizes["curve"], largest_k=LARGEST),
+        "fig07-monotonic": measured(falls, curves=data["a"].sizes["curve"] + data["b"].sizes["curve"], largest_k=STIFFEST),
         "fig07-limit": measured(
-            bool(last * np.sqrt(LARGEST) < 3), largest=last, largest_k=LARGEST, scaled=last * np.sqrt(LARGEST)
+            bool(last * np.sqrt(STIFFEST) < 3), largest=last, largest_k=STIFFEST, scaled=last * np.sqrt(STIFFEST)
         ),
         "reciprocity": measured(min(here, 1 / here) - min(twin, 1 / twin)),
     }

@@ -25,7 +25,7 @@ from saltus.plots import (
 )
 
 AMPLITUDES = {"a": 0.2, "b": 0.5, "c": 1.0, "d": 1.5, "e": 2.0, "f": 3.0}  # Hhat
-FREQUENCIES = (0.1, 3.0)
+FREQUENCY_RANGE = (0.1, 3.0)
 ZOOMED = {"a": (0.1, 0.46), "b": (0.1, 0.34)}  # Omega of the superharmonic resonances
 
 
@@ -35,7 +35,7 @@ def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any
 
 
 def _panel(amplitude: float, **options: Any) -> Any:
-    return spectrum(under_force(amplitude=amplitude), FREQUENCIES, **options)
+    return spectrum(under_force(amplitude=amplitude), FREQUENCY_RANGE, **options)
 
 
 @styled

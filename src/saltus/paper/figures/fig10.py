@@ -17,7 +17,7 @@ from saltus.paper.measures.spectrum_features import main_branch
 from saltus.plots import DOUBLE_COLUMN, draw_zoom, highest, new_figure, response_legend, styled
 
 AMPLITUDES = {"a": 0.25, "b": 0.5}  # zetahat
-FREQUENCIES = (0.1, 4.0)  # Omega: up to chaos
+FREQUENCY_RANGE = (0.1, 4.0)  # Omega: up to chaos
 
 
 def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any:
@@ -26,7 +26,7 @@ def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any
 
 
 def _panel(amplitude: float, **options: Any) -> Any:
-    return spectrum(on_ground(amplitude=amplitude), FREQUENCIES, **options)
+    return spectrum(on_ground(amplitude=amplitude), FREQUENCY_RANGE, **options)
 
 
 @styled

@@ -11,12 +11,12 @@ from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import scalar_dataset, scalars
 from saltus.systems import PhysicalCell, UnitCell
 
-CELLS = ((0.5, 1.2), (0.8, 1.4), (1.1, 0.9), (0.6, 1.9))  # alpha0, beta0, rad
+UNIT_CELLS = ((0.5, 1.2), (0.8, 1.4), (1.1, 0.9), (0.6, 1.9))  # alpha0, beta0, rad
 
 
 def compute() -> Any:
     """Largest residuals over several cells and openings."""
-    rows = [_cell(*angles) for angles in CELLS]
+    rows = [_cell(*angles) for angles in UNIT_CELLS]
     worst = {name: max(row[name] for row in rows) for name in rows[0]}
     values = {**worst, **_limits(), **_dimensions()}
     return scalar_dataset(values, what="residuals of the kinematics")
@@ -115,4 +115,4 @@ def measure(data: Any) -> dict[str, Measured]:
         "damping-dimension": measured(r["damping_printed_ratio"] - 1, r["damping_ratio"] - 1),
         "time-scale": measured(r["tau_printed"] - r["tau_of_frequency"], r["tau_corrected"] - r["tau_of_frequency"]),
     }
-    return with_fields(r | {"cells": len(CELLS)}, found)
+    return with_fields(r | {"cells": len(UNIT_CELLS)}, found)
