@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, overload
 
 import numpy as np
@@ -14,8 +15,6 @@ from saltus.flow.motion import Event, EventKind, Impacts, Samples
 from saltus.flow.request import MotionRequest
 from saltus.flow.validity import Validity, ValidityCheck
 
-KEPT_STEPS = 10_000_000  # largest number of steps of a motion that is kept whole; about 2 GB
-BUFFER = 4096  # steps, and events, that one call of the kernel may record
 EVENT_KINDS = (
     EventKind.IMPACT,
     EventKind.GRAZING,
@@ -24,6 +23,19 @@ EVENT_KINDS = (
     EventKind.CHATTER,
     EventKind.LIMIT,
 )  # in the order of the kernel's numbers
+
+
+@dataclass(frozen=True)
+class RecorderSettings:
+    """How much of a motion is kept."""
+
+    steps: int = 10_000_000  # The largest number of steps of a motion that is kept whole; they take about 2 GB.
+    events: int = 20_000_000  # The largest number of events that are kept.
+    rate: int = 1_000_000  # The most impacts in a unit of time: more are an accumulation that is not being resolved.
+    buffer: int = 4096  # The steps, and events, that one call of the kernel may record.
+
+
+MOST = RecorderSettings()
 
 
 class MotionEvents(Sequence[Event]):
@@ -76,9 +88,9 @@ class Recorder:
 
     def __init__(self, request: MotionRequest, order: int, columns: int) -> None:
         kept = request.dense or request.sample_times is not None
-        dof, size = len(request.system.model.coordinates), BUFFER if kept else 8
+        dof, size = len(request.system.model.coordinates), MOST.buffer if kept else 8
         self.steps = (np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
-        self.events = (np.empty((BUFFER, 4), dtype=np.int64), np.empty((BUFFER, 3 + columns)))
+        self.events = (np.empty((MOST.buffer, 4), dtype=np.int64), np.empty((MOST.buffer, 3 + columns)))
         self.total = 0  # events so far
         self._kept = 0  # steps so far
         self._length, self._times = float(request.clock.length), request.sample_times
@@ -101,9 +113,9 @@ class Recorder:
         if self._times is None:
             self._pieces.append(piece)
             self._kept += piece.start.size
-            if self._kept > KEPT_STEPS:
+            if self._kept > MOST.steps:
                 raise MotionError(
-                    f"more than {KEPT_STEPS} steps before time {piece.end:.6g}, too many to be kept; give samples=times to keep "
+                    f"more than {MOST.steps} steps before time {piece.end:.6g}, too many to be kept; give samples=times to keep "
                     "the states at those times instead, or dense=False to keep the events alone"
                 )
             return

@@ -14,7 +14,7 @@ from saltus.flow.kernel_layout import Mode, Setting, Status, Where
 from saltus.flow.kernel_state import KernelState
 from saltus.flow.memory_layout import State
 from saltus.flow.motion import Motion
-from saltus.flow.recorder import Recorder
+from saltus.flow.recorder import MOST, Recorder
 from saltus.flow.request import MotionRequest
 from saltus.flow.stops import Stop
 from saltus.flow.structures import Program, program
@@ -22,8 +22,6 @@ from saltus.progress import Progress, silent
 from saltus.systems import System
 
 WHAT = "following the motion"  # for the progress
-MOST_EVENTS = 20_000_000  # largest number of events that are kept
-IMPACT_RATE = 1_000_000  # most impacts in a unit of time: more are an accumulation that is not being resolved
 
 
 def simulate(
@@ -108,16 +106,16 @@ def _advance(system: System, run: Program, now: KernelState, recorder: Recorder,
         if status not in (Status.FULL, Status.PAUSED):
             _refuse(system, status, now)
             return status
-        if recorder.total > counted + IMPACT_RATE:
+        if recorder.total > counted + MOST.rate:
             if time < checked_at + unit:
                 raise MotionError(
-                    f"more than {IMPACT_RATE} impacts from time {checked_at:.6g} to {time:.6g}: they accumulate too slowly "
+                    f"more than {MOST.rate} impacts from time {checked_at:.6g} to {time:.6g}: they accumulate too slowly "
                     "to be followed; raise the loss at impact, or ask for a shorter time"
                 )
             checked_at, counted = time, recorder.total
-        if recorder.total > MOST_EVENTS:
+        if recorder.total > MOST.events:
             raise MotionError(
-                f"more than {MOST_EVENTS} impacts before time {time:.6g}, too many to be kept; ask for a shorter time, or use "
+                f"more than {MOST.events} impacts before time {time:.6g}, too many to be kept; ask for a shorter time, or use "
                 "simulate_many, which only counts them"
             )
 

@@ -24,21 +24,17 @@ Run = Continuation
 class BranchLimits:
     """Where a branch is given up, and how its events are told from rounding."""
 
-    # Orbits with more impacts in a period than this are not followed.
-    most_impacts: int = 120
+    most_impacts: int = 120  # Orbits with more impacts in a period than this are not followed.
     # Grazings are taken to accumulate when this many in a row have each added impacts, and one of the next two conditions holds.
     accumulating: int = 5
-    # Either all of them lie within this share of the parameter's range,
-    accumulation_width: float = 1e-3
+    accumulation_width: float = 1e-3  # Either all of them lie within this share of the parameter's range,
     # or the amplitude has shrunk below this share of the largest one, with more impacts than `shrunk_impacts`.
     shrunk: float = 1e-2
     shrunk_impacts: int = 60
     # With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved for.
     steepest: float = 1e8
-    # An orbit of an amplitude below this has shrunk to rest.
-    smallest: float = 1e-7
-    # A fold and a crossing of branches whose parameters differ by less than this are one point.
-    same_fold: float = 1e-8
+    smallest: float = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
+    same_fold: float = 1e-8  # A fold and a crossing of branches whose parameters differ by less than this are one point.
     # Distances to both sides along a parent's branch, tried in turn until its special point lies between the two ends.
     reaches: tuple[float, ...] = tuple(10.0 ** np.arange(-8, -0.9))
 

@@ -15,7 +15,7 @@ from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import Agreement, Claim, tally, to_markdown
 from saltus.paper.figures.figure import PaperFigure
 
-KINDS = {Agreement.AGREES: "agrees", Agreement.ERRATUM: "erratum", Agreement.DISAGREES: "disagrees"}
+STYLE_CLASSES = {Agreement.AGREES: "agrees", Agreement.ERRATUM: "erratum", Agreement.DISAGREES: "disagrees"}
 
 
 def compute_claims(figure: PaperFigure, folder: Path) -> list[Claim]:
@@ -87,7 +87,7 @@ def _section(figure: PaperFigure, claims: list[Claim], folder: Path) -> Iterator
 def _row(claim: Claim) -> str:
     cells = (claim.statement, claim.where, claim.paper, claim.value)
     row = "".join(f"<td>{html.escape(cell)}</td>" for cell in cells)
-    verdict = f'<td class="{KINDS[claim.verdict]}">{claim.verdict_text}</td>'
+    verdict = f'<td class="{STYLE_CLASSES[claim.verdict]}">{claim.verdict_text}</td>'
     return f'<tr id="{claim.id}">{row}{verdict}<td>{html.escape(claim.evidence)}</td></tr>'
 
 

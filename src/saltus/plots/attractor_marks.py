@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from saltus.plots.conventions import INK, shades
 
-UNDECIDED = "#ffffff"
+UNDECIDED_COLOUR = "#ffffff"
 AT_REST = "#dddddd"  # lighter than every colour of a moving attractor
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
 MARK: dict[str, Any] = {"linestyle": "none", "markersize": 4.5, "markerfacecolor": "white", "markeredgecolor": INK, "zorder": 6}
@@ -45,7 +45,7 @@ def attractor_legend(
         text = f"{number}: {_kind(dataset, i)}{share(i)}"
         handles.append(_handle(MARKERS[i % len(MARKERS)], colour, text))
     if undecided is not None:
-        handles.append(_handle(undecided[0], UNDECIDED, f"undecided, {undecided[1]}"))
+        handles.append(_handle(undecided[0], UNDECIDED_COLOUR, f"undecided, {undecided[1]}"))
     figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.2, handletextpad=0.4)
 
 

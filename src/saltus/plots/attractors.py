@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patheffects import Normal, Stroke
 
-from saltus.plots.attractor_marks import UNDECIDED, attractor_colours, attractor_legend, draw_points, steady
+from saltus.plots.attractor_marks import UNDECIDED_COLOUR, attractor_colours, attractor_legend, draw_points, steady
 from saltus.plots.axis_names import symbol, unit_in_brackets
 from saltus.plots.conventions import INK, SINGLE_COLUMN, new_figure, styled
 
-START: dict[str, Any] = {
+START_MARK: dict[str, Any] = {
     "linestyle": "none",
     "marker": "o",
     "markersize": 2.6,
@@ -31,9 +31,9 @@ def draw_attractors(dataset: Any, width: float = 1.3 * SINGLE_COLUMN) -> Figure:
     figure = new_figure(width, 0.82 * width + 4.2 * (len(colours) + 1) // 2)
     ax = figure.subplots()
     ends = dataset["end"].values
-    for n, colour in {**colours, -1: UNDECIDED}.items():
+    for n, colour in {**colours, -1: UNDECIDED_COLOUR}.items():
         here = ends == n
-        ax.plot(dataset[f"start_{name}"].values[here], dataset["start_velocity"].values[here], color=colour, **START)
+        ax.plot(dataset[f"start_{name}"].values[here], dataset["start_velocity"].values[here], color=colour, **START_MARK)
     for i, colour in enumerate(colours.values()):
         draw_points(ax, dataset, name, i, markerfacecolor=colour, path_effects=HALO)
     when = "" if steady(dataset) else " at phase 0"

@@ -10,7 +10,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patheffects import Normal, Stroke
 
-from saltus.plots.attractor_marks import MOST_NAMED, UNDECIDED, attractor_colours, attractor_legend, draw_points, steady
+from saltus.plots.attractor_marks import MOST_NAMED, UNDECIDED_COLOUR, attractor_colours, attractor_legend, draw_points, steady
 from saltus.plots.axis_names import symbol, unit_in_brackets
 from saltus.plots.conventions import INK, SINGLE_COLUMN, new_figure, styled
 from saltus.plots.marks import cell_edges
@@ -57,7 +57,7 @@ def _paint(ax: Any, dataset: Any, name: str, colours: dict[int, Any]) -> None:
     cells = np.zeros(label.shape, dtype=int)
     for i, number in enumerate(colours):
         cells[label == number] = i + 1
-    palette = ListedColormap([UNDECIDED, *colours.values()])
+    palette = ListedColormap([UNDECIDED_COLOUR, *colours.values()])
     limits = np.arange(len(colours) + 2) - 0.5
     ax.pcolormesh(*edges, cells, cmap=palette, norm=BoundaryNorm(limits, palette.N), rasterized=True, zorder=1)
     ax.set_xlim(edges[0][[0, -1]])

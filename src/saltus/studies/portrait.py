@@ -32,7 +32,7 @@ class StartSettings:
     beside: tuple[float, ...] = (0.35, 0.75)  # From beside each stable equilibrium, at these shares of the way to the next one.
 
 
-STARTS = StartSettings()
+PORTRAIT_STARTS = StartSettings()
 
 
 def _check(
@@ -96,15 +96,15 @@ def phase_portrait(
 
 def _spread(system: System, window: Rectangle, points: tuple[Equilibrium, ...], seed: int) -> np.ndarray:
     """States (n, 2) beside the stable equilibria, and spread evenly over the part of the window in which the system can be."""
-    area, shifts = check_window(window, system), np.arange(1, STARTS.tried * STARTS.spread + 1)[:, None] * EVEN
+    area, shifts = check_window(window, system), np.arange(1, PORTRAIT_STARTS.tried * PORTRAIT_STARTS.spread + 1)[:, None] * EVEN
     states = area.centre + area.half * (2.0 * ((np.random.default_rng(seed).random(2) + shifts) % 1.0) - 1.0)
-    states = states[_possible(system, states[:, 0])][: STARTS.spread]
+    states = states[_possible(system, states[:, 0])][: PORTRAIT_STARTS.spread]
     if not len(states):
         raise ParameterError(
             f"window must reach to where the system can be, got {window!r}: all of it is beyond the contact", "window"
         )
     ends = [*(point.place for point in points), *area.coordinate]
-    near = [(_beside(point.place, ends, share), 0.0) for point in points if point.stable for share in STARTS.beside]
+    near = [(_beside(point.place, ends, share), 0.0) for point in points if point.stable for share in PORTRAIT_STARTS.beside]
     return np.concatenate([np.array(near).reshape(-1, 2), states])
 
 

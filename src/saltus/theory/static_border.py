@@ -14,7 +14,7 @@ from saltus.theory.quasi_static import critical_horizontal, fold_horizontal, sub
 if TYPE_CHECKING:
     import xarray
 
-PLANE = ("load.horizontal.amplitude", "load.vertical")  # the two parameters in whose plane the closed forms hold
+LOAD_PLANE = ("load.horizontal.amplitude", "load.vertical")  # the two parameters in whose plane the closed forms hold
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ def quasi_static_border(system: System, plane: tuple[str, ...], lowest: float) -
     the plane of Hhat and V.
     """
     model, channels = system.model, system.load.channels
-    if tuple(plane) != PLANE or not isinstance(model, Metainterface):
+    if tuple(plane) != LOAD_PLANE or not isinstance(model, Metainterface):
         return None
     horizontal = channels.get("horizontal")
     known = (

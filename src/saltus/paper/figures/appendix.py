@@ -21,7 +21,7 @@ from saltus.theory import (
 )
 
 SLENDERNESS_ANGLES = (5.0, 20.0, 45.0)  # alpha, degrees
-DOTS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.85, 0.95)  # theta0 / alpha of the simulated motions
+DOT_ANGLES = (0.02, 0.1, 0.3, 0.5, 0.7, 0.85, 0.95)  # theta0 / alpha of the simulated motions
 JUMP = {"alpha": 20.0, "e": 0.8}
 
 
@@ -35,9 +35,9 @@ def _periods(samples: int) -> Any:
     share = np.concatenate([np.geomspace(1e-3, 0.05, samples // 4), np.linspace(0.05, 0.995, samples)[1:]])
     forms = (rocking_period, short_rocking_period, slender_rocking_period)
     curves = [np.array([form(share * a, alpha=a) for a in np.deg2rad(SLENDERNESS_ANGLES)]) for form in forms]
-    simulated = np.empty((len(SLENDERNESS_ANGLES), len(DOTS)))
+    simulated = np.empty((len(SLENDERNESS_ANGLES), len(DOT_ANGLES)))
     for i, alpha in enumerate(np.deg2rad(SLENDERNESS_ANGLES)):
-        for j, dot in enumerate(DOTS):
+        for j, dot in enumerate(DOT_ANGLES):
             expected = float(rocking_period(dot * alpha, alpha=alpha))
             motion = simulate(block(float(alpha)), theta=float(dot * alpha), velocity=0.0, duration=1.6 * expected, tol=TOLERANCE)
             simulated[i, j] = motion.impacts.time[2] - motion.impacts.time[0]
@@ -51,7 +51,7 @@ def _periods(samples: int) -> Any:
         {
             "alpha": ("alpha", np.deg2rad(SLENDERNESS_ANGLES), "rad", "slenderness angle"),
             "share": ("share", share, "1", "theta0 / alpha"),
-            "dot": ("dot", np.array(DOTS), "1", "theta0 / alpha of the motions"),
+            "dot": ("dot", np.array(DOT_ANGLES), "1", "theta0 / alpha of the motions"),
         },
         what="period of free rocking",
     )

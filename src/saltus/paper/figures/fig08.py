@@ -22,7 +22,7 @@ from saltus.theory import (
     unloaded_fold,
 )
 
-SEGMENTS = ((0.05, -0.5, 0.0), (0.2, -0.7, 0.0), (0.16, -1.2, 0.0))  # Hhat, Vbar, Vhat of load (i)
+LOAD_SEGMENTS = ((0.05, -0.5, 0.0), (0.2, -0.7, 0.0), (0.16, -1.2, 0.0))  # Hhat, Vbar, Vhat of load (i)
 ELLIPSES = ((0.05, -0.5, 0.25), (0.2, -0.5, 0.25))  # of load (iii)
 LOWEST = -1.6
 
@@ -31,7 +31,7 @@ def compute(beta0: float = 80.0) -> Any:
     """Both borders, the paths, and the counts of equilibria that prove which border is the true one; `beta0` in degrees."""
     groups = {
         "borders": _borders(np.deg2rad(beta0)),
-        "i": _paths(np.deg2rad(beta0), SEGMENTS, "load (i), `loadpatha`"),
+        "i": _paths(np.deg2rad(beta0), LOAD_SEGMENTS, "load (i), `loadpatha`"),
         "iii": _paths(np.deg2rad(beta0), ELLIPSES, "load (iii), `loadpathb`"),
         "numbers": _numbers(),
     }

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.studies.chart.changes import Changes, ChartMotions
-from saltus.studies.chart.motions import TOLERANCES
+from saltus.studies.chart.motions import ALIKE
 
 if TYPE_CHECKING:
     import xarray
@@ -65,7 +65,7 @@ def explained(chart: ChartMotions, changes: Changes, curves: Sequence[xarray.Dat
 
 def _is_similar(amplitudes: np.ndarray, amplitude: float) -> np.ndarray:
     """Whether motions may end in an orbit of this amplitude."""
-    return np.asarray(np.abs(amplitudes - amplitude) <= TOLERANCES.curve * np.maximum(amplitudes, amplitude))
+    return np.asarray(np.abs(amplitudes - amplitude) <= ALIKE.curve * np.maximum(amplitudes, amplitude))
 
 
 def passes_through(chart: ChartMotions, curve: xarray.Dataset, spot: Sequence[float]) -> bool:
@@ -91,7 +91,7 @@ def unseen_folds(chart: ChartMotions, curves: Sequence[xarray.Dataset]) -> np.nd
     period = np.array([int(curve.attrs["period"]) for curve in curves], dtype=int)[number]
     place = chart.place
     for i, (*spot, amplitude) in enumerate(points):
-        if curves[number[i]].attrs["kind"] != "LP" or amplitude < (1 + TOLERANCES.curve) * chart.least:
+        if curves[number[i]].attrs["kind"] != "LP" or amplitude < (1 + ALIKE.curve) * chart.least:
             continue
         here = (np.abs(place - spot) < 1 + ON_LINE).all(axis=1) & (chart.motions["period"] == period[i])
         strip = (number != number[i]) & (np.abs(points[:, :2] - spot) < 1 + ON_LINE).all(axis=1)

@@ -16,7 +16,7 @@ import numpy as np
 from saltus.checks import Window
 from saltus.flow import find_recurrence
 from saltus.orbits import initial_states
-from saltus.studies.chart.motions import MOTION, SIDES, TOLERANCES, distinct, has_alike, is_alike, motions_in, table
+from saltus.studies.chart.motions import ALIKE, MOTION, SIDES, distinct, has_alike, is_alike, motions_in, table
 from saltus.studies.chart.request import ChartRequest
 from saltus.systems import System
 from saltus.theory import amplitude_limits
@@ -91,7 +91,7 @@ def stable_motions(request: ChartRequest) -> tuple[CellOutcomes, np.ndarray]:
         if not len(cell):
             break
         further = settle(request, cell, states, known).motions
-        new = further[~has_alike(known, further["cell"], further, TOLERANCES.same)]
+        new = further[~has_alike(known, further["cell"], further, ALIKE.same)]
         known = distinct(np.concatenate([known, new]))
     return settled, known
 
@@ -178,7 +178,7 @@ def joined(motions: np.ndarray) -> np.ndarray:
 
 def _is_near(one: np.ndarray, other: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
     """Whether states at the same phase are so near to one another that the motions end as one."""
-    return np.asarray(np.abs(one - other).max(axis=1) <= TOLERANCES.joined * amplitude)
+    return np.asarray(np.abs(one - other).max(axis=1) <= ALIKE.joined * amplitude)
 
 
 def _arrived(motions: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -200,7 +200,7 @@ def seeds(motions: np.ndarray, known: np.ndarray, shape: tuple[int, int]) -> tup
     for side in np.array(SIDES):
         ahead, behind = (((place + step >= 0) & (place + step < shape)).all(axis=1) for step in (side, -side))
         step, source = side @ [shape[1], 1], motions[ahead]
-        new = ~has_alike(known, source["cell"] + step, source, TOLERANCES.alike)
+        new = ~has_alike(known, source["cell"] + step, source, ALIKE.alike)
         source, behind = source[new], behind[ahead][new]
         found.append((source["cell"] + step, _heading(source, known, np.where(behind, source["cell"] - step, -1))))
     return np.concatenate([cell for cell, _ in found]), np.concatenate([states for _, states in found])
@@ -211,8 +211,8 @@ def _heading(motions: np.ndarray, known: np.ndarray, behind: np.ndarray) -> np.n
     ahead = motions["state"].copy()
     for there, index in motions_in(known, behind):
         other = known[index]
-        like = there & is_alike(other, motions, TOLERANCES.alike)
+        like = there & is_alike(other, motions, ALIKE.alike)
         step = motions["state"] - other["state"]
-        like &= np.abs(step).max(axis=1) <= TOLERANCES.alike * motions["amplitude"]  # also at the same phase of several periods
+        like &= np.abs(step).max(axis=1) <= ALIKE.alike * motions["amplitude"]  # also at the same phase of several periods
         ahead[like] = motions["state"][like] + step[like]
     return ahead

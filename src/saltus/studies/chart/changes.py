@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from saltus.studies.chart.motions import SIDES, TOLERANCES, motions_in, read_motions
+from saltus.studies.chart.motions import ALIKE, SIDES, motions_in, read_motions
 
 if TYPE_CHECKING:
     import xarray
@@ -83,10 +83,10 @@ def _counterparts(motions: np.ndarray, shape: tuple[int, ...], side: tuple[int, 
     inside = ((there >= 0) & (there < shape)).all(axis=1)
     target = np.where(inside, there @ [shape[1], 1], -1)
     amplitude, pairs, lonely = motions["amplitude"], [np.empty((0, 2), dtype=int)], inside.copy()
-    symmetric = np.abs(amplitude - motions["other"]) < TOLERANCES.symmetric * amplitude
+    symmetric = np.abs(amplitude - motions["other"]) < ALIKE.symmetric * amplitude
     for counts, other in motions_in(motions, target):
         size = np.maximum(amplitude[other], amplitude)
-        like = counts & (np.abs(amplitude[other] - amplitude) <= TOLERANCES.family * size)
+        like = counts & (np.abs(amplitude[other] - amplitude) <= ALIKE.family * size)
         like &= (motions["period"][other] == motions["period"]) & (symmetric[other] == symmetric)
         pairs.append(np.stack([np.flatnonzero(like), other[like]], axis=1))
         lonely &= ~like

@@ -12,7 +12,7 @@ import numpy as np
 from saltus.errors import MotionError, ParameterError
 from saltus.orbits import Branch, PeriodicOrbit, SpecialPoint, find_orbit, follow_stable
 from saltus.studies.chart.changes import Changes, ChartMotions
-from saltus.studies.chart.motions import TOLERANCES
+from saltus.studies.chart.motions import ALIKE
 from saltus.systems import System
 
 STABILITY_ENDS = ("LP", "PD", "BPC", "GR", "RL", "CH")  # kinds of special points; the last two are of orbits that rest
@@ -88,7 +88,7 @@ class Follower:
     def _has(self, cell: np.ndarray, orbit: PeriodicOrbit) -> bool:
         """Whether a cell has a motion of the size of an orbit."""
         there = self._chart.motions["amplitude"][(self._chart.place == cell).all(axis=1)]
-        return bool(np.abs(there - orbit.amplitude).min(initial=np.inf) < TOLERANCES.followed * orbit.amplitude)
+        return bool(np.abs(there - orbit.amplitude).min(initial=np.inf) < ALIKE.followed * orbit.amplitude)
 
     def _values(self, cell: np.ndarray) -> tuple[float, float]:
         """The two parameters in the middle of a cell: along the horizontal axis, along the vertical one."""

@@ -39,7 +39,7 @@ class MotionTolerances:
     followed: float = 1e-3  # The orbit followed into a cell is the motion there if their amplitudes are so near.
 
 
-TOLERANCES = MotionTolerances()
+ALIKE = MotionTolerances()
 
 
 def motions_in(motions: np.ndarray, cell: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -50,7 +50,7 @@ def motions_in(motions: np.ndarray, cell: np.ndarray) -> Iterator[tuple[np.ndarr
         yield there, np.where(there, first + step, 0)
 
 
-def is_same(one: np.ndarray, other: np.ndarray, tolerance: float = TOLERANCES.same) -> np.ndarray:
+def is_same(one: np.ndarray, other: np.ndarray, tolerance: float = ALIKE.same) -> np.ndarray:
     """Whether motions have the same period and the same extrema, so that they are one or mirror images."""
     same = one["period"] == other["period"]
     for name in ("amplitude", "other"):
