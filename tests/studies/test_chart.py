@@ -14,7 +14,7 @@ from saltus.studies import stability_chart
 from saltus.studies.chart.cells import beyond_limits, joined, seeds, starts
 from saltus.studies.chart.changes import monostable
 from saltus.studies.chart.motions import MOTION, distinct, has_alike
-from saltus.systems import Harmonic, Load, TwoLayer
+from saltus.systems import Harmonic, Load, Metainterface, System, TwoLayer, VelocityReduction
 from saltus.theory import equilibria, unloaded_fold
 
 H, V = "load.horizontal.amplitude", "load.vertical"
@@ -88,6 +88,18 @@ def test_motions_are_followed_from_cell_to_cell_where_nothing_else_leads_to_them
     assert sum(alone) == 0
     together = stability_chart(forced(1.0), horizontal=horizontal, **options)
     assert ((together["count"].values[0] > 0) == (horizontal > ONSET)).all()
+
+
+def test_a_motion_that_rests_for_a_part_of_each_period_is_a_motion():
+    """At phase 0 it is held at the contact, but the load pulls it off again: it is no capture."""
+    load = Load(frequency=0.1, horizontal=Harmonic(0.24), vertical=-0.8)
+    system = System(model=Metainterface(beta0=np.radians(80.0), damping=0.5), load=load, impact=VelocityReduction(0.3))
+    orbit = find_orbit(system, theta=0.5)
+    assert orbit.rest_share > 0.2
+    chart = stability_chart(system, horizontal=[0.24], vertical=[-0.8], starts=4)
+    assert not chart["rest"].any()
+    assert (int(chart["count"][0, 0]), int(chart["period"][0, 0])) == (1, 1)
+    assert float(chart["amplitude"][0, 0]) == pytest.approx(orbit.amplitude, rel=1e-8)
 
 
 def test_smaller_motions_than_asked_for_do_not_count():
