@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class EventKind(StrEnum):
-    """What happens at an instant of a motion."""
+    """What happens at an instant of a motion, in the order of the kernel's numbers."""
 
     IMPACT = "impact"  # an impact: the gap closes with a speed
     GRAZING = "grazing"  # the gap touches zero without a speed, to within the working precision

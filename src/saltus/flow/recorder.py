@@ -15,14 +15,7 @@ from saltus.flow.motion import Event, EventKind, Impacts, Samples
 from saltus.flow.request import MotionRequest
 from saltus.flow.validity import Validity, ValidityCheck
 
-EVENT_KINDS = (
-    EventKind.IMPACT,
-    EventKind.GRAZING,
-    EventKind.REST,
-    EventKind.RELEASE,
-    EventKind.CHATTER,
-    EventKind.LIMIT,
-)  # in the order of the kernel's numbers
+EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
 
 
 @dataclass(frozen=True)
