@@ -19,7 +19,7 @@ SYSTEM = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency
 STEADY = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=1.0, horizontal=0.1, vertical=-0.5))
 TIMELESS = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(horizontal=0.1, vertical=-0.5))
 ANGLES = np.linspace(-0.5, 0.5, 5)
-FEW = settings(max_examples=60, deadline=None, derandomize=True)
+FEW = settings(max_examples=60, deadline=None)
 
 
 def run(system=SYSTEM, **arguments):
@@ -337,7 +337,7 @@ junk = st.one_of(
 )
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150, deadline=None)
 @given(
     st.sampled_from(
         ["theta", "velocity", "time", "parameters", "tol", "side", "sample", "last", "until", "sensitivities", "threads"]

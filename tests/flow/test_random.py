@@ -142,7 +142,7 @@ def decades(low, high):
     return st.one_of(st.just(0.0), st.floats(low, high).map(lambda x: 10.0**x), st.floats(low, high).map(lambda x: -(10.0**x)))
 
 
-@settings(max_examples=300, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     beta0=st.floats(0.05, math.pi - 0.05),
     e=st.sampled_from([0.0, 1e-9, 0.3, 0.8, 0.99, 1.0]),

@@ -91,7 +91,7 @@ def test_force_record_is_exact_at_any_time_between():
     st.floats(0.1, 20.0),
     st.integers(0, 2**32 - 1),
 )
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None)
 def test_random_force_records_are_exact(gaps, start, duration, seed):
     times = np.concatenate([[0.3], 0.3 + np.cumsum(gaps)])
     values = np.random.default_rng(seed).normal(size=times.size)

@@ -71,7 +71,7 @@ def polynomials(draw):
 
 
 @given(polynomials())
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200, deadline=None)
 def test_no_crossing_is_missed_and_none_invented(p):
     if not np.isfinite(p).all() or p[0] <= 0:
         return
@@ -82,7 +82,7 @@ def test_no_crossing_is_missed_and_none_invented(p):
     st.lists(st.floats(0.05, 0.99), min_size=1, max_size=4, unique=True),
     st.lists(st.one_of(st.floats(-9.0, -0.5), st.floats(1.5, 9.0)), min_size=1, max_size=12),
 )
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None)
 def test_first_simple_root_agrees_with_forty_digits(inside, outside):
     inside = sorted(inside)
     if min(np.diff([0.0, *inside])) < 0.02:
@@ -103,7 +103,7 @@ def polyroots(p):
 
 @given(st.integers(1, 15), st.integers(1, 15), st.integers(0, 6))
 @example(8, 4, 0)
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None)
 def test_roots_where_boxes_meet_are_found_exactly(first, second, bend):
     # (i/16 - u)(j/16 - u)(1 + u)^bend has coefficients without rounding, and its roots lie on the boxes' borders.
     p = np.array([1.0])

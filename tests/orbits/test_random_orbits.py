@@ -14,7 +14,7 @@ from saltus.orbits import RestingOrbit
 
 pytestmark = pytest.mark.thorough  # many structures of their own
 
-FEW = settings(max_examples=10, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+FEW = settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 LEAST = 3  # orbits that a test of ten examples must have seen: one that finds nothing has shown nothing
 numbers = {
     "beta0": st.floats(0.5, 2.2),
