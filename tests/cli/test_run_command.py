@@ -157,7 +157,7 @@ REFUSED = {
     "window": (
         CONSTANT + "[phase_portrait]\nwindow = [1, 2]\n",
         ", line 9",
-        "phase_portrait.window must be a list of two numbers",
+        "phase_portrait.window must be pairs of numbers",
     ),
     "beyond": (WALL + "[phase_portrait]\nstarts = [[2, 0]]\n", ", line 7", "[2.0, 0.0] is beyond the contact"),
     "window of states": (FORCED + "[attractors]\nwindow = [[1, -1], [0, 1]]\n", ", line 10", "attractors.window must be ((least"),
