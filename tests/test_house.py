@@ -141,6 +141,31 @@ def test_a_class_has_its_name_alone() -> None:
     assert not {name for name in names if names.count(name) > 1}
 
 
+# --- models ----------------------------------------------------------------------------------------------------------------
+
+GENERIC = ("taylor", "bounds", "flow", "continuation", "orbits", "attractors", "studies", "sweep")
+SPECIAL = {"Metainterface", "RockingBlock", "TwoLayer", "WallOscillator", "beta0"}
+
+
+def words(tree: ast.AST) -> Iterator[str]:
+    """The names, attributes and texts of a file's code; those of docstrings are no code."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name):
+            yield node.id
+        elif isinstance(node, ast.Attribute):
+            yield node.attr
+        elif isinstance(node, ast.alias):
+            yield node.name
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and len(node.value) < 80:
+            yield from node.value.replace(".", " ").split()
+
+
+@pytest.mark.parametrize("room", GENERIC)
+def test_generic_code_knows_no_special_model(room: str) -> None:
+    known = {path.name: SPECIAL & set(words(ast.parse(path.read_text()))) for path in (SOURCE / room).rglob("*.py")}
+    assert not {name: found for name, found in known.items() if found}
+
+
 # --- size ------------------------------------------------------------------------------------------------------------------
 
 
