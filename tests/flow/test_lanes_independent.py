@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,11 +57,27 @@ def test_neighbours_change_nothing(reference):
     same_bits(cases.chosen(rows).in_lanes(**OPTIONS), expected.isel(trajectory=rows))
 
 
-@pytest.mark.parametrize("chunk", [1, 7, 1000, 10**6])
-def test_chunks_change_nothing(reference, chunk, monkeypatch):
+@pytest.mark.parametrize(("smallest", "largest"), [(1, 1), (7, 7), (1, 1000), (10**6, 10**6)])
+def test_chunks_change_nothing(reference, smallest, largest, monkeypatch):
     cases, expected = reference
-    monkeypatch.setattr(lanes_run, "CHUNK", chunk)
+    settings = replace(lanes_run.SETTINGS, smallest_chunk=smallest, largest_chunk=largest)
+    monkeypatch.setattr(lanes_run, "SETTINGS", settings)
     same_bits(cases.in_lanes(threads=2, **OPTIONS), expected)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 64])
+@pytest.mark.parametrize("count", [1, 8, 33, 100, 968, 40_001])
+def test_chunks_are_all_trajectories_once(count, threads):
+    rows = [row for chunk in lanes_run.chunks(count, threads) for row in range(count)[chunk]]
+    assert rows == list(range(count))
+
+
+@pytest.mark.parametrize("count", [100, 968, 4000])
+def test_no_thread_has_more_than_half_of_its_share_in_its_last_chunk(count):
+    for threads in (2, 3):
+        last = list(lanes_run.chunks(count, threads))[-1]
+        assert last.stop - last.start <= max(count / threads / 2, lanes_run.SETTINGS.smallest_chunk)
+        assert len(list(lanes_run.chunks(count, threads))) >= threads
 
 
 def test_what_is_sampled_changes_nothing_in_the_rest(reference):

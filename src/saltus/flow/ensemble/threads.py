@@ -20,9 +20,34 @@ from saltus.flow.structures import Program, taylor_order
 from saltus.progress import Progress, silent
 from saltus.taylor import CACHE_LINE, WIDTH, pointer
 
-CHUNK = 1024  # trajectories that one call of the driver runs: some milliseconds a forcing period
 WHAT = "following the motions"  # for the progress
-LOOK_INTERVAL = 0.1  # seconds between looks at Ctrl-C and at the progress
+
+
+@dataclass(frozen=True)
+class ThreadSettings:
+    """How trajectories are shared between threads, and how often these are looked after."""
+
+    largest_chunk: int = 1024  # Trajectories that one call of the driver runs at most: some milliseconds a forcing period.
+    # Trajectories of the smallest chunk, if there are as many for each thread: at the end of a chunk lanes stand empty, which
+    # costs more the fewer trajectories each lane had.
+    smallest_chunk: int = 8 * WIDTH
+    # Chunks that each thread still has before it, at least, when one is taken: the last ones are small, so that all threads end
+    # at about the same time.
+    chunks_ahead: int = 2
+    look_interval: float = 0.1  # Seconds between looks at Ctrl-C and at the progress.
+
+
+SETTINGS = ThreadSettings()
+
+
+def chunks(count: int, threads: int) -> Iterator[slice]:
+    """The chunks of so many trajectories: large ones, then ever smaller ones, so that no thread is left alone at the end."""
+    first, least = 0, min(SETTINGS.smallest_chunk, math.ceil(count / threads))
+    while first < count:
+        share = (count - first) / (SETTINGS.chunks_ahead * threads) if threads > 1 else count
+        size = min(WIDTH * math.ceil(max(share, least) / WIDTH), SETTINGS.largest_chunk)
+        yield slice(first, min(first + size, count))
+        first += size
 
 
 @dataclass(frozen=True)
@@ -87,13 +112,13 @@ class Lanes:
             np.empty((n, self.kept, len(self.sampled))),
         )
         controls = [np.zeros(2, dtype=np.int64) for _ in range(threads)]
-        chunks, lock = iter(range(0, n, CHUNK)), threading.Lock()
+        waiting, lock = chunks(n, threads), threading.Lock()
         compile_everything()  # here, not in each thread
         progress(0.0, WHAT)
         with ThreadPoolExecutor(threads) as pool:
             try:  # an interrupt while they are begun must stop them too, or the pool would wait for their end
-                workers = [pool.submit(self._work, jobs, ends, chunks, lock, control) for control in controls]
-                while wait(workers, LOOK_INTERVAL).not_done:
+                workers = [pool.submit(self._work, jobs, ends, waiting, lock, control) for control in controls]
+                while wait(workers, SETTINGS.look_interval).not_done:
                     if total > 0:
                         progress(min(1.0, sum(int(c[1]) for c in controls) / total), WHAT)
             except BaseException:
@@ -110,16 +135,16 @@ class Lanes:
         """The model's coordinates."""
         return int(self.program.structure.module.OWN)
 
-    def _work(self, jobs: Jobs, ends: Ends, chunks: Iterator[int], lock: threading.Lock, control: np.ndarray) -> None:
+    def _work(self, jobs: Jobs, ends: Ends, waiting: Iterator[slice], lock: threading.Lock, control: np.ndarray) -> None:
         """Run chunk after chunk until there are none."""
         fixed = self._arguments()
         memory = self._memory()
         while True:
             with lock:
-                first = next(chunks, None)
-            if first is None or control[0]:
+                rows = next(waiting, None)
+            if rows is None or control[0]:
                 return
-            self._run_chunk(fixed, memory, jobs, ends, slice(first, first + CHUNK), control)
+            self._run_chunk(fixed, memory, jobs, ends, rows, control)
 
     def _run_chunk(
         self, fixed: tuple[Any, ...], memory: np.ndarray, jobs: Jobs, ends: Ends, rows: slice, control: np.ndarray
