@@ -1,13 +1,68 @@
-"""Where a result comes from: the attributes that every dataset of saltus carries."""
+"""Where a result comes from: the attributes that every dataset of saltus carries, and whether they are those of a system."""
 
 from __future__ import annotations
 
-from typing import Any
+import json
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from saltus.errors import ParameterError
+
+if TYPE_CHECKING:
+    from saltus.systems import System
+
+# Raised whenever the same request gives other numbers than before: a result of another version is not gone on with.
+RESULT_VERSION = 2
 
 
-def provenance(system: Any = None, *, tol: float | None = None, seed: int | None = None, **more: Any) -> dict[str, Any]:
-    """`saltus_version`, `system` (as JSON), `tol` and `seed`, as far as there are such, then whatever else is to be said."""
+def provenance(system: System | None = None, *, tol: float | None = None, seed: int | None = None, **more: Any) -> dict[str, Any]:
+    """`saltus_version`, `result_version`, `system` and `equations` (as JSON), `tol` and `seed`, as far as there are such, then
+    whatever else is to be said.
+
+    The system's JSON has its numbers, and `equations` a digest of each part of its equations (`saltus.taylor.equations_of`).
+    """
     from saltus import __version__
 
-    known = {"system": None if system is None else system.to_json(), "tol": tol, "seed": seed}
-    return {"saltus_version": __version__, **{name: value for name, value in known.items() if value is not None}, **more}
+    kept: dict[str, Any] = {"saltus_version": __version__, "result_version": RESULT_VERSION}
+    if system is not None:
+        kept |= {"system": system.to_json()} | identity(system)
+    return kept | {name: value for name, value in (("tol", tol), ("seed", seed)) if value is not None} | more
+
+
+def identity(system: System) -> dict[str, Any]:
+    """What `check_provenance` compares: `result_version` and `equations`, for whoever computes a part of a result elsewhere.
+
+    Raises:
+        TraceError: a model that cannot be traced.
+    """
+    from saltus.taylor import equations_of
+
+    return {"result_version": RESULT_VERSION, "equations": json.dumps(equations_of(system))}
+
+
+def check_provenance(attributes: Mapping[str, Any], system: System, what: str) -> None:
+    """Refuse a result, `what`, whose attributes are not those of this system and of this version of saltus.
+
+    Raises:
+        ParameterError: with what differs: the version, or the part of the equations.
+    """
+    differ = "; ".join(_differences(attributes, system))
+    if differ:
+        raise ParameterError(f"{what} is not of what is computed now: {differ}; compute it again")
+
+
+def _differences(attributes: Mapping[str, Any], system: System) -> Iterator[str]:
+    version, name = attributes.get("result_version"), type(system.model).__name__
+    if version != RESULT_VERSION:
+        by = f"saltus {attributes['saltus_version']}" if "saltus_version" in attributes else "another saltus"
+        yield f"it is by {by}, whose results are of version {version if version is not None else 1}, and here of {RESULT_VERSION}"
+        return
+    try:
+        there = dict(json.loads(attributes["equations"]))
+    except (KeyError, TypeError, ValueError):
+        yield f"it does not say of which equations of {name} it is"
+        return
+    here = json.loads(identity(system)["equations"])
+    changed = [part for part in here if here[part] != there.get(part)]
+    if changed:
+        yield f"the {' and the '.join(changed)} of {name} {'has' if len(changed) == 1 else 'have'} changed since"

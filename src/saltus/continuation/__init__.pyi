@@ -1,5 +1,5 @@
 from .continuation_loop import Continuation, both_ways
-from .corrector import Corrected, Evaluation, newton
+from .corrector import NEWTON, Corrected, Evaluation, newton
 from .course import Course
 from .curve import Curve, Point
 from .end import CurveEnd, End, EndReason
@@ -11,6 +11,7 @@ from .test_functions import TestFunction, located
 from .zero import Evidence, Zero
 
 __all__ = [
+    "NEWTON",
     "STEPS",
     "Continuation",
     "Corrected",

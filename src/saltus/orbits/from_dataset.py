@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.continuation import NEWTON
 from saltus.errors import ParameterError
 from saltus.flow import load_releases
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import resting_orbit
 from saltus.orbits.signature import Signature
+from saltus.provenance import check_provenance
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -23,11 +25,12 @@ NEEDED = ("parameter", "unknowns")
 def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     """The orbits along `point` of a dataset that `Branch.to_xarray` or `SpecialCurve.to_xarray` made, bit for bit, in order.
 
-    Nothing is solved again: the equations are evaluated at the unknowns as they are kept, and orbits that rest are flown from
+    The equations are evaluated at the unknowns as they are kept, which must solve them, and orbits that rest are followed from
     their first release. `continue_orbit` goes on from any.
 
     Raises:
-        ParameterError: a dataset of something else; a model of one's own that is not registered (`saltus.register`).
+        ParameterError: a dataset of something else, of other equations than the model has now, or of another version of saltus;
+            unknowns that do not solve the equations; a model of one's own that is not registered (`saltus.register`).
     """
     missing = [name for name in NEEDED if name not in dataset] + [name for name in ("system", "tol") if name not in dataset.attrs]
     if missing:
@@ -35,6 +38,7 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
             f"orbits_of takes the dataset of a branch or of a curve of special points; this one lacks {missing[0]!r}"
         )
     system, tol = System.from_json(dataset.attrs["system"]), float(dataset.attrs["tol"])
+    check_provenance(dataset.attrs, system, "the dataset of these orbits")
     if "releases" in dataset:
         return _resting_orbits(dataset, system)
     paths = tuple(map(str, dataset["path"].values)) if "path" in dataset.coords else (str(dataset.attrs["path"]),)
@@ -65,10 +69,10 @@ def _signature(sides: np.ndarray, periods: Any, symmetric: Any, side: Any) -> Si
 def _orbit(problem: Problem, row: np.ndarray, value: np.ndarray) -> PeriodicOrbit:
     values = value.astype(float)
     orbit = PeriodicOrbit.known(problem, row[: problem.size].copy(), values)
-    if orbit is None:
-        raise ParameterError(
-            f"the motion of the orbit at {problem.paths[0]} = {values[0]:g} cannot be followed: the file is damaged"
-        )
+    scale = max(1.0, float(np.abs(row[: problem.size]).max()))
+    if orbit is None or not orbit.residual <= NEWTON.stalled * scale:
+        error = "its motion cannot be followed" if orbit is None else f"its residual is {orbit.residual:.1e}"
+        raise ParameterError(f"what is kept at {problem.paths[0]} = {values[0]:g} is no orbit ({error}): the data are damaged")
     return orbit
 
 

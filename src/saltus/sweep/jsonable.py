@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from saltus.errors import ParameterError
 
 QUOTED = 60  # characters of a value in a sentence
+DIGEST = re.compile(r"[0-9a-f]{20,}")  # of which a reader learns only that it has changed
 
 
 def as_json(value: Any, place: str) -> Any:
@@ -58,8 +60,14 @@ def differences(there: Any, here: Any, place: str = "") -> Iterator[str]:
                 yield f"{below} is {_short(here[key])} here and not given there"
             else:
                 yield from differences(there[key], here[key], below)
+    elif there != here and _is_digest(there) and _is_digest(here):
+        yield f"{place} has changed"
     elif there != here or isinstance(there, bool) != isinstance(here, bool):
         yield f"{place} is {_short(there)} there and {_short(here)} here"
+
+
+def _is_digest(value: Any) -> bool:
+    return isinstance(value, str) and DIGEST.fullmatch(value) is not None
 
 
 def _parsed(value: Any) -> Any:

@@ -18,6 +18,7 @@ from saltus.sweep.jsonable import as_json, one_line
 
 NAME = re.compile(r"[A-Za-z][\w.\-]*")  # of an axis, a dimension or a variable: it is a folder's name in a store
 RESERVED = ("zarr.json", "plan")
+WRITER = "saltus_version"  # an attribute that says who wrote a store, not what is computed: `result_version` says that
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +142,7 @@ class Plan:
             "axes": {name: _digest(values) for name, values in self.axes.items()},
             "chunk": self.chunk,
             "variables": variables,
-            "attrs": self.attrs,
+            "attrs": {name: value for name, value in self.attrs.items() if name != WRITER},
         }
 
 

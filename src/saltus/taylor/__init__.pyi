@@ -1,5 +1,6 @@
 from .cache import cache_directory, compiled_part, digest, is_compiled, load_module, module_name
 from .derivatives import FREQUENCY, derivative_along, partial_derivative, tangent_leaves, time_derivative
+from .equations import equations_of
 from .generated import Case, function_text, generated_header
 from .graph import RECORD_WIDTH, Expr, differentiate, is_steep, number, ordered, substitute
 from .lane_vectors import (
@@ -56,6 +57,7 @@ __all__ = [
     "differentiate",
     "digest",
     "entry_point",
+    "equations_of",
     "expand_record",
     "first_lane",
     "fma",

@@ -14,7 +14,7 @@ from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.stroboscopic_section import with_clock
 from saltus.errors import ParameterError
 from saltus.progress import Progress, silent
-from saltus.provenance import provenance
+from saltus.provenance import check_provenance, identity, provenance
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -33,8 +33,12 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
 
     Returns:
         {"label": int16 (velocities, coordinates), "time": float (velocities, coordinates)}.
+
+    Raises:
+        ParameterError: arguments that were made where the system has other equations, or saltus another version.
     """
     system = System.from_dict(arguments["system"])
+    check_provenance(arguments, system, "this part of the basins")
     targets = tuple(Target.from_dict(item) for item in arguments["attractors"])
     grid = np.asarray(block["velocity"], dtype=float), np.asarray(block[system.model.coordinates[0]], dtype=float)
     numbers = int(arguments["periods"]), float(arguments["within"]), float(arguments["tol"])
@@ -73,7 +77,7 @@ def cell_arguments(system: System, labelling: Labelling) -> dict[str, Any]:
     """The arguments of `cells` that are the same for all blocks."""
     targets = [target.to_dict() for target in labelling.targets]
     numbers = {"periods": labelling.periods, "within": labelling.within, "tol": labelling.tol}
-    return {"system": system.to_dict(), "attractors": targets, **numbers}
+    return {"system": system.to_dict(), "attractors": targets, **numbers, **identity(system)}
 
 
 def _plan(system: System, labelling: Labelling, grid: Grid, rows: int) -> Plan:
@@ -89,7 +93,7 @@ def _plan(system: System, labelling: Labelling, grid: Grid, rows: int) -> Plan:
         axes={"velocity": grid[0], system.model.coordinates[0]: grid[1]},
         chunk={"velocity": rows},
         variables=variables,
-        attrs=provenance(kind="basin_cells", title="cells of basins computed by saltus"),
+        attrs=provenance(system, kind="basin_cells", title="cells of basins computed by saltus"),
     )
 
 
@@ -99,4 +103,7 @@ def check_basin_store(path: Path, system: System) -> None:
 
     kept = read_plan(path)
     if kept["function"] != FUNCTION or kept["arguments"]["system"] != json.loads(json.dumps(system.to_dict())):
-        raise ParameterError(f"{path} is the store of another sweep, or of the basins of another system; name another store")
+        raise ParameterError(
+            f"{path} is the store of another sweep, or of the basins of another system; name another store", "store"
+        )
+    check_provenance(kept["attrs"], system, str(path))

@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.checks import check_along, check_axis, check_count, check_number, check_path, check_window
 from saltus.errors import ParameterError
-from saltus.provenance import provenance
+from saltus.provenance import check_provenance, identity, provenance
 from saltus.studies.chart.motions import KEPT
 from saltus.systems import System, check_system
 from saltus.theory import amplitude_limits
@@ -91,12 +91,18 @@ class ChartRequest:
     def to_arguments(self) -> dict[str, Any]:
         """The request without its axes, as JSON has it."""
         numbers = {name: getattr(self, name) for name in NUMBERS}
-        return {"system": self.system.to_json(), "paths": list(self.paths), "window": list(self.window), **numbers}
+        named = {"system": self.system.to_json(), "paths": list(self.paths), "window": list(self.window)}
+        return named | numbers | identity(self.system)
 
     @classmethod
     def from_arguments(cls, arguments: Mapping[str, Any], block: Mapping[str, Any]) -> ChartRequest:
-        """The request for a block of the plane, with these values along its axes."""
+        """The request for a block of the plane, with these values along its axes.
+
+        Raises:
+            ParameterError: arguments that were made where the system has other equations, or saltus another version.
+        """
         system, paths = System.from_json(arguments["system"]), tuple(arguments["paths"])
+        check_provenance(arguments, system, "this chart")
         numbers = {name: arguments[name] for name in NUMBERS}
         return cls(system=system, paths=paths, window=arguments["window"], **block, **numbers)
 

@@ -1,0 +1,57 @@
+"""Which equations a system has: a digest of each part of what was traced of it, by which results know what they are of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from saltus.errors import SaltusError
+from saltus.systems import System
+from saltus.taylor.cache import digest
+from saltus.taylor.graph import Expr
+from saltus.taylor.tapes import tape
+from saltus.taylor.tracing import Trace, trace
+
+
+def equations_of(system: System) -> dict[str, str]:
+    """A digest of each part of a system's equations, its numbers left out: `System.to_json` has these.
+
+    The parts are `acceleration` (with the load's channels in it), `gap`, `contact` (where it is), `reset` (with the impact law in
+    it), `margins`, `mirror` (the load of the mirror image) and `names` (of coordinates, units, channels, sides and stops). What a
+    model's Python reads from elsewhere, such as a constant of its module, stands in the expressions as a number.
+
+    Raises:
+        TraceError: a model that cannot be traced.
+    """
+    traced, model = trace(system), system.model
+    roots: dict[str, list[Expr | None]] = {
+        "acceleration": list(traced.acceleration),
+        "gap": [traced.gap],
+        "contact": [traced.contact],
+        "reset": [traced.next_side, traced.velocity_after],
+    }
+    mirrored = system.mirrored()
+    texts = {name: _text(traced, [root for root in parts if root is not None]) for name, parts in roots.items()}
+    texts["margins"] = _margins(system)
+    texts["mirror"] = repr(mirrored and mirrored.to_dict()["load"])
+    texts["names"] = repr((model.coordinates, model.units, model.channels, model.sides, model.stops))
+    return {name: digest(text) for name, text in texts.items()}
+
+
+def _margins(system: System) -> str:
+    """The margins as text, in which the names stand for themselves where they cannot be traced: they can then end no motion."""
+    state = (0.1,) * len(system.model.coordinates)
+    at: Any = state[0] if len(state) == 1 else state
+    names = tuple(system.model.margins(0.0, at, at, at, (*system.model.sides, 1)[0], system.load))
+    try:
+        traced = trace(system, names)
+    except SaltusError:
+        return repr(names)
+    return repr(names) + _text(traced, list(traced.margins.values()))
+
+
+def _text(traced: Trace, roots: list[Expr]) -> str:
+    """Expressions as text, with the paths of parameters and records in the place of their numbers in the trace."""
+    paths: dict[str, list[Any]] = {"parameter": traced.parameters, "record": traced.records}
+    written = tape(roots)
+    nodes = [(node[0], paths[node[0]][node[1]]) if node[0] in paths else node for node in written.nodes]
+    return repr((nodes, written.roots))
