@@ -6,7 +6,7 @@ import xarray as xr
 from claim_verdicts import verdicts
 from spectrum_cases import branch, diagram
 
-from saltus.paper import Agreement
+from saltus.paper import ClaimVerdict
 from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.measures import chaos_measures
 
@@ -35,18 +35,18 @@ def panel(*spans, wandering=(), bounds=(0.0, 3.0), stable=True):
 def test_what_the_paper_calls_quasi_periodic_is_chaos_by_erratum_22_or_nothing():
     small, large = panel((0.36, 0.39)), panel((1.0, 1.8))
     found = verdicts(chaos_measures.force_spectra({0.2: small, 3.0: large}))
-    assert found["fig09-quasi-periodic"] is Agreement.ERRATUM
+    assert found["fig09-quasi-periodic"] is ClaimVerdict.CORRECTED
     empty = verdicts(chaos_measures.force_spectra({0.2: panel(), 3.0: large}))
-    assert empty["fig09-quasi-periodic"] is Agreement.DISAGREES
+    assert empty["fig09-quasi-periodic"] is ClaimVerdict.DISAGREES
 
 
 @pytest.mark.parametrize(
     ("spans", "verdict"),
     [
-        ({"c": [], "e": [(1.0, 1.2)], "f": [(1.0, 1.6)]}, Agreement.AGREES),
-        ({"c": [], "e": [(1.0, 1.6)], "f": [(1.0, 1.2)]}, Agreement.DISAGREES),  # it narrows
-        ({"c": [(1.0, 1.9)], "e": [(1.0, 1.2)], "f": [(1.0, 1.6)]}, Agreement.DISAGREES),  # more at a small load
-        ({"c": [], "e": [], "f": [(1.0, 1.6)]}, Agreement.DISAGREES),
+        ({"c": [], "e": [(1.0, 1.2)], "f": [(1.0, 1.6)]}, ClaimVerdict.AS_PRINTED),
+        ({"c": [], "e": [(1.0, 1.6)], "f": [(1.0, 1.2)]}, ClaimVerdict.DISAGREES),  # it narrows
+        ({"c": [(1.0, 1.9)], "e": [(1.0, 1.2)], "f": [(1.0, 1.6)]}, ClaimVerdict.DISAGREES),  # more at a small load
+        ({"c": [], "e": [], "f": [(1.0, 1.6)]}, ClaimVerdict.DISAGREES),
     ],
 )
 def test_chaos_widens_with_the_load(spans, verdict):
@@ -55,7 +55,7 @@ def test_chaos_widens_with_the_load(spans, verdict):
     assert verdicts(chaos_measures.force_spectra(panels))["fig09-chaos"] is verdict
 
 
-@pytest.mark.parametrize(("stable", "verdict"), [(True, Agreement.AGREES), (False, Agreement.DISAGREES)])
+@pytest.mark.parametrize(("stable", "verdict"), [(True, ClaimVerdict.AS_PRINTED), (False, ClaimVerdict.DISAGREES)])
 def test_a_band_is_pierced_by_a_stable_motion_alone(stable, verdict):
     one = chaos_measures.pierced(panel((1.0, 1.5), stable=stable), load=3.0)
     assert verdicts({"fig09-pierced": one}) == {"fig09-pierced": verdict}
@@ -64,10 +64,10 @@ def test_a_band_is_pierced_by_a_stable_motion_alone(stable, verdict):
 @pytest.mark.parametrize(
     ("small", "large", "verdict"),
     [
-        (panel(), panel((2.0, 2.5)), Agreement.AGREES),
-        (panel(), panel(wandering=(2.0, 2.1)), Agreement.ERRATUM),
-        (panel(wandering=(2.0, 2.1)), panel(wandering=(2.0,)), Agreement.DISAGREES),
-        (panel(), panel(wandering=(0.4,)), Agreement.DISAGREES),  # at low frequency alone
+        (panel(), panel((2.0, 2.5)), ClaimVerdict.AS_PRINTED),
+        (panel(), panel(wandering=(2.0, 2.1)), ClaimVerdict.CORRECTED),
+        (panel(wandering=(2.0, 2.1)), panel(wandering=(2.0,)), ClaimVerdict.DISAGREES),
+        (panel(), panel(wandering=(0.4,)), ClaimVerdict.DISAGREES),  # at low frequency alone
     ],
 )
 def test_chaos_at_high_frequency_lasts_or_is_a_transient_by_erratum_31(small, large, verdict):
@@ -77,9 +77,9 @@ def test_chaos_at_high_frequency_lasts_or_is_a_transient_by_erratum_31(small, la
 @pytest.mark.parametrize(
     ("frequencies", "first", "verdict"),
     [
-        ({"a": 2.0, "b": 4.0}, (1.0, 2.0), Agreement.AGREES),
-        ({"a": 0.5, "b": 1.0}, (2.0, 1.0), Agreement.ERRATUM),
-        ({"a": 2.0, "b": 4.0}, (2.0, 1.0), Agreement.DISAGREES),  # no erratum above the resonance
+        ({"a": 2.0, "b": 4.0}, (1.0, 2.0), ClaimVerdict.AS_PRINTED),
+        ({"a": 0.5, "b": 1.0}, (2.0, 1.0), ClaimVerdict.CORRECTED),
+        ({"a": 2.0, "b": 4.0}, (2.0, 1.0), ClaimVerdict.DISAGREES),  # no erratum above the resonance
     ],
 )
 def test_chaos_begins_at_larger_loads_for_larger_frequencies_above_the_resonance(frequencies, first, verdict):
@@ -89,7 +89,7 @@ def test_chaos_begins_at_larger_loads_for_larger_frequencies_above_the_resonance
 
 @pytest.mark.parametrize(
     ("spans", "verdict"),
-    [([(1.0, 1.2), (2.0, 2.2)], Agreement.AGREES), ([(1.0, 1.2)], Agreement.DISAGREES), ([], Agreement.DISAGREES)],
+    [([(1.0, 1.2), (2.0, 2.2)], ClaimVerdict.AS_PRINTED), ([(1.0, 1.2)], ClaimVerdict.DISAGREES), ([], ClaimVerdict.DISAGREES)],
 )
 def test_two_regions_of_chaos_are_parted_by_stable_motions(spans, verdict):
     assert verdicts(chaos_measures.force_diagrams({1.0: panel(*spans)}))["fig11-two-regions"] is verdict

@@ -9,7 +9,7 @@ from claim_verdicts import claims_of, verdicts
 from picture_checks import check_provenance, clipped
 
 from saltus.files import write_dataset
-from saltus.paper import FIGURES, Agreement
+from saltus.paper import FIGURES, ClaimVerdict
 from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.measures import chart_areas, chart_measures
 from saltus.plots.chart import draw_stability_chart
@@ -42,8 +42,8 @@ def test_the_data_say_what_they_are_and_claims_follow_from_disk_too(tmp_path):
 def test_claims_that_a_coarse_chart_bears_hold():
     verdicts = {claim.id: claim.verdict for claim in FIGURES["fig14"].claims(data())}
     for name in ("anticipates", "frequency", "onset"):
-        assert verdicts[f"fig14-{name}"] is Agreement.AGREES
-    assert verdicts["fig14-closed-form"] is Agreement.ERRATUM
+        assert verdicts[f"fig14-{name}"] is ClaimVerdict.AS_PRINTED
+    assert verdicts["fig14-closed-form"] is ClaimVerdict.CORRECTED
 
 
 def test_claims_fail_where_the_data_do_not_bear_them():
@@ -53,7 +53,7 @@ def test_claims_fail_where_the_data_do_not_bear_them():
         panel["chart"]["unsettled"] = panel["chart"]["unsettled"] * 0
     verdicts = {claim.id: claim.verdict for claim in FIGURES["fig14"].claims(wrong)}
     for name in ("anticipates", "frequency", "second"):
-        assert verdicts[f"fig14-{name}"] is Agreement.DISAGREES
+        assert verdicts[f"fig14-{name}"] is ClaimVerdict.DISAGREES
 
 
 def test_the_static_border_is_that_of_the_equilibria():
@@ -95,7 +95,7 @@ def test_statements_on_parameters_compare_charts_of_the_same_cells():
     quick = {"a": reference | {"beta0": 60.0}, "b": reference | {"damping": 0.05}, "reference": reference}
     made = FIGURES["fig15"].compute(panels=quick, size=9, curves=2, starts=4)
     claims = claims_of(chart_measures.over_parameters(made))
-    assert claims["fig15-damping-domain"].verdict is Agreement.AGREES
+    assert claims["fig15-damping-domain"].verdict is ClaimVerdict.AS_PRINTED
     assert len(claims) == 5
     picture = FIGURES["fig15"].draw(made)
     assert clipped(picture) == []
@@ -123,4 +123,4 @@ def test_agreement_is_never_one_on_nothing(total, looked, agrees):
     panel = xr.DataTree.from_dict({"chart": xr.Dataset(), "disagreements": differ})
     panel.attrs["frequency"] = 1.0
     one = chart_measures.agreement(xr.DataTree(children={"a": panel}))
-    assert (verdicts({"fig14-agreement": one})["fig14-agreement"] is Agreement.AGREES) is agrees
+    assert (verdicts({"fig14-agreement": one})["fig14-agreement"] is ClaimVerdict.AS_PRINTED) is agrees

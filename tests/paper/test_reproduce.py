@@ -9,7 +9,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.files import write_dataset
-from saltus.paper import FIGURES, reproduce
+from saltus.paper import FIGURES, ClaimVerdict, report, reproduce
 from saltus.systems import System
 
 
@@ -58,6 +58,14 @@ def test_the_table_has_a_row_for_each_scenario(tmp_path):
     rows = [line for line in lines if re.match(r"\| [12] \|", line)]
     assert len(rows) == 5
     assert "<table>" in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+
+def test_every_verdict_has_a_box_that_hides_its_claims():
+    style = report._style_sheet()
+    for verdict in ClaimVerdict:
+        name = report._style_class(verdict)
+        assert f'id="show-{name}"' in "".join(report._filter())
+        assert f"body:has(#show-{name}:not(:checked)) tr.{name}" in style
 
 
 def test_every_part_has_a_title_a_caption_and_its_own_name():

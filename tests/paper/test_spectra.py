@@ -7,7 +7,7 @@ from picture_checks import check_provenance, clipped
 from spectrum_cases import branch, diagram, folded, loop
 
 from saltus.files import write_dataset
-from saltus.paper import FIGURES, Agreement
+from saltus.paper import FIGURES, ClaimVerdict
 from saltus.paper.measures.response_measures import coexistence
 
 pytestmark = pytest.mark.thorough  # searches and branches for five figures
@@ -36,8 +36,8 @@ def test_the_claims_hold_also_from_disk_and_the_picture_is_whole(name, tmp_path)
     data = figure.compute(**QUICK[name])
     check_provenance(name, data)
     claims = figure.claims(data)
-    assert {claim.id for claim in claims if claim.verdict is Agreement.DISAGREES} <= NEED_A_WHOLE_SEARCH
-    assert {claim.erratum for claim in claims if claim.verdict is Agreement.ERRATUM} == ERRATA.get(name, set())
+    assert {claim.id for claim in claims if claim.verdict is ClaimVerdict.DISAGREES} <= NEED_A_WHOLE_SEARCH
+    assert {claim.erratum for claim in claims if claim.verdict is ClaimVerdict.CORRECTED} == ERRATA.get(name, set())
     assert len({claim.id for claim in claims}) == len(claims)
     write_dataset(tmp_path / f"{name}.nc", data)
     with xr.open_datatree(tmp_path / f"{name}.nc", engine="h5netcdf") as tree:
@@ -50,13 +50,13 @@ def test_claims_fail_where_the_data_do_not_bear_them():
     figure = FIGURES["fig10"]
     data = figure.compute(amplitudes={"b": 0.5}, values=[0.8], starts=8, max_period=1, repelling=0, switch=False)
     verdicts = {claim.id: claim.verdict for claim in figure.claims(data)}
-    assert verdicts["fig10-loops"] is Agreement.DISAGREES  # period 1 alone: no loop was looked for
-    assert verdicts["fig10-superharmonic"] is Agreement.AGREES
+    assert verdicts["fig10-loops"] is ClaimVerdict.DISAGREES  # period 1 alone: no loop was looked for
+    assert verdicts["fig10-superharmonic"] is ClaimVerdict.AS_PRINTED
     data["b/attractors"]["amplitude"] = data["b/attractors"]["amplitude"] + 0.1  # dots beside the branches
-    assert {c.id: c.verdict for c in figure.claims(data)}["fig10-confirmed"] is Agreement.DISAGREES
+    assert {c.id: c.verdict for c in figure.claims(data)}["fig10-confirmed"] is ClaimVerdict.DISAGREES
 
 
-@pytest.mark.parametrize(("others", "verdict"), [((loop(),), Agreement.AGREES), ((), Agreement.DISAGREES)])
+@pytest.mark.parametrize(("others", "verdict"), [((loop(),), ClaimVerdict.AS_PRINTED), ((), ClaimVerdict.DISAGREES)])
 def test_coexistence_is_judged_by_the_motions_beyond_twice_the_critical_load(others, verdict):
     single = branch([0.0, 3.0], [0.1, 1.0], [1, 1])
     tree = diagram(single, *others)

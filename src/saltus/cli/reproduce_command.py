@@ -12,7 +12,7 @@ from rich.table import Table
 def reproduce_paper(names: Sequence[str], output: Path, force: bool) -> None:
     """Reproduce the named parts of the paper, or all, into `output`; print what was made and what became of the claims."""
     from saltus.cli.progress_bar import progress_bar
-    from saltus.paper import FIGURES, reproduce, tally
+    from saltus.paper import FIGURES, HEADINGS, ledger, reproduce, tally, with_summaries
 
     with progress_bar("paper") as progress:
         results = reproduce(names, output, force, progress)
@@ -20,7 +20,12 @@ def reproduce_paper(names: Sequence[str], output: Path, force: bool) -> None:
     for result in results:
         table.add_row(result.name, f"made in {result.seconds:.1f} s" if result.made else "up to date", FIGURES[result.name].title)
     console.print(table)
-    console.print(tally([claim for result in results for claim in result.claims]), markup=False, soft_wrap=True)
+    claims = with_summaries(claim for result in results for claim in result.claims)
+    verdicts = Table(*HEADINGS, box=None)
+    for row in ledger(claims):
+        verdicts.add_row(*row.cells())
+    console.print(verdicts)
+    console.print(tally(claims), markup=False, soft_wrap=True)
     console.print(f"Results are in {output}: open {output / 'index.html'}", markup=False, soft_wrap=True)
 
 

@@ -1,6 +1,18 @@
-from .claims.claim import Agreement, Claim, tally
+from .claims.claim import Claim, ClaimVerdict, with_summaries
+from .claims.ledger import HEADINGS, ledger, tally
 from .figures.figure import PaperFigure
 from .parts import FIGURES
 from .reproduction import Result, reproduce
 
-__all__ = ["FIGURES", "Agreement", "Claim", "PaperFigure", "Result", "reproduce", "tally"]
+__all__ = [
+    "FIGURES",
+    "HEADINGS",
+    "Claim",
+    "ClaimVerdict",
+    "PaperFigure",
+    "Result",
+    "ledger",
+    "reproduce",
+    "tally",
+    "with_summaries",
+]

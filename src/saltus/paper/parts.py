@@ -7,10 +7,10 @@ from importlib import import_module
 from saltus.paper.figures.figure import PaperFigure
 
 FIGURE_FILES = (
-    *("fig01c", "fig02", "fig03", "fig04", "fig05", "fig06", "fig07", "fig08"),
-    *("fig09", "fig10", "fig11", "fig12", "fig13"),
-    *("fig14", "fig15", "quasi"),
-    *("table1", "appendix"),
+    *("fig01c", "fig02", "fig03", "table1"),
+    *("fig04", "fig05", "fig06", "fig07", "fig08"),
+    *("fig09", "fig10", "quasi", "fig11", "fig12", "fig13"),
+    *("fig14", "fig15", "appendix"),
 )
 FILES = (*(f"saltus.paper.figures.{name}" for name in FIGURE_FILES), "saltus.paper.sections.statements")
 FIGURES: dict[str, PaperFigure] = {part.name: part for part in (import_module(file).FIGURE for file in FILES)}

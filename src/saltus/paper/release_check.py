@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from saltus.paper.claims.claim import Agreement, Claim
+from saltus.paper.claims.claim import Claim, ClaimVerdict, with_summaries
 from saltus.paper.claims.claim_tables import claim_tables
 from saltus.paper.reproduction import reproduce
 
@@ -18,7 +18,7 @@ from saltus.paper.reproduction import reproduce
 def failures(claims: Iterable[Claim]) -> list[str]:
     """A line for each claim that disagrees with the paper and its errata, and for each one of the tables that was not judged."""
     found = {claim.id: claim for claim in claims}
-    wrong = [f"{id} disagrees: {claim.evidence}" for id, claim in found.items() if claim.verdict is Agreement.DISAGREES]
+    wrong = [f"{id} disagrees: {claim.evidence}" for id, claim in found.items() if claim.verdict is ClaimVerdict.DISAGREES]
     known = [(part, id) for part, entries in claim_tables().items() for id in entries]
     return wrong + [f"{id} of {part} was not judged" for part, id in known if id not in found]
 
@@ -26,7 +26,7 @@ def failures(claims: Iterable[Claim]) -> list[str]:
 def check_release(folder: Path) -> int:
     """Reproduce the whole paper into `folder` and print what fails; the exit status, 1 if anything does."""
     results = reproduce((), folder, force=True, progress=lambda fraction, what: print(f"{fraction:4.0%}  {what}", flush=True))
-    lines = failures(claim for result in results for claim in result.claims)
+    lines = failures(with_summaries(claim for result in results for claim in result.claims))
     print(*lines, sep="\n")
     print(f"{len(lines)} claims fail." if lines else "Every claim was judged, and none disagrees.")
     return int(bool(lines))

@@ -1,4 +1,7 @@
-"""The report: every figure with its caption, every claim with its verdict, in HTML, Markdown and JSON."""
+"""The report: the paper's sections in its order, every figure with its caption and every claim with its verdict.
+
+It is written as HTML, Markdown and JSON, and begins with the ledger: how many statements hold as printed, fail, or are not checked.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +15,10 @@ from pathlib import Path
 import saltus
 from saltus.files import write_text
 from saltus.paper import up_to_date as state
-from saltus.paper.claims.claim import Agreement, Claim, tally, to_markdown
+from saltus.paper.claims.claim import Claim, ClaimVerdict, with_summaries
+from saltus.paper.claims.claim_tables import Origin, section_titles
+from saltus.paper.claims.ledger import LISTING_TITLES, ledger_table, listed, tally, to_markdown
 from saltus.paper.figures.figure import PaperFigure
-
-STYLE_CLASSES = {Agreement.AGREES: "agrees", Agreement.ERRATUM: "erratum", Agreement.DISAGREES: "disagrees"}
 
 
 def compute_claims(figure: PaperFigure, folder: Path) -> list[Claim]:
@@ -37,11 +40,11 @@ def write(figures: Iterable[PaperFigure], folder: Path, known: Mapping[str, Iter
             present[figure] = list(known[figure.name])
         elif state.up_to_date(figure, folder):
             present[figure] = state.claims(figure, folder)
-    claims = [claim for group in present.values() for claim in group]
+    claims = with_summaries(claim for group in present.values() for claim in group)
     pages = {
         "claims.json": json.dumps([claim.to_dict() for claim in claims], indent=1, ensure_ascii=False) + "\n",
         "claims.md": to_markdown(claims),
-        "index.html": "\n".join(_page(present, folder)) + "\n",
+        "index.html": "\n".join(_page(present, claims, folder)) + "\n",
     }
     for name, text in pages.items():
         path = folder / name
@@ -50,27 +53,50 @@ def write(figures: Iterable[PaperFigure], folder: Path, known: Mapping[str, Iter
     return claims
 
 
-def _page(present: dict[PaperFigure, list[Claim]], folder: Path) -> Iterator[str]:
-    everything = [claim for group in present.values() for claim in group]
+def _page(present: dict[PaperFigure, list[Claim]], everything: list[Claim], folder: Path) -> Iterator[str]:
     yield '<!doctype html><html lang="en"><head><meta charset="utf-8">'
     yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
     yield f"<title>The paper, computed by saltus</title><style>{_style_sheet()}</style></head><body>"
     yield "<h1>Non-smooth dynamics of buckling based metainterfaces: the paper, computed</h1>"
     yield f"<p>saltus {saltus.__version__}. {tally(everything)} The whole table: "
-    yield '<a href="claims.md">claims.md</a>, <a href="claims.json">claims.json</a>.</p><nav>'
-    yield from (f'<a href="#{figure.name}">{html.escape(figure.title)}</a>' for figure in present)
+    yield '<a href="claims.md">claims.md</a>, <a href="claims.json">claims.json</a>.</p>'
+    yield _html_table("\n".join(ledger_table(everything)))
+    for listing, headlines in listed(everything):
+        links = "".join(f'<li><a href="#{claim.id}">{html.escape(text)}</a></li>' for claim, text in headlines)
+        yield f"<h2>{LISTING_TITLES[listing]}</h2><ul>{links}</ul>"
+    yield from _filter()
+    shown = {claim.id for figure, claims in present.items() if figure.section for claim in claims}
+    sections = [s for s in section_titles() if any(f.section == s for f in present) or any(c.section == s for c in everything)]
+    yield "<nav>"
+    yield from (f'<a href="#section-{number}">{number} {html.escape(section_titles()[number])}</a>' for number in sections)
     yield "</nav>"
-    for figure, claims in present.items():
-        yield from _section(figure, claims, folder)
+    for number in sections:
+        yield f'<h2 id="section-{number}">{number} {html.escape(section_titles()[number])}</h2>'
+        for figure, claims in present.items():
+            if figure.section == number:
+                yield from _figure(figure, claims, folder)
+        yield from _claims_table([claim for claim in everything if claim.section == number and claim.id not in shown])
     yield "</body></html>"
+
+
+def _filter() -> Iterator[str]:
+    """Boxes that hide the claims of one verdict each: rules of the style sheet do it, without a script."""
+    yield '<p class="filter">Show claims that are: '
+    for verdict in ClaimVerdict:
+        yield f'<label><input type="checkbox" id="show-{_style_class(verdict)}" checked> {verdict}</label>'
+    yield "</p>"
+
+
+def _style_class(verdict: ClaimVerdict) -> str:
+    return verdict.name.lower().replace("_", "-")
 
 
 def _style_sheet() -> str:
     return (files("saltus.paper") / "report.css").read_text(encoding="utf-8")
 
 
-def _section(figure: PaperFigure, claims: list[Claim], folder: Path) -> Iterator[str]:
-    yield f'<h2 id="{figure.name}">{html.escape(figure.title)}</h2>'
+def _figure(figure: PaperFigure, claims: list[Claim], folder: Path) -> Iterator[str]:
+    yield f'<h3 id="{figure.name}">{html.escape(figure.title)}</h3>'
     if figure.draw is not None:
         yield f'<img src="{figure.name}.png" alt="{html.escape(figure.title)}">'
     yield f'<p class="caption">{html.escape(figure.caption)}</p>'
@@ -78,17 +104,23 @@ def _section(figure: PaperFigure, claims: list[Claim], folder: Path) -> Iterator
         yield _html_table((folder / f"{figure.name}.md").read_text(encoding="utf-8"))
     links = (f'<a href="{name}">{name}</a>' for name in figure.files())
     yield f'<p class="files">{" · ".join(links)}</p>'
+    yield from _claims_table(claims)
+
+
+def _claims_table(claims: list[Claim]) -> Iterator[str]:
     if claims:
-        yield "<table><tr><th>claim</th><th>where</th><th>paper</th><th>here</th><th>verdict</th><th>evidence</th></tr>"
+        yield '<table class="claims">'
+        yield "<tr><th>claim</th><th>where</th><th>paper</th><th>here</th><th>verdict</th><th>evidence</th></tr>"
         yield from map(_row, claims)
         yield "</table>"
 
 
 def _row(claim: Claim) -> str:
-    cells = (claim.statement, claim.where, claim.paper, claim.value)
-    row = "".join(f"<td>{html.escape(cell)}</td>" for cell in cells)
-    verdict = f'<td class="{STYLE_CLASSES[claim.verdict]}">{claim.verdict_text}</td>'
-    return f'<tr id="{claim.id}">{row}{verdict}<td>{html.escape(claim.evidence)}</td></tr>'
+    own = ' <em class="own">own check</em>' if claim.origin is Origin.OURS else ""
+    row = f"<td>{html.escape(claim.statement)}{own}</td>"
+    row += "".join(f"<td>{html.escape(cell)}</td>" for cell in (claim.where, claim.paper, claim.value))
+    row += f'<td class="verdict">{claim.verdict_text}</td><td>{html.escape(claim.evidence)}</td>'
+    return f'<tr id="{claim.id}" class="{_style_class(claim.verdict)}">{row}</tr>'
 
 
 def _html_table(markdown: str) -> str:

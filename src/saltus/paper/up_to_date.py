@@ -14,7 +14,7 @@ from typing import Any
 
 import saltus
 from saltus.files import write_text
-from saltus.paper.claims.claim import Agreement, Claim
+from saltus.paper.claims.claim import Claim
 from saltus.paper.claims.claim_tables import claim_tables
 from saltus.paper.figures.figure import PaperFigure
 
@@ -104,7 +104,7 @@ def read(figure: PaperFigure, folder: Path) -> dict[str, Any] | None:
 def claims(figure: PaperFigure, folder: Path) -> list[Claim]:
     """The claims of a figure that is up to date, as recorded when it was made."""
     rows = (read(figure, folder) or {}).get("claims", [])
-    return [Claim(**{**row, "verdict": Agreement(row["verdict"])}) for row in rows]
+    return [Claim.from_dict(row) for row in rows]
 
 
 def write(figure: PaperFigure, folder: Path, made: Iterable[Claim]) -> None:

@@ -1,7 +1,7 @@
 """A claim: a number or statement of the paper, what a figure measured for it, and the verdict that follows.
 
 What the paper says stands in the tables beside this file (see `claim_tables`); a figure or section gives one `Measured` for each
-of its claims, and `judge` joins both.
+of its claims, and `judge` joins both. `ledger` counts the verdicts.
 """
 
 from __future__ import annotations
@@ -13,15 +13,18 @@ from enum import StrEnum
 from typing import Any
 
 from saltus.errors import SaltusError, near
-from saltus.paper.claims.claim_tables import ClaimEntry, claim_tables
+from saltus.paper.claims.claim_tables import ClaimEntry, Listing, Origin, claim_tables
 
 
-class Agreement(StrEnum):
-    """What the computation says of a claim."""
+class ClaimVerdict(StrEnum):
+    """What the computation says of a claim, the gravest last."""
 
-    AGREES = "agrees"
-    ERRATUM = "agrees with erratum"  # not as printed, but as the erratum corrects it
-    DISAGREES = "disagrees"
+    HOLDS = "holds"  # a check of our own, which the paper does not state
+    AS_PRINTED = "as printed"
+    NOT_CHECKED = "not checked"  # with the reason
+    CORRECTED = "corrected"  # it fails as printed, and holds as its erratum corrects it
+    UNDECIDED = "undecided"  # the numbers bear out neither, with the reason
+    DISAGREES = "disagrees"  # it fails, and no erratum of it holds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,22 +32,34 @@ class Claim:
     """One row of the table of claims. `judge` makes it, so that the verdict is always computed."""
 
     id: str
+    section: str  # its number in the paper
+    origin: Origin
     where: str  # equation label, section or figure
     statement: str  # in our own words
     paper: str
     value: str
-    verdict: Agreement
+    verdict: ClaimVerdict
     evidence: str
     erratum: int | None = None
+    listing: Listing | None = None
+    headline: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """As written to claims.json."""
         return asdict(self)
 
+    @classmethod
+    def from_dict(cls, row: Mapping[str, Any]) -> Claim:
+        """The claim that `to_dict` wrote."""
+        listing = Listing(row["listing"]) if row["listing"] else None
+        return cls(**{**row, "verdict": ClaimVerdict(row["verdict"]), "origin": Origin(row["origin"]), "listing": listing})
+
     @property
     def verdict_text(self) -> str:
         """The verdict with the erratum's number."""
-        return f"{self.verdict} {self.erratum}" if self.verdict is Agreement.ERRATUM else str(self.verdict)
+        if self.verdict is ClaimVerdict.CORRECTED and self.erratum:
+            return f"{self.verdict}, erratum {self.erratum}"
+        return str(self.verdict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,20 +67,24 @@ class Measured:
     """What was computed for one claim.
 
     A claim with a printed number has one `outcome`, the number found. For a formula or statement the outcome is a residual that
-    must vanish, or whether it holds, as printed and, where there is an erratum, as `corrected`.
+    must vanish, or whether it holds, as printed and, where there is an erratum, as `corrected`. `second` is the same of the
+    correction by an independent kind of evidence. An outcome of None decides nothing.
     """
 
-    outcome: float | bool
+    outcome: float | bool | None
     corrected: float | bool | None
+    second: float | bool | None
     fields: Mapping[str, Any]  # of the template of the evidence
 
 
 Measures = Mapping[str, Measured | None]  # by the claim's id; None where the data at hand cannot bear on it
 
 
-def measured(outcome: float | bool, corrected: float | bool | None = None, /, **fields: Any) -> Measured:
+def measured(
+    outcome: float | bool | None, corrected: float | bool | None = None, /, *, second: float | bool | None = None, **fields: Any
+) -> Measured:
     """A `Measured` with the fields of the claim's evidence."""
-    return Measured(outcome, corrected, fields)
+    return Measured(outcome, corrected, second, fields)
 
 
 def with_fields(fields: Mapping[str, Any], measures: Mapping[str, Measured]) -> dict[str, Measured]:
@@ -74,48 +93,101 @@ def with_fields(fields: Mapping[str, Any], measures: Mapping[str, Measured]) -> 
 
 
 def judge(part: str, measures: Measures) -> list[Claim]:
-    """The claims of a part of the paper, such as "fig04", in the order of its table.
+    """The claims of a part of the paper, such as "fig04", in the order of its table; without those that rest on other claims.
 
     Raises:
         SaltusError: a claim of the table that was not measured, or a measured one that is in no table.
     """
-    entries = claim_tables().get(part, {})
-    missing, unknown = entries.keys() - measures.keys(), measures.keys() - entries.keys()
+    entries = {id: entry for id, entry in claim_tables().get(part, {}).items() if not entry.rests_on}
+    to_measure = {id for id, entry in entries.items() if entry.is_measured}
+    missing, unknown = to_measure - measures.keys(), measures.keys() - to_measure
     if missing:
         raise SaltusError(f"{part} did not measure its claims {', '.join(sorted(missing))}")
     if unknown:
-        raise SaltusError("; ".join(f"{part} has no claim {id!r}; {near(id, entries)}" for id in sorted(unknown)))
-    return [judge_claim(id, entry, one) for id, entry in entries.items() if (one := measures[id]) is not None]
+        raise SaltusError("; ".join(f"{part} has no claim {id!r}; {near(id, to_measure)}" for id in sorted(unknown)))
+    claims = []
+    for id, entry in entries.items():
+        one = measures.get(id)
+        if not entry.is_measured:
+            claims.append(_row(id, entry, ("as stated", "", ClaimVerdict.NOT_CHECKED), entry.not_checked))
+        elif one is not None:
+            claims.append(judge_claim(id, entry, one))
+    return claims
 
 
 def judge_claim(id: str, entry: ClaimEntry, measured: Measured) -> Claim:
     """One claim: a number against the printed one, or a formula or statement by its residual or whether it holds."""
+    evidence = entry.filled(entry.evidence, measured.fields)
+    if measured.outcome is None:
+        reason = entry.filled(entry.undecided, measured.fields)
+        return _row(id, entry, ("as stated", "", ClaimVerdict.UNDECIDED), f"{reason}; {evidence}" if evidence else reason)
     paper, value, verdict = (_compared if entry.printed is not None else _checked)(entry, measured)
+    if entry.second and verdict is ClaimVerdict.CORRECTED:
+        evidence += f"; independently: {entry.filled(entry.second, measured.fields)}"
+        if measured.second is None or not _holds(measured.second, entry.tolerance):
+            verdict = ClaimVerdict.UNDECIDED  # one kind of evidence against the paper is not enough
+    headline = entry.filled(entry.headline, measured.fields)
+    return replace(_row(id, entry, (paper, value, verdict), evidence), headline=headline)
+
+
+def _row(id: str, entry: ClaimEntry, judged: tuple[str, str, ClaimVerdict], evidence: str) -> Claim:
+    paper, value, verdict = judged
     return Claim(
         id=id,
+        section=entry.section,
+        origin=entry.origin,
         where=entry.place,
         statement=entry.statement,
         paper=paper,
         value=value,
         verdict=verdict,
-        evidence=entry.evidence_text(measured.fields),
+        evidence=evidence,
         erratum=entry.erratum,
+        listing=entry.listing,
+        headline=entry.headline,
     )
 
 
-def _compared(entry: ClaimEntry, measured: Measured) -> tuple[str, str, Agreement]:
+def with_summaries(claims: Iterable[Claim]) -> list[Claim]:
+    """The claims, and those that rest on them: a summary has the gravest verdict of what it sums up, and comes once all is judged."""
+    known = {claim.id: claim for claim in claims}
+    entries = {id: entry for part in claim_tables().values() for id, entry in part.items() if entry.rests_on}
+    found = [
+        _summary(id, entry, [known[other] for other in entry.rests_on])
+        for id, entry in entries.items()
+        if entry.rests_on and all(other in known for other in entry.rests_on)
+    ]
+    return [*known.values(), *found]
+
+
+def _summary(id: str, entry: ClaimEntry, parts: list[Claim]) -> Claim:
+    gravity = list(ClaimVerdict)
+    gravest = max(parts, key=lambda claim: gravity.index(claim.verdict))
+    verdict = (
+        gravest.verdict if entry.origin is Origin.OURS or gravest.verdict is not ClaimVerdict.HOLDS else ClaimVerdict.AS_PRINTED
+    )
+    evidence = "rests on " + ", ".join(f"{claim.id} ({claim.verdict_text})" for claim in parts)
+    row = _row(id, entry, ("as stated", "see the claims it rests on", verdict), evidence)
+    return replace(row, erratum=entry.erratum or (gravest.erratum if verdict is ClaimVerdict.CORRECTED else None))
+
+
+def _compared(entry: ClaimEntry, measured: Measured) -> tuple[str, str, ClaimVerdict]:
     """Numbers agree within one unit of the last printed digit, so that a digit may have been rounded or cut."""
     unit = f" {entry.unit}" if entry.unit else ""
-    verdict = Agreement.DISAGREES
+    verdict = ClaimVerdict.DISAGREES
     if _same_number(measured.outcome, entry.printed):
-        verdict = Agreement.AGREES
+        verdict = _true(entry)
     elif _same_number(measured.outcome, entry.corrected):
-        verdict = Agreement.ERRATUM
+        verdict = ClaimVerdict.CORRECTED
     return f"{entry.printed}{unit}", f"{measured.outcome:.6g}{unit}", verdict
 
 
-def _same_number(value: float, printed: str | None) -> bool:
-    return printed is not None and abs(value - float(printed)) < printed_unit(printed) * (1 + 1e-9)
+def _true(entry: ClaimEntry) -> ClaimVerdict:
+    return ClaimVerdict.HOLDS if entry.origin is Origin.OURS else ClaimVerdict.AS_PRINTED
+
+
+def _same_number(value: float | None, printed: str | None) -> bool:
+    return value is not None and printed is not None and abs(value - float(printed)) < printed_unit(printed) * (1 + 1e-9)
 
 
 def printed_unit(printed: str) -> float:
@@ -123,11 +195,11 @@ def printed_unit(printed: str) -> float:
     return float(Decimal(1).scaleb(int(Decimal(printed).as_tuple().exponent)))
 
 
-def _checked(entry: ClaimEntry, measured: Measured) -> tuple[str, str, Agreement]:
+def _checked(entry: ClaimEntry, measured: Measured) -> tuple[str, str, ClaimVerdict]:
     """A residual vanishes within the tolerance; the erratum counts only where the claim as printed fails."""
     printed, corrected = measured.outcome, measured.corrected
     agrees, mended = (one is not None and _holds(one, entry.tolerance) for one in (printed, corrected))
-    verdict = Agreement.AGREES if agrees else Agreement.ERRATUM if mended and entry.erratum else Agreement.DISAGREES
+    verdict = _true(entry) if agrees else ClaimVerdict.CORRECTED if mended and entry.erratum else ClaimVerdict.DISAGREES
     if corrected is None:
         return "as stated", _outcome_text(printed), verdict
     return f"as printed: {_outcome_text(printed)}", f"corrected: {_outcome_text(corrected)}", verdict
@@ -141,24 +213,5 @@ def _is_bool(outcome: Any) -> bool:
     return isinstance(outcome, bool) or type(outcome).__name__ == "bool"
 
 
-def _outcome_text(outcome: float | bool) -> str:
+def _outcome_text(outcome: Any) -> str:
     return ("holds" if outcome else "does not hold") if _is_bool(outcome) else f"residual {float(outcome):.1e}"
-
-
-def to_markdown(claims: Iterable[Claim]) -> str:
-    """The table of claims, with a count of the verdicts above it."""
-    claims = list(claims)
-    lines = ["# The paper's claims, computed", "", tally(claims), ""]
-    lines += ["| id | where | claim | paper | here | verdict | evidence |", "|---|---|---|---|---|---|---|"]
-    for c in claims:
-        cells = (c.id, c.where, c.statement, c.paper, c.value, c.verdict_text, c.evidence)
-        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    return "\n".join(lines) + "\n"
-
-
-def tally(claims: Iterable[Claim]) -> str:
-    """How many claims carry each verdict, in words."""
-    claims = list(claims)
-    counts = {verdict: sum(c.verdict is verdict for c in claims) for verdict in Agreement}
-    parts = [f"{counts[Agreement.AGREES]} agree", f"{counts[Agreement.ERRATUM]} agree with an erratum"]
-    return f"{len(claims)} claims: {', '.join(parts)}, {counts[Agreement.DISAGREES]} disagree."

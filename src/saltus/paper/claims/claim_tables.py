@@ -1,17 +1,26 @@
 """The tables of claims: what the paper says, as data, in one TOML file for each section and in the paper's order.
 
-A table `[part.claim-id]` holds, for the claim that the part (a figure, table or group of statements) bears on:
+A file begins with the `section` of the paper, its number, and its `title`. A table `[part.claim-id]` holds, for the claim that the
+part (a figure, table or group of statements) bears on:
 
-    place       equation label, section or figure
-    statement   in our own words
-    printed     the printed number, as a string; left out where the claim is a formula or a statement
-    corrected   the erratum's number
-    unit        of both numbers
-    tolerance   of the residual of a formula, 1e-9 unless it is given
-    erratum     the number of the erratum that corrects the claim
-    evidence    a template: `{name:format}` is a field that the part measured
-    lists       how a field that is a list of rows is written: `each` row, what stands `between`, and what if there is `none`
-    like        another claim, whose keys are taken where this one has none
+    place        equation label, section or figure
+    statement    in our own words
+    origin       "paper", or "ours" for a check of our own that the paper does not state; "paper" unless it is given
+    printed      the printed number, as a string; left out where the claim is a formula or a statement
+    corrected    the erratum's number
+    unit         of both numbers
+    tolerance    of the residual of a formula, 1e-9 unless it is given
+    erratum      the number of the erratum that corrects the claim
+    evidence     a template: `{name:format}` is a field that the part measured
+    second       a template of the second, independent kind of evidence for the correction, which the part measures as `second`
+    proof        the test that shows the correction in another way, as file::name
+    undecided    a template of the reason for which the numbers decide nothing; the part then measures None
+    not_checked  the reason for which the statement is not checked: nothing is measured for it
+    rests_on     the ids of the claims of which this one is a summary: nothing is measured for it either
+    listing      "findings" or "validity": where the report lists the claim before all others
+    headline     a template of what it says there
+    lists        how a field that is a list of rows is written: `each` row, what stands `between`, and what if there is `none`
+    like         another claim, whose keys are taken where this one has none
 """
 
 from __future__ import annotations
@@ -19,9 +28,24 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import cache
 from importlib.resources import files
 from typing import Any
+
+
+class Origin(StrEnum):
+    """Who says what a claim states."""
+
+    PAPER = "paper"
+    OURS = "ours"  # a check of our own, counted apart from the paper's claims
+
+
+class Listing(StrEnum):
+    """The lists with which the report begins."""
+
+    FINDINGS = "findings"  # what changes a conclusion of the paper
+    VALIDITY = "validity"  # where the reduced model may not be believed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +63,16 @@ class ClaimEntry:
 
     place: str
     statement: str
-    evidence: str
+    section: str = ""
+    origin: Origin = Origin.PAPER
+    evidence: str = ""
+    second: str = ""
+    proof: str = ""
+    undecided: str = ""
+    not_checked: str = ""
+    rests_on: tuple[str, ...] = ()
+    listing: Listing | None = None
+    headline: str = ""
     printed: str | None = None
     corrected: str | None = None
     unit: str = ""
@@ -47,37 +80,56 @@ class ClaimEntry:
     erratum: int | None = None
     lists: dict[str, ListForm] = field(default_factory=dict)
 
-    def evidence_text(self, fields: Mapping[str, Any]) -> str:
-        """The evidence with the fields put in."""
-        return self._filled(self.evidence, fields)
+    @property
+    def is_measured(self) -> bool:
+        """Whether a part of the paper measures something for it."""
+        return not (self.not_checked or self.rests_on)
 
-    def _filled(self, template: str, fields: Mapping[str, Any]) -> str:
+    def filled(self, template: str, fields: Mapping[str, Any]) -> str:
+        """A template, such as the evidence, with the fields put in."""
         texts = {name: self._listed(self.lists[name], rows) for name, rows in fields.items() if name in self.lists}
         return template.format(**{**fields, **texts})
 
     def _listed(self, form: ListForm, rows: Iterable[Mapping[str, Any]]) -> str:
-        return form.between.join(self._filled(form.each, row) for row in rows) or form.none
+        return form.between.join(self.filled(form.each, row) for row in rows) or form.none
 
 
-@cache
 def claim_tables() -> dict[str, dict[str, ClaimEntry]]:
     """All claims by part and id.
 
     Raises:
-        TypeError: a claim without a place, statement or evidence, or with an unknown key.
+        TypeError: a claim without a place or statement, or with an unknown key.
+        ValueError: a source or listing that there is none of.
     """
+    return _read()[1]
+
+
+def section_titles() -> dict[str, str]:
+    """The titles of the paper's sections by their numbers, in its order."""
+    return _read()[0]
+
+
+@cache
+def _read() -> tuple[dict[str, str], dict[str, dict[str, ClaimEntry]]]:
+    titles: dict[str, str] = {}
     parts: dict[str, dict[str, dict[str, Any]]] = {}
     for file in sorted(files("saltus.paper.claims").iterdir(), key=lambda file: file.name):
         if file.name.endswith(".toml"):
-            for part, claims in tomllib.loads(file.read_text(encoding="utf-8")).items():
-                parts.setdefault(part, {}).update(claims)
+            tables = tomllib.loads(file.read_text(encoding="utf-8"))
+            section = tables.pop("section")
+            titles[section] = tables.pop("title")
+            for part, claims in tables.items():
+                parts.setdefault(part, {}).update({id: {**keys, "section": section} for id, keys in claims.items()})
     everything = {id: entry for claims in parts.values() for id, entry in claims.items()}
-    return {part: {id: _entry(claims[id], everything) for id in claims} for part, claims in parts.items()}
+    return titles, {part: {id: _entry(claims[id], everything) for id in claims} for part, claims in parts.items()}
 
 
 def _entry(own: Mapping[str, Any], everything: Mapping[str, Mapping[str, Any]]) -> ClaimEntry:
     """A claim from its keys, and those of the claim that it is `like`."""
     keys = {**everything[own["like"]], **own} if "like" in own else dict(own)
     keys.pop("like", None)
+    keys["rests_on"] = tuple(keys.get("rests_on", ()))
+    keys["origin"] = Origin(keys.get("origin", Origin.PAPER))
+    keys["listing"] = Listing(keys["listing"]) if "listing" in keys else None
     lists = {name: ListForm(**form) for name, form in keys.pop("lists", {}).items()}
     return ClaimEntry(**keys, lists=lists)

@@ -65,7 +65,7 @@ def measure(data: Any) -> dict[str, Measured]:
             start=STARTS["b"][2][0],
             circled=rest[1].round(4).tolist(),
         ),
-        "fig05a-one-layer": measured(bool(wrong.max() == 0), bool(wrong.max() > 0), shares=wrong.round(3).tolist()),
+        "fig05a-one-layer": measured(bool(wrong.max() > 0), shares=wrong.round(3).tolist()),
         "fig05a-limit": measured(
             largest < limit,
             largest > limit,

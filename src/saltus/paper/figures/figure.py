@@ -25,6 +25,7 @@ class PaperFigure:
     name: str
     title: str
     caption: str
+    section: str = ""  # its number in the paper; none where the statements are of several sections
     compute: Callable[..., Any]
     measure: Callable[[Any], Measures] = lambda data: {}
     draw: Callable[[Any], Any] | None = None
@@ -49,7 +50,7 @@ class PaperFigure:
 def paper_figure(name: str, **parts: Any) -> PaperFigure:
     """A `PaperFigure` with its title and caption from `captions.toml`."""
     words = _captions()[name]
-    return PaperFigure(name=name, title=words["title"], caption=words["caption"], **parts)
+    return PaperFigure(name=name, title=words["title"], caption=words["caption"], section=words.get("section", ""), **parts)
 
 
 @cache

@@ -115,7 +115,7 @@ def _closed_form(panels: Panels) -> Measured:
     beta0, damping = math.radians(float(attrs["beta0_degrees"])), float(attrs["damping"])
     known = [high_frequency_onset(fast, beta0=beta0, vertical=v, damping=damping, order=2) for v in ROWS]
     away = _farthest(onset(panels[fast], ROWS) / np.array(known))
-    return measured(False, away < 0.02, frequency=fast, low=ROWS[0], high=ROWS[-1], difference=away)
+    return measured(away < 0.02, frequency=fast, low=ROWS[0], high=ROWS[-1], difference=away)
 
 
 def agreement(data: Any) -> Measured:

@@ -1,0 +1,112 @@
+"""The ledger: how many of the paper's statements hold as printed, fail and are corrected, or are not checked, section by section."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from saltus.paper.claims.claim import Claim, ClaimVerdict
+from saltus.paper.claims.claim_tables import Listing, Origin, section_titles
+
+PAPER_VERDICTS = (
+    ClaimVerdict.AS_PRINTED,
+    ClaimVerdict.CORRECTED,
+    ClaimVerdict.UNDECIDED,
+    ClaimVerdict.NOT_CHECKED,
+    ClaimVerdict.DISAGREES,
+)
+LISTING_TITLES = {
+    Listing.FINDINGS: "What changes a conclusion of the paper",
+    Listing.VALIDITY: "Where the reduced model may not be believed",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class SectionCount:
+    """The verdicts on one section, or on all of them."""
+
+    name: str
+    paper: Counter[ClaimVerdict]  # of what the paper states
+    ours: Counter[ClaimVerdict]  # of our own checks
+
+    def cells(self) -> tuple[str, ...]:
+        """A row of the ledger's table, under `HEADINGS`."""
+        counts = [self.paper.total(), *(self.paper[verdict] for verdict in PAPER_VERDICTS)]
+        own = self.ours.total()
+        return self.name, *map(str, counts), f"{self.ours[ClaimVerdict.HOLDS]} of {own}" if own else "–"
+
+
+HEADINGS = ("section", "statements", *map(str, PAPER_VERDICTS), "own checks that hold")
+
+
+def ledger(claims: Iterable[Claim]) -> list[SectionCount]:
+    """One count for each section that claims are of, in the paper's order, and one of all."""
+    claims, titles = list(claims), section_titles()
+    order = list(titles)
+    sections = sorted({claim.section for claim in claims}, key=lambda s: order.index(s) if s in order else len(order))
+    rows = [_count(f"{s} {titles.get(s, '')}".strip(), (c for c in claims if c.section == s)) for s in sections]
+    return [*rows, _count("all", claims)]
+
+
+def _count(name: str, claims: Iterable[Claim]) -> SectionCount:
+    counts = {origin: Counter[ClaimVerdict]() for origin in Origin}
+    for claim in claims:
+        counts[claim.origin][claim.verdict] += 1
+    return SectionCount(name, counts[Origin.PAPER], counts[Origin.OURS])
+
+
+def tally(claims: Iterable[Claim]) -> str:
+    """How many claims carry each verdict, in words."""
+    total = ledger(claims)[-1]
+    paper, ours = total.paper, total.ours
+    return (
+        f"{paper.total()} statements of the paper: {paper[ClaimVerdict.AS_PRINTED]} hold as printed, "
+        f"{paper[ClaimVerdict.CORRECTED]} fail as printed and are corrected by an erratum, "
+        f"{paper[ClaimVerdict.UNDECIDED]} are undecided, {paper[ClaimVerdict.NOT_CHECKED]} are not checked, "
+        f"{paper[ClaimVerdict.DISAGREES]} disagree. Of {ours.total()} checks of our own {ours[ClaimVerdict.HOLDS]} hold."
+    )
+
+
+def to_markdown(claims: Iterable[Claim]) -> str:
+    """The counts section by section, what is listed first, and the table of claims of each section."""
+    claims = list(claims)
+    lines = ["# The paper's claims, computed", "", tally(claims), "", *ledger_table(claims), ""]
+    for listing, headlines in listed(claims):
+        lines += [f"## {LISTING_TITLES[listing]}", "", *(f"* {text} (`{claim.id}`)" for claim, text in headlines), ""]
+    for section, title in section_titles().items():
+        here = [claim for claim in claims if claim.section == section]
+        if here:
+            lines += [f"## {section} {title}", "", *_claims_table(here), ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def ledger_table(claims: Iterable[Claim]) -> list[str]:
+    """The lines of the table of counts in Markdown."""
+    return _table([HEADINGS, *(row.cells() for row in ledger(claims))])
+
+
+def listed(claims: Iterable[Claim]) -> Iterator[tuple[Listing, list[tuple[Claim, str]]]]:
+    """What the report says first: the headlines of each listing; a finding counts where the statement fails as printed."""
+    claims = list(claims)
+    for listing in Listing:
+        here = [c for c in claims if c.listing is listing]
+        if listing is Listing.FINDINGS:
+            here = [c for c in here if c.verdict is ClaimVerdict.CORRECTED]
+        if here:
+            yield listing, [(claim, claim.headline or claim.statement) for claim in here]
+
+
+def _claims_table(claims: Iterable[Claim]) -> list[str]:
+    rows = [("id", "where", "claim", "paper", "here", "verdict", "evidence")]
+    rows += [(c.id, c.where, _statement(c), c.paper, c.value, c.verdict_text, c.evidence) for c in claims]
+    return _table(rows)
+
+
+def _statement(claim: Claim) -> str:
+    return f"{claim.statement} (own check)" if claim.origin is Origin.OURS else claim.statement
+
+
+def _table(rows: Iterable[tuple[str, ...]]) -> list[str]:
+    first, *rest = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
+    return [first, "|" + "---|" * (first.count(" | ") + 1), *rest]
