@@ -1,6 +1,6 @@
 """The report: the paper's sections in its order, every figure with its caption and every claim with its verdict.
 
-It is written as HTML, Markdown and JSON, and begins with the ledger: how many statements hold as printed, fail, or are not checked.
+It is written as HTML, Markdown and JSON, and begins with the ledger: how many statements hold, fail, or are not checked.
 """
 
 from __future__ import annotations

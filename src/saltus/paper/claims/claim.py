@@ -149,23 +149,17 @@ def _row(id: str, entry: ClaimEntry, judged: tuple[str, str, ClaimVerdict], evid
 
 
 def with_summaries(claims: Iterable[Claim]) -> list[Claim]:
-    """The claims, and those that rest on them: a summary has the gravest verdict of what it sums up, and comes once all is judged."""
+    """The claims, and those that rest on them: a summary has the gravest verdict of what it sums up, once all of that is judged."""
     known = {claim.id: claim for claim in claims}
     entries = {id: entry for part in claim_tables().values() for id, entry in part.items() if entry.rests_on}
-    found = [
-        _summary(id, entry, [known[other] for other in entry.rests_on])
-        for id, entry in entries.items()
-        if entry.rests_on and all(other in known for other in entry.rests_on)
-    ]
-    return [*known.values(), *found]
+    ready = {id: entry for id, entry in entries.items() if all(other in known for other in entry.rests_on)}
+    return [*known.values(), *(_summary(id, entry, [known[other] for other in entry.rests_on]) for id, entry in ready.items())]
 
 
 def _summary(id: str, entry: ClaimEntry, parts: list[Claim]) -> Claim:
     gravity = list(ClaimVerdict)
     gravest = max(parts, key=lambda claim: gravity.index(claim.verdict))
-    verdict = (
-        gravest.verdict if entry.origin is Origin.OURS or gravest.verdict is not ClaimVerdict.HOLDS else ClaimVerdict.AS_PRINTED
-    )
+    verdict = _true(entry) if gravest.verdict is ClaimVerdict.HOLDS else gravest.verdict
     evidence = "rests on " + ", ".join(f"{claim.id} ({claim.verdict_text})" for claim in parts)
     row = _row(id, entry, ("as stated", "see the claims it rests on", verdict), evidence)
     return replace(row, erratum=entry.erratum or (gravest.erratum if verdict is ClaimVerdict.CORRECTED else None))

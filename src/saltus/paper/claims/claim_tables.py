@@ -1,7 +1,7 @@
 """The tables of claims: what the paper says, as data, in one TOML file for each section and in the paper's order.
 
-A file begins with the `section` of the paper, its number, and its `title`. A table `[part.claim-id]` holds, for the claim that the
-part (a figure, table or group of statements) bears on:
+A file begins with the `section` of the paper, its number, and its `title`. A table `[part.claim-id]` holds, for the claim that
+the part (a figure, table or group of statements) bears on:
 
     place        equation label, section or figure
     statement    in our own words

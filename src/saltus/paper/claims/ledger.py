@@ -1,4 +1,4 @@
-"""The ledger: how many of the paper's statements hold as printed, fail and are corrected, or are not checked, section by section."""
+"""The ledger: how many of the paper's statements hold as printed, are corrected or are not checked, section by section."""
 
 from __future__ import annotations
 
