@@ -11,19 +11,26 @@ from .manifolds.phase_plane import Separatrix, separatrices
 from .manifolds.saddle_manifolds import Manifold, stable_manifold, unstable_manifold
 from .verdict.classification import classify
 from .verdict.tori import excludes_tori
+from .verdict.unsettled import JUDGEMENT, Doubt, Judged, JudgementSettings, SettledLater, Unsettled, judge_unsettled
 from .verdict.verdict import Verdict
 from .verdict.zero_one_test import ZeroOne, zero_one_test
 
 __all__ = [
+    "JUDGEMENT",
     "Attractor",
     "Attractors",
     "BasinEntropy",
+    "Doubt",
     "Equilibrium",
     "Exponents",
+    "Judged",
+    "JudgementSettings",
     "Manifold",
     "Separatrix",
+    "SettledLater",
     "Target",
     "UncertaintyExponent",
+    "Unsettled",
     "Verdict",
     "Wada",
     "ZeroOne",
@@ -34,6 +41,7 @@ __all__ = [
     "equilibria",
     "excludes_tori",
     "find_attractors",
+    "judge_unsettled",
     "largest_exponents",
     "lyapunov_many",
     "lyapunov_spectrum",

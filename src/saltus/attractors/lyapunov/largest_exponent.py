@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,14 +21,25 @@ class Largest:
     exponent: np.ndarray  # per unit of dimensionless time
     error: np.ndarray  # half width of its 95 % interval
     positive: np.ndarray  # whether it is above its error and the resolution, in all and in both halves
-    states: np.ndarray  # (n, 2) at the end
+    rates: np.ndarray  # (32, n): from each stretch
+    duration: np.ndarray  # (n,): of the run
 
-    def replaced(self, rows: np.ndarray, other: Largest) -> Largest:
-        """A copy in which some of the motions are those of another run."""
-        columns = {part.name: getattr(self, part.name).copy() for part in fields(self)}
-        for name, values in columns.items():
-            values[rows] = getattr(other, name)
-        return Largest(**columns)
+    @classmethod
+    def of(cls, rates: np.ndarray, duration: np.ndarray) -> Largest:
+        """The averages of rates (32, n) over runs of these durations, (n,)."""
+        found = Estimate.of(rates)
+        return cls(found.value, found.error, found.positive(duration), rates, duration)
+
+    def averaged(self, chosen: np.ndarray) -> Largest:
+        """The exponents of groups of motions that follow one another, averaged over those chosen, (groups, size).
+
+        Motions on one attractor are samples of it, whose average has a smaller error than each of them.
+        """
+        rates = self.rates.reshape(-1, *chosen.shape)
+        counted = chosen & np.isfinite(rates)
+        with np.errstate(invalid="ignore"):
+            mean = np.where(counted, rates, 0.0).sum(axis=2) / counted.sum(axis=2)
+        return Largest.of(mean, self.duration.reshape(chosen.shape)[:, 0])
 
 
 def largest_exponents(
@@ -58,5 +69,4 @@ def largest_exponents(
             direction[here] = grown / length[:, None]
         states[here] = np.where(going[:, None], last_states(system, ends), np.nan)
     duration = periods * 2.0 * math.pi / frequency
-    found = Estimate.of(growth / duration)
-    return Largest(found.value, found.error, found.positive(LYAPUNOV.stretches * duration), states)
+    return Largest.of(growth / duration, LYAPUNOV.stretches * duration)

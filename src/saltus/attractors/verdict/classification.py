@@ -8,7 +8,7 @@ import numpy as np
 
 from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.attractors.verdict.nonsettling import SETTINGS, judge_unsettled
+from saltus.attractors.verdict.nonsettling import SETTINGS, unsettled
 from saltus.attractors.verdict.verdict import Verdict, VerdictRequest, settled
 from saltus.checks import check_count, check_number
 from saltus.errors import ParameterError
@@ -62,7 +62,7 @@ def classify(
     check_count("max_period", max_period, RECURRENCE.compiled_max_period)
     case = VerdictRequest(system, clock, int(periods), int(max_period), int(seed), float(tol), progress)
     ends = case.follow(start, int(transient + periods), max(SETTINGS.states, 4 * int(max_period)), (0.0, 0.1))
-    verdict = settled(case, ends, start[0]) or judge_unsettled(case, ends)
+    verdict = settled(case, ends, start[0]) or unsettled(case, ends)
     progress(1.0, "verdict")
     return verdict
 

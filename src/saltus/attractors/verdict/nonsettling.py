@@ -78,7 +78,7 @@ class _Judged:
         }
 
 
-def judge_unsettled(case: VerdictRequest, ends: Recurrence) -> Verdict:
+def unsettled(case: VerdictRequest, ends: Recurrence) -> Verdict:
     """The verdict on a motion that has not settled."""
     if case.system.load.period is None:
         return case.undecided(Reason.CONSERVATIVE, ends, {})

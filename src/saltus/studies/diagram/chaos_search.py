@@ -125,8 +125,9 @@ class _ChaosSearch:
         again = np.flatnonzero(~found.positive & (found.exponent > 0.0))  # weak chaos, or none: a longer run may decide
         if again.size:
             columns, stretch = {self.path: values[again]}, SETTINGS.longer_stretch
-            longer = largest_exponents(self.system, found.states[again], columns, periods=stretch, tol=SETTINGS.tol)
-            found = found.replaced(again, longer)
+            longer = largest_exponents(self.system, tried.states[rows][again, -1], columns, periods=stretch, tol=SETTINGS.tol)
+            for name in ("exponent", "error", "positive"):
+                getattr(found, name)[again] = getattr(longer, name)
         tried.exponent[rows], tried.error[rows], positive = found.exponent, found.error, found.positive
         tried.undecided[rows] = ~positive & ~(found.exponent + found.error < 0.0)
         if positive.any():

@@ -1,0 +1,285 @@
+"""What becomes of motions that have not settled: chaos, a transient, or a periodic motion of long period; many questions at once.
+
+Charts and diagrams both ask this function, so that they cannot contradict each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from saltus.attractors.lyapunov.largest_exponent import Largest, largest_exponents
+from saltus.flow import RECURRENCE, Outcome, Recurrence, find_recurrence, return_period
+from saltus.progress import Progress, part_of, silent
+from saltus.systems import System
+
+
+class Unsettled(IntEnum):
+    """What motions are that have neither come to rest nor repeated themselves so far."""
+
+    UNDECIDED = 0
+    CHAOTIC = 1
+    TRANSIENT = 2
+    PERIODIC = 3
+
+    def __str__(self) -> str:
+        return SENTENCES[self]
+
+
+SENTENCES = {
+    Unsettled.UNDECIDED: "the numbers do not bear out a verdict",
+    Unsettled.CHAOTIC: "neighbouring motions part for good, and none of them settles",
+    Unsettled.TRANSIENT: "motions from the same states settle after a while",
+    Unsettled.PERIODIC: "neighbouring motions come together: it settles slowly, or on an orbit of a long period",
+}
+
+
+class Doubt(IntEnum):
+    """Why no verdict is borne out."""
+
+    NONE = 0
+    NEAR_ZERO = 1
+    FEW_SETTLED = 2
+    NO_EXPONENT = 3
+
+    def __str__(self) -> str:
+        return DOUBTS[self]
+
+
+DOUBTS = {
+    Doubt.NONE: "there is a verdict",
+    Doubt.NEAR_ZERO: "the largest exponent is not surely above or below 0",
+    Doubt.FEW_SETTLED: "some motions settled, too few to tell a long transient from chaos beside one",
+    Doubt.NO_EXPONENT: "the motions rest or end before an exponent is known",
+}
+
+
+@dataclass(frozen=True)
+class JudgementSettings:
+    """How long motions that have not settled are followed, and what then counts as chaos."""
+
+    # Number of companions: motions from the states of a question, which stand for all motions there.
+    companions: int = 24
+    first_periods: int = 250  # The first round in forcing periods; most transients end in it, and need no exponents.
+    round_periods: int = 1000  # The length of each further round. After a round survivors take the places of what has settled.
+    rounds: int = 6  # The largest number of further rounds.
+    # Forcing periods, added up over companions, in which none may settle. If none has settled within E, transients of a mean life
+    # of E / 3 or less are excluded with a probability of 95 %, as the number that settle within E is Poisson distributed.
+    exposure: int = 48_000
+    # Number of those that must have settled, where others go on: a life is estimated from three to within a factor of about 3.
+    # Where some settle and others stop to do so, these must outlast three of the lives that the former show.
+    settled: int = 3
+    measured: int = 8  # Number of survivors of which the exponent is measured; their average is the question's exponent.
+    stretch: int = 12  # Forcing periods of a stretch of the exponent (32 of them).
+    longer_stretch: int = 60  # The same, where the shorter run leaves open whether the exponent is positive.
+    # Distance between the beginnings of companions from one state, or they would all be one motion. Chaos of exponent 0.005
+    # brings them apart within 3000 units of time; those from several states are apart from the beginning.
+    apart: float = 1e-7
+    longest_period: int = 128  # The longest period looked for in a regular motion that has not settled, in forcing periods.
+    patience: int = 4000  # Forcing periods for which such a motion is followed, so that multipliers up to 0.99 may settle.
+    tol: float = 1e-10  # The error of a step.
+
+
+JUDGEMENT = JudgementSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """The answers, an entry for each question."""
+
+    verdict: np.ndarray  # (n,): an `Unsettled` each
+    doubt: np.ndarray  # (n,): a `Doubt` each
+    exponent: np.ndarray  # (n,): the largest one of what has not settled, per unit of time; nan where all settled at once
+    error: np.ndarray  # (n,): half width of its 95 % interval
+    life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the one that is excluded with 95 %
+    period: np.ndarray  # (n,): forcing periods after which a periodic motion repeats itself, 0 where that is not known
+    states: np.ndarray  # (n, companions, 2): the last stroboscopic states, of survivors where there are any
+    settled: SettledLater  # what companions settled on
+
+    def __len__(self) -> int:
+        return len(self.verdict)
+
+
+@dataclass(frozen=True, eq=False)
+class SettledLater:
+    """Periodic motions on which companions settled."""
+
+    question: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))  # (k,): the number of the question
+    state: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # (k, 2): at phase 0
+    period: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))  # (k,): in forcing periods
+
+    def joined(self, other: SettledLater) -> SettledLater:
+        """These and others."""
+        return SettledLater(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in ("question", "state", "period")))
+
+
+def judge_unsettled(
+    system: System,
+    states: np.ndarray,
+    parameters: Mapping[str, np.ndarray],
+    *,
+    settings: JudgementSettings = JUDGEMENT,
+    progress: Progress = silent,
+) -> Judged:
+    """Whether motions that have not settled are chaotic, transient, or periodic after all.
+
+    A question is a set of stroboscopic states under one set of parameters: the last ones of a motion, or of several motions that
+    have not settled. Companions start at them and are followed in rounds. Chaos takes two things. The average of the survivors'
+    largest exponents is above 0 by more than its 95 % error and the resolution 2 ln(t) / t, in both halves of the run. And within
+    a number of forcing periods, added up over companions, none settles: settling from chaotic transients is a Poisson process,
+    whose rate is estimated or bounded by that. If some settle, their places are taken by survivors, so that an attractor beside a
+    transient becomes an ever larger share of the companions, and shows itself by three mean lives in which none settles.
+
+    Args:
+        system: what moves, with one coordinate, under a load with a frequency.
+        states: (n, m, 2), coordinate and velocity at phase 0; rows of nan are left out, a question needs one other.
+        parameters: numbers by dotted path, (n,) each, in place of the system's.
+        settings: how long is looked, and how surely.
+        progress: called with the fraction done.
+    """
+    run = _Judgement.begin(system, states, parameters, settings)
+    run.follow(settings.first_periods, part_of(progress, 0.0, 0.2, "judging"))
+    run.measure(settings.stretch, np.flatnonzero(run.open))
+    run.measure(settings.longer_stretch, np.flatnonzero(run.open & ~run.positive & ~run.negative))
+    for i in range(settings.rounds):
+        run.open &= (run.positive & ~run.lasts) | (~run.positive & ~run.negative & (run.gone > 0))
+        run.follow(settings.round_periods, part_of(progress, 0.3 + 0.7 * i / settings.rounds, 1.0, "judging"))
+    run.look_for_long_periods()
+    progress(1.0, "judging")
+    return run.judged()
+
+
+@dataclass(eq=False)
+class _Judgement:
+    """The questions on their way."""
+
+    system: System
+    parameters: dict[str, np.ndarray]
+    settings: JudgementSettings
+    states: np.ndarray  # (n, companions, 2)
+    open: np.ndarray  # (n,): still to be followed
+    positive: np.ndarray  # (n,): whether the exponent is surely above 0
+    negative: np.ndarray  # (n,): surely below
+    exponent: np.ndarray
+    error: np.ndarray
+    period: np.ndarray
+    gone: np.ndarray  # (n,): number of companions that have settled
+    exposure: np.ndarray  # (n,): forcing periods of companions in all
+    before: np.ndarray  # (n,): those of the rounds up to the last one in which any settled
+    all_gone: np.ndarray  # (n,): whether no companion is left
+    settled: SettledLater = field(default_factory=SettledLater)
+
+    @classmethod
+    def begin(
+        cls, system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray], settings: JudgementSettings
+    ) -> _Judgement:
+        """Companions at the states of each question."""
+        n = len(states)
+        chosen = np.full((n, settings.companions, 2), np.nan)
+        for row, given in enumerate(states):
+            chosen[row] = _companions(given[np.isfinite(given).all(axis=-1)], settings)
+        columns = {path: np.broadcast_to(np.asarray(values, dtype=float), n) for path, values in parameters.items()}
+        flags = (np.zeros(n, dtype=bool) for _ in range(3))
+        zeros = (np.zeros(n, dtype=int) for _ in range(4))
+        positive, negative, all_gone = flags
+        period, gone, exposure, before = zeros
+        empty = np.full((2, n), np.nan)
+        return cls(
+            system, columns, settings, chosen, np.ones(n, dtype=bool), positive, negative, empty[0], empty[1],
+            period, gone, exposure, before, all_gone,
+        )  # fmt: skip
+
+    def _ends(self, rows: np.ndarray, states: np.ndarray, periods: int, progress: Progress, **options: Any) -> Recurrence:
+        """How motions from states (rows, m, 2) end."""
+        columns = {path: np.repeat(values[rows], states.shape[1]) for path, values in self.parameters.items()}
+        options = {"kept": 1} | options
+        return find_recurrence(
+            self.system, states.reshape(-1, 2), periods, parameters=columns, tol=self.settings.tol, progress=progress, **options
+        )
+
+    def follow(self, periods: int, progress: Progress) -> None:
+        """A round: what settles is counted, and survivors take its place."""
+        rows = np.flatnonzero(self.open)
+        if not rows.size:
+            return
+        ends = self._ends(rows, self.states[rows], periods, progress)
+        shape = (rows.size, self.settings.companions)
+        moving, last = (ends.outcome == Outcome.MOVING).reshape(shape), ends.last.reshape(*shape, 2)
+        self._keep_settled(rows, ends)
+        left = (~moving).sum(axis=1)
+        self.exposure[rows] += np.ceil(ends.periods).astype(int).reshape(shape).sum(axis=1)
+        self.gone[rows] += left
+        self.before[rows] = np.where(left > 0, self.exposure[rows], self.before[rows])
+        for i, row in enumerate(rows):
+            survivors = last[i][moving[i]]
+            self.all_gone[row] = not len(survivors)
+            self.states[row] = _companions(survivors, self.settings) if len(survivors) else last[i]
+        self.open[rows] = ~self.all_gone[rows]
+
+    @property
+    def lasts(self) -> np.ndarray:
+        """Where none has settled for so long that a transient is excluded, (n,)."""
+        life = self.before / np.maximum(self.gone, 1)
+        return np.asarray(self.exposure - self.before >= np.maximum(self.settings.exposure, 3.0 * life))
+
+    def _keep_settled(self, rows: np.ndarray, ends: Recurrence) -> None:
+        """Remember on what companions have settled."""
+        here = np.flatnonzero(ends.periodic)
+        question = rows[here // self.settings.companions]
+        self.settled = self.settled.joined(SettledLater(question, ends.last[here], ends.period[here]))
+
+    def measure(self, stretch: int, rows: np.ndarray) -> None:
+        """The exponents of some survivors of these questions, averaged over those that are not surely regular."""
+        if not rows.size:
+            return
+        count = min(self.settings.measured, self.settings.companions)
+        chosen = np.linspace(0, self.settings.companions - 1, count).astype(int)
+        states = self.states[rows][:, chosen].reshape(-1, 2)
+        columns = {path: np.repeat(values[rows], count) for path, values in self.parameters.items()}
+        found = largest_exponents(self.system, states, columns, periods=stretch, tol=self.settings.tol)
+        self._average(rows, found, count)
+
+    def _average(self, rows: np.ndarray, found: Largest, count: int) -> None:
+        regular = (found.exponent + found.error < 0.0).reshape(-1, count)
+        mean = found.averaged(np.where(regular.all(axis=1)[:, None], True, ~regular))
+        self.exponent[rows], self.error[rows], self.positive[rows] = mean.exponent, mean.error, mean.positive
+        self.negative[rows] = mean.exponent + mean.error < 0.0
+
+    def look_for_long_periods(self) -> None:
+        """Follow what is not surely chaotic, and has not settled, until it does: near bifurcations exponents are near 0."""
+        rows = np.flatnonzero(~self.positive & ~self.all_gone)
+        if not rows.size:
+            return
+        longest = self.settings.longest_period
+        options = {"max_period": longest, "kept": 2 * longest + 2}
+        ends = self._ends(rows, self.states[rows, :1], self.settings.patience, silent, **options)
+        rows, ends = rows[ends.periodic], ends.only(ends.periodic)
+        fewest = return_period(ends.states, longest, RECURRENCE.long_agreement)
+        self.period[rows] = fewest
+        self.settled = self.settled.joined(SettledLater(rows, ends.last, fewest))
+
+    def judged(self) -> Judged:
+        """The verdicts that follow from what was counted and measured."""
+        n = len(self.open)
+        verdict, doubt = np.full(n, Unsettled.UNDECIDED), np.full(n, Doubt.NEAR_ZERO)
+        lasts = self.positive & ~self.all_gone & self.lasts
+        some = self.positive & ~self.lasts
+        transient = self.all_gone | (some & (self.gone >= self.settings.settled))
+        doubt[some], doubt[np.isnan(self.exponent)] = Doubt.FEW_SETTLED, Doubt.NO_EXPONENT
+        periodic = (self.negative | (self.period > 0)) & ~self.all_gone
+        for chosen, kind in ((periodic, Unsettled.PERIODIC), (transient, Unsettled.TRANSIENT), (lasts, Unsettled.CHAOTIC)):
+            verdict[chosen], doubt[chosen] = kind, Doubt.NONE
+        with np.errstate(divide="ignore"):
+            life = np.where(lasts, (self.exposure - self.before) / 3.0, self.exposure / self.gone)
+        return Judged(verdict, doubt, self.exponent, self.error, life, self.period, self.states, self.settled)
+
+
+def _companions(states: np.ndarray, settings: JudgementSettings) -> np.ndarray:
+    """So many states, beside these (m, 2), spread evenly over them."""
+    chosen = states[np.linspace(0, len(states) - 1, settings.companions).astype(int)]
+    beside: np.ndarray = chosen + settings.apart * np.arange(settings.companions)[:, None]
+    return beside

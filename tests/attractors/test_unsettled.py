@@ -1,0 +1,96 @@
+"""Motions that have not settled: chaos, transients with their lives, and slow or long periodic motions."""
+
+import numpy as np
+import pytest
+from shared_systems import forced
+
+from saltus import WallOscillator, simulate_many
+from saltus.attractors import Doubt, JudgementSettings, Unsettled, judge_unsettled
+from saltus.flow import Outcome, find_recurrence
+from saltus.systems import Harmonic, Load, System
+
+FREQUENCY, AMPLITUDE = "load.frequency", "load.horizontal.amplitude"
+
+
+def unsettled_states(system, path, value, periods=300, starts=6, kept=16):
+    """The last states of the motions from random states that have not settled at one value, (1, n, 2)."""
+    states = np.random.default_rng(1).uniform(-2.0, 2.0, (starts, 2))
+    ends = find_recurrence(system, states, periods, parameters={path: np.full(starts, value)}, kept=kept)
+    return ends.states[ends.outcome == Outcome.MOVING].reshape(1, -1, 2)
+
+
+def judged(system, path, value, **options):
+    return judge_unsettled(system, unsettled_states(system, path, value, **options), {path: np.array([value])})
+
+
+def test_the_motion_that_erratum_32_overlooked_is_chaotic():
+    """The review of the results, section 2: Omega = 0.5, Hhat = 0.105, exponent about 0.07 by two integrators."""
+    found = judged(forced(0.105, 0.5), AMPLITUDE, 0.105)
+    assert found.verdict.tolist() == [Unsettled.CHAOTIC]
+    assert found.exponent[0] == pytest.approx(0.07, abs=0.01)
+    assert found.error[0] < 0.01
+    assert found.doubt.tolist() == [Doubt.NONE]
+
+
+def test_a_transient_is_one_and_its_life_is_that_of_an_ensemble():
+    """numerics.md: transients at Omega = 4, Hhat between 7.2 and 7.7; the life by plain simulation without any judgement."""
+    system = forced(7.2, 4.0)
+    found = judged(system, AMPLITUDE, 7.2, starts=24)
+    assert found.verdict.tolist() == [Unsettled.TRANSIENT]
+    states = np.random.default_rng(2).uniform(-2.0, 2.0, (400, 2))
+    ends = simulate_many(system, theta=states[:, 0], velocity=states[:, 1], periods=3000, until=("settled",), tol=1e-11)
+    late = ends["periods"].values
+    late = late[late > 300]
+    life = (late - 300).sum() / (late < 3000).sum()
+    assert len(late) > 100
+    assert found.life[0] == pytest.approx(life, rel=0.6)
+
+
+def test_what_companions_settle_on_repeats_itself():
+    system = forced(7.2, 4.0)
+    settled = judged(system, AMPLITUDE, 7.2).settled
+    assert len(settled.period) > 0
+    for state, period in zip(settled.state, settled.period, strict=True):
+        later = simulate_many(system, theta=state[0], velocity=state[1], periods=int(period), tol=1e-12)
+        assert [later["theta"].item(), later["velocity"].item()] == pytest.approx(state, abs=1e-8)
+
+
+def test_a_slow_linear_oscillator_is_periodic_with_half_its_damping_as_exponent():
+    system = System(
+        model=WallOscillator(stiffness=1.0, damping=0.005, wall=50.0), load=Load(frequency=1.7, force=Harmonic(amplitude=0.1))
+    )
+    found = judged(system, FREQUENCY, 1.7)
+    assert found.verdict.tolist() == [Unsettled.PERIODIC]
+    assert found.exponent[0] == pytest.approx(-0.0025, rel=0.01)
+    assert found.period.tolist() == [1]
+
+
+def test_weak_chaos_is_chaos_and_a_period_longer_than_was_looked_for_is_none():
+    """Both near the end of the cascade of period doublings at Omega = 0.3994, Hhat = 0.2 (numerics.md)."""
+    values, system = np.array([0.397, 0.397875]), forced(0.2)
+    states = np.concatenate([unsettled_states(system, FREQUENCY, value)[:, :16] for value in values])
+    found = judge_unsettled(system, states, {FREQUENCY: values})
+    assert found.verdict.tolist() == [Unsettled.CHAOTIC, Unsettled.PERIODIC]
+    assert 0.0 < found.error[0] < found.exponent[0] < 0.01
+    (state,), (period,) = found.settled.state, found.settled.period
+    later = simulate_many(system.with_({FREQUENCY: 0.397875}), theta=state[0], velocity=state[1], periods=int(period), last="all")
+    visited = later["sampled_theta"].values
+    assert period > 16
+    assert abs(visited[-1] - state[0]) < 1e-7
+    assert np.abs(visited[:-1] - state[0]).min() > 1e-5
+
+
+def test_what_is_looked_at_too_briefly_is_undecided():
+    short = JudgementSettings(companions=4, rounds=0)
+    found = judge_unsettled(forced(7.2, 4.0), unsettled_states(forced(7.2, 4.0), AMPLITUDE, 7.2), {}, settings=short)
+    assert found.verdict.tolist() == [Unsettled.UNDECIDED]
+    assert found.doubt.tolist() == [Doubt.FEW_SETTLED]
+
+
+def test_a_question_is_answered_the_same_alone_and_among_others():
+    system, values = forced(0.2), np.array([0.37, 0.38, 0.39])
+    states = np.concatenate([unsettled_states(system, FREQUENCY, value)[:, :16] for value in values])
+    many = judge_unsettled(system, states, {FREQUENCY: values})
+    one = judge_unsettled(system, states[1:2], {FREQUENCY: values[1:2]})
+    assert (many.verdict[1], many.exponent[1], many.error[1]) == (one.verdict[0], one.exponent[0], one.error[0])
+    assert np.array_equal(many.states[1], one.states[0])
