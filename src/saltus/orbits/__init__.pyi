@@ -6,7 +6,7 @@ from .newton import solve
 from .orbit import PeriodicOrbit
 from .problem import Problem
 from .resting import RestingOrbit
-from .search import EVEN, Search, initial_states, same_orbit, search_orbits
+from .search import EVEN, Search, initial_states, same_orbit, search_orbits, within_window
 from .signature import Signature
 from .special_curve import SpecialCurve
 from .special_curve_continuation import continue_special
@@ -43,4 +43,5 @@ __all__ = [
     "search_orbits",
     "solve",
     "switch_branch",
+    "within_window",
 ]

@@ -126,13 +126,18 @@ def search_orbits(
 def initial_states(system: System, count: int, window: Window, seed: int) -> np.ndarray:
     """(count, 2): coordinates and velocities spread over a window; those beyond a one-sided contact are reflected at it."""
     offset = np.random.default_rng(seed).random(2)
-    points = 2.0 * ((offset + np.arange(1, count + 1)[:, None] * EVEN) % 1.0) - 1.0
+    return within_window(system, 2.0 * ((offset + np.arange(1, count + 1)[:, None] * EVEN) % 1.0) - 1.0, window)
+
+
+def within_window(system: System, points: np.ndarray, window: Window, shrunk: Any = 1.0) -> np.ndarray:
+    """The states (..., 2) at points of the square (-1, 1)^2 laid over a window, drawn in towards the contact by a factor; those
+    beyond a one-sided contact are reflected at it."""
     contact = _contact(system)
-    states = points * window.half + (window.centre - contact)
+    states = (points * window.half + (window.centre - contact)) * shrunk
     model = system.model
     if len(model.sides) == 1:
         inward = np.sign(float(model.gap(model.contact + 1.0, model.sides[0])))
-        states[:, 0] = inward * np.abs(states[:, 0])
+        states[..., 0] = inward * np.abs(states[..., 0])
     return np.asarray(states + contact)
 
 

@@ -1,0 +1,156 @@
+"""The motions of a diagram's one simulation: where each of them begins, along the parameter, and how it ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import Window
+from saltus.flow import Outcome, Recurrence, find_recurrence, return_distances
+from saltus.orbits import EVEN, within_window
+from saltus.progress import Progress, silent
+from saltus.systems import System
+
+
+@dataclass(frozen=True)
+class SimulationSettings:
+    """How motions are started, followed and kept."""
+
+    # The compiled lanes tell periods up to this one (`RECURRENCE`): those beyond a diagram's longest one are no chaos either.
+    max_period: int = 16
+    kept: int = 64  # Stroboscopic states that are kept of each motion, for the dots of a diagram and as beginnings of others.
+    # Every other start lies in a smaller copy of the window, down to this share of its size: some motions are small.
+    innermost: float = 1e-2
+    # An unsettled motion is slow and no chaos if it comes back so near to where it was, relative to the size of the motion.
+    slow: float = 1e-2
+    patience: int = 8  # Slow motions are followed for so many times the forcing periods of the others.
+    still: float = 1e-6  # A motion that stays this near to the contact is at rest.
+    tol: float = 1e-11  # The error of a step: a tenth of what the lanes ask of states that are the same.
+
+
+SETTINGS = SimulationSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedMotions:
+    """Motions along one parameter, a row for each."""
+
+    value: np.ndarray  # (n,) of the parameter
+    last: np.ndarray  # (n, 2): coordinate and velocity at the end, at phase 0
+    outcome: np.ndarray  # (n,): an `Outcome`
+    period: np.ndarray  # (n,): forcing periods after which it repeats itself; 0 where it does not
+    impact_count: np.ndarray  # (n,): impacts in one period; in those that are kept where it has none
+    highest: np.ndarray  # (n,): largest coordinate over its period, or those that are kept
+    lowest: np.ndarray  # (n,): the least one
+    states: np.ndarray  # (n, kept, 2): its last stroboscopic states, of a periodic motion those of one period; else nan
+    peaks: np.ndarray  # (n, kept): max abs of the coordinate in each of these periods
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """max abs of the coordinate, (n,)."""
+        return np.asarray(np.maximum(np.abs(self.highest), np.abs(self.lowest)))
+
+    @property
+    def periodic(self) -> np.ndarray:
+        """Which repeat themselves, beside those at rest, (n,)."""
+        return np.asarray(self.period > 0)
+
+    @property
+    def unsettled(self) -> np.ndarray:
+        """Which neither rest, nor repeat themselves, nor have ended: chaotic, slow, or of a period above 16, (n,)."""
+        return np.asarray(self.outcome == Outcome.MOVING)
+
+    @property
+    def at_rest(self) -> np.ndarray:
+        """Which are at rest at the contact, (n,)."""
+        return np.asarray((self.outcome == Outcome.REST) | (self.outcome == Outcome.HELD))
+
+    def only(self, rows: Any) -> SimulatedMotions:
+        """Some of the motions."""
+        return SimulatedMotions(*(getattr(self, part.name)[rows] for part in fields(self)))
+
+    def joined(self, *others: SimulatedMotions) -> SimulatedMotions:
+        """These motions, then others."""
+        every = (self, *others)
+        return SimulatedMotions(*(np.concatenate([getattr(one, part.name) for one in every]) for part in fields(self)))
+
+
+def starts_at(system: System, values: np.ndarray, count: int, window: Window, seed: int) -> np.ndarray:
+    """(values, count, 2): states spread over the window at each value, every other one drawn in towards the contact.
+
+    Those of a value follow from the seed and the value alone, and more of them begin with the fewer: a finer grid or more starts
+    only adds to what was simulated. Their union over the values is dense in the window.
+    """
+    bits = np.ascontiguousarray(values, dtype="<f8").view("<u4").reshape(len(values), 2)
+    offsets = np.array([np.random.default_rng([seed, *pair]).random(3) for pair in bits.tolist()]).reshape(-1, 1, 3)
+    number = np.arange(1, count + 1)
+    points = 2.0 * ((offsets[..., :2] + number[:, None] * EVEN) % 1.0) - 1.0
+    share = SETTINGS.innermost ** ((offsets[..., 2] + number * EVEN[0]) % 1.0)
+    inner = np.where(number % 2 == 0, share, 1.0)[..., None]
+    return within_window(system, points, window, inner)
+
+
+def simulate_from(
+    system: System, path: str, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent
+) -> SimulatedMotions:
+    """Follow motions from states (n, 2) at phase 0 at values (n,) of the parameter until they settle or the time is up."""
+    ends = _followed(system, path, values, states, periods, progress)
+    found = _motions(system, values, ends)
+    slow = np.flatnonzero(found.unsettled & _is_slow(found))
+    if slow.size:
+        later = _followed(system, path, values[slow], found.last[slow], SETTINGS.patience * periods)
+        further = _motions(system, values[slow], later)
+        for part in fields(found):
+            getattr(found, part.name)[slow] = getattr(further, part.name)
+    return found
+
+
+def _followed(
+    system: System, path: str, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent
+) -> Recurrence:
+    return find_recurrence(
+        system,
+        states,
+        max(periods, SETTINGS.kept),
+        parameters={path: values},
+        max_period=SETTINGS.max_period,
+        kept=SETTINGS.kept,
+        extrema=True,
+        impact_count=True,
+        tol=SETTINGS.tol,
+        progress=progress,
+    )
+
+
+def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedMotions:
+    """The motions as they have ended; those that stay at the contact are at rest."""
+    assert ends.extrema is not None
+    contact = float(system.model.contact) if system.model.sides else 0.0
+    highest, lowest = ends.highest, ends.lowest
+    period, outcome = ends.period.copy(), ends.outcome.copy()
+    still = np.maximum(np.abs(highest - contact), np.abs(lowest - contact)) <= SETTINGS.still
+    still &= (period > 0) | (outcome == Outcome.MOVING)
+    outcome[still], period[still] = Outcome.HELD, 0
+    shown = ends.within_period & ~ends.rest[:, None]
+    return SimulatedMotions(
+        value=np.array(values, dtype=float),
+        last=ends.last,
+        outcome=outcome,
+        period=period,
+        impact_count=ends.impact_count,
+        highest=highest,
+        lowest=lowest,
+        states=np.where(shown[..., None], ends.states, np.nan),
+        peaks=np.where(shown, np.abs(ends.extrema).max(axis=2), np.nan),
+    )
+
+
+def _is_slow(motions: SimulatedMotions) -> np.ndarray:
+    """Which motions come back near to where they were, (n,)."""
+    distance = return_distances(motions.states, SETTINGS.max_period).min(axis=1)
+    return np.asarray(np.nan_to_num(distance, nan=np.inf) <= SETTINGS.slow * np.maximum(motions.amplitude, SETTINGS.still))
