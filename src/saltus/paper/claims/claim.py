@@ -149,7 +149,7 @@ def _row(id: str, entry: ClaimEntry, judged: tuple[str, str, ClaimVerdict], evid
 
 
 def with_summaries(claims: Iterable[Claim]) -> list[Claim]:
-    """The claims, and those that rest on them: a summary has the gravest verdict of what it sums up, once all of that is judged."""
+    """The claims, and those that rest on them: a summary has the gravest verdict of what it sums up, once all that is judged."""
     known = {claim.id: claim for claim in claims}
     entries = {id: entry for part in claim_tables().values() for id, entry in part.items() if entry.rests_on}
     ready = {id: entry for id, entry in entries.items() if all(other in known for other in entry.rests_on)}
