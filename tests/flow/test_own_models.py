@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, SaltusError
 from saltus.flow import simulate
 from saltus.flow.structures import _structures
 from saltus.systems import Harmonic, Load, Model, System, VelocityReduction, WallOscillator
@@ -159,11 +159,73 @@ def test_an_array_in_a_model_is_not_taken_from_another_one():
     assert [Generated(s).coefficients(0.0, 0.5, 0.0, 3)[0, 2] for s in (one, four)] == [-0.25, -1.0]
 
 
-@pytest.mark.parametrize(("gap", "message"), [("1 - x**2", "one contact point, not two stops"), ("2 - x", "must be 0 at")])
+@pytest.mark.parametrize(
+    ("gap", "message"),
+    [
+        ("1 - x**2", "one contact point, not two stops"),
+        ("(1 - x) - (1 - x)**3", "one contact point, not two stops"),  # odd about the contact: 0 there and linear by its values
+        ("np.sinh(1 - x)", "one contact point, not two stops"),
+        ("1 - 0 * x", "must depend on the coordinate"),
+        ("2 - x", "must be 0 at"),
+    ],
+)
 def test_a_gap_that_does_not_fit_its_contact_is_refused(gap, message):
     class Stops(WallOscillator):
         def gap(self, x, side):
-            return eval(gap, {}, {"x": x})
+            return eval(gap, {"np": np}, {"x": x})
 
-    with pytest.raises(ParameterError, match=message):
+    with pytest.raises(SaltusError, match=message):
         simulate(System(model=Stops()), x=0.0, duration=1.0)
+
+
+def test_a_gap_that_is_linear_in_other_words_is_the_same_gap():
+    class Rewritten(WallOscillator):
+        def gap(self, x, side):
+            return ((self.wall + 1.0) ** 2 - (x + 1.0) * (self.wall + 1.0)) / (1.0 + self.wall)
+
+    load, start = Load(frequency=1.0, force=Harmonic(0.8)), {"x": 0.2, "periods": 5}
+    one, other = (simulate(System(model=cls(wall=0.5), load=load), **start) for cls in (WallOscillator, Rewritten))
+    assert len(one.impacts) > 3
+    assert other.impacts.time == pytest.approx(one.impacts.time, abs=1e-9)
+
+
+class Wall(Model):
+    """A wall at x = 0 whose reset is that of a passage."""
+
+    coordinates = ("x",)
+    sides = (1,)
+
+    def acceleration(self, t, x, velocity, side, load):
+        return -1.0 - x
+
+
+class Sticky(Wall):
+    def reset(self, t, velocity, side, load, impact):
+        return side, impact.velocity_after(self, t, velocity, side, side, load)  # a bounce that forgets to turn the sign
+
+
+class Leading(Wall):
+    def reset(self, t, velocity, side, load, impact):
+        return 3 * side, -velocity
+
+
+class Numbered(Wall):
+    sides = (1, 2)
+
+
+@pytest.mark.parametrize("make", [lambda: System(model=Wall()), lambda: register(Wall)])
+def test_a_wall_without_a_reset_is_refused_before_it_moves(make):
+    with pytest.raises(ParameterError, match="define reset"):
+        make()
+    assert "Wall" not in MODELS
+
+
+def test_sides_that_no_contact_has_are_refused():
+    with pytest.raises(ParameterError, match="sides must be"):
+        System(model=Numbered())
+
+
+@pytest.mark.parametrize("model", [Sticky(), Leading()])
+def test_a_reset_that_leads_beyond_the_contact_is_refused_before_the_first_impact(model):
+    with pytest.raises(SaltusError, match="beyond the contact" if isinstance(model, Sticky) else "leads from side 1 to side 3"):
+        simulate(System(model=model), x=1.0, duration=1e-3)

@@ -10,7 +10,7 @@ import pytest
 from saltus.errors import ParameterError, TraceError
 from saltus.flow.structures import structure_key
 from saltus.systems import Harmonic, Load, Metainterface, Model, Record, System, VelocityReduction, WallOscillator
-from saltus.taylor.graph import Expr, combine, differentiate, number, ordered, power, substitute
+from saltus.taylor.graph import FRICTION, Expr, combine, differentiate, number, ordered, power, substitute
 from saltus.taylor.tracing import trace
 
 X, V, T, SIDE = Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("time"), Expr("side")
@@ -113,12 +113,14 @@ def test_power_of_a_variable_exponent_is_an_exponential():
         (lambda t, x, v, s, load: np.add.reduce(x), "np.add cannot be traced"),
         (lambda t, x, v, s, load: -x if x > 0 else x, "may not branch on its state or parameters (if, and, or, min, max)"),
         (lambda t, x, v, s, load: min(x, 0.0), "may not branch on its state or parameters (if, and, or, min, max)"),
-        (lambda t, x, v, s, load: max(v, x), "use `side`"),
+        (lambda t, x, v, s, load: max(x * x, x), "use `side`"),
         (lambda t, x, v, s, load: x > 0 and v, "may not branch"),
         (lambda t, x, v, s, load: x % 1, "%, //, @ and round cannot be traced; " + ALLOWED),
         (lambda t, x, v, s, load: 1 // x, "%, //, @ and round cannot be traced"),
         (lambda t, x, v, s, load: round(x), "%, //, @ and round cannot be traced"),
-        (lambda t, x, v, s, load: abs(v), "abs of an expression that is not a coordinate cannot be traced; " + ALLOWED),
+        (lambda t, x, v, s, load: abs(v), "abs of an expression that is not a coordinate cannot be traced; " + FRICTION),
+        (lambda t, x, v, s, load: -np.sign(v), "np.sign cannot be traced; " + FRICTION),
+        (lambda t, x, v, s, load: -1.0 if v > x else 1.0, "(if, and, or, min, max); " + FRICTION),
         (lambda t, x, v, s, load: np.abs(2 * x), "abs of an expression that is not a coordinate cannot be traced"),
         (lambda t, x, v, s, load: abs(x), "abs of the coordinate can be traced only where the gap is side"),
         (lambda t, x, v, s, load: sum(x), "a scalar: it cannot be unpacked or looped ove"),
@@ -174,10 +176,17 @@ def wall_gap(self, x, side):
     return 2.0 - x
 
 
+def turned(self, t, velocity, side, load, impact):
+    return side, -velocity
+
+
 @pytest.mark.parametrize(
     ("more", "sentence"),
     [
-        ({"sides": (1,), "gap": wall_gap, "contact": 2.0}, r"only where the gap is side \* coordinate; write it with the gap"),
+        (
+            {"sides": (1,), "gap": wall_gap, "contact": 2.0, "reset": turned},
+            r"side \* coordinate; write it with the gap",
+        ),
         ({"sides": (1, -1), "gap": lambda self, x, side: side * (x - 1)}, r"only where the gap is side \* coordinate"),
     ],
 )
@@ -233,8 +242,8 @@ def test_what_cannot_be_told_apart_is_refused_in_a_model():
         structure_key(System(model=Listed([1.0])))
 
 
-def test_dry_friction_is_refused_by_what_it_uses():
-    with pytest.raises(TraceError, match="Small uses greater in an acceleration"):
+def test_dry_friction_is_refused_as_friction():
+    with pytest.raises(TraceError, match=r"Small uses greater in an acceleration, a gap or a margin; a force that jumps"):
         traced(lambda t, x, v, s, load: np.where(v > 0, -1.0, 1.0) - x, sides=(1, -1))
 
 

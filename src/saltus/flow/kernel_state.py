@@ -11,7 +11,7 @@ from saltus.flow.contact_side import side_of_state
 from saltus.flow.kernel_layout import STRUCTURE_SIZES, Mode, ModelPart, Setting, Where
 from saltus.flow.memory_layout import State
 from saltus.flow.request import MotionRequest
-from saltus.flow.structures import Program, check_gap, taylor_order
+from saltus.flow.structures import Program, check_contact, taylor_order
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class KernelState:
         """The state in which a motion starts.
 
         Raises:
-            ParameterError: a state beyond the contact, a gap that is not linear in the coordinate.
+            ParameterError: a state beyond the contact, a gap or a reset that cannot be.
         """
         where, at = np.zeros(len(Where), dtype=np.int64), request.clock
         where[Where.PERIOD], where[Where.LAST_PERIOD] = int(at.first), int(at.last)
@@ -78,7 +78,7 @@ class KernelState:
 def _mode_and_side(request: MotionRequest, run: Program) -> tuple[int, int]:
     model = request.system.model
     if model.sides:
-        check_gap(model)
+        check_contact(request.system)
     position, speed = float(request.position[0]), float(request.speeds[0])
     mode, side = side_of_state.py_func(len(model.sides), position, speed, run.model[ModelPart.GEOMETRY])
     if mode == Mode.BEYOND:

@@ -11,8 +11,10 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow.compiled import Structure, load_structure
-from saltus.systems import Model, Record, System, children, is_number, numbers
+from saltus.systems import Record, System, children, is_number, numbers
 from saltus.taylor import Trace, record_table, trace
+
+OFF_CONTACT = 1e-9  # of a gap at the contact, relative to its rate: far above rounding, far below what a model would mean
 
 
 @dataclass(frozen=True)
@@ -71,13 +73,20 @@ def taylor_order(tol: float) -> int:
     return round(10 + 1.25 * (-math.log10(tol) - 6))
 
 
-def check_gap(model: Model) -> None:
-    """Refuse a gap that is not linear in the coordinate, or not zero at `contact`: a model has one contact point."""
+def check_contact(system: System) -> None:
+    """Refuse a gap that is not 0 at `contact`, and a reset that sends the motion beyond the contact."""
+    model, load, impact = system.model, system.load, system.impact
     point, name = float(model.contact), type(model).__name__
-    for side in model.sides:
-        at, below, above = (float(model.gap(point + x, side)) for x in (0.0, -1.0, 1.0))
-        rounding = 1e-9 * (abs(below) + abs(above))
-        if abs(at) > rounding:
+    rates = {side: float(model.gap(point + 1.0, side)) - float(model.gap(point, side)) for side in model.sides}
+    for side, rate in rates.items():
+        at = float(model.gap(point, side))
+        if abs(at) > OFF_CONTACT * abs(rate):
             raise ParameterError(f"{name}.gap must be 0 at {name}.contact = {point:g}, got {at:g} on side {side}; give both")
-        if abs(below + above) > rounding:
-            raise ParameterError(f"{name}.gap must be linear in the coordinate: a model has one contact point, not two stops")
+        before = -math.copysign(1.0, rate)
+        following, after = model.reset(0.0, before, side, load, impact)
+        if rates.get(int(following), 0.0) * after < 0.0:
+            raise ParameterError(
+                f"{name}.reset sends the motion beyond the contact: on side {side} the velocity {before:g} becomes "
+                f"{float(after):g} on side {int(following)}; velocities are rates of the coordinate, and "
+                + ("a bounce turns the sign of what impact.velocity_after returns" if following == side else "a passage keeps it")
+            )

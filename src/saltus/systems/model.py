@@ -19,7 +19,7 @@ class Model:
        arc (the sign of the coordinate is ambiguous at contact);
     4. `gap`, positive inside a mode: its first zero, reached from above, ends the mode; and `contact`, the coordinate
        at which the gaps of all sides are zero. While the system rests there the accelerations at contact decide when it leaves;
-    5. `reset`, the next side and the velocity after an impact, given the impact law;
+    5. `reset`, the next side and the velocity after an impact, given the impact law; a model with one side must define it;
     6. optionally `mirror` (the symmetry that maps motions to motions), `kinetic_energy` (for impact laws that need
        it), `margins` (what must stay positive), `stops` (the margins that end a motion unasked), `check_load`, and
        `damping`, the coefficient of the velocity in the equation of motion.
@@ -91,3 +91,22 @@ class Model:
         The mirror turns the signs of all coordinates, velocities and sides; it does not shift the time.
         """
         return None
+
+
+def check_sides(model: Model | type[Model]) -> None:
+    """Refuse sides that no contact has, and a wall without a reset that turns the motion round.
+
+    Of a class whose sides depend on its numbers nothing is known yet, and nothing is refused.
+    """
+    name, sides = getattr(model, "__name__", type(model).__name__), model.sides
+    if isinstance(sides, property):
+        return
+    if sides not in ((1, -1), (1,), ()):
+        raise ParameterError(
+            f"{name}.sides must be (1, -1) for a motion that passes the contact, (1,) for a wall or () for none, got {sides!r}"
+        )
+    if sides == (1,) and getattr(model.reset, "__func__", model.reset) is Model.reset:
+        raise ParameterError(
+            f"{name} has one side, so an impact must turn the motion round: define reset(self, t, velocity, side, load, impact), "
+            "such as return side, -impact.velocity_after(self, t, velocity, side, side, load)"
+        )

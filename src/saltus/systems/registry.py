@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 from saltus.errors import ParameterError, near
 from saltus.systems.impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
 from saltus.systems.metainterface import Metainterface
-from saltus.systems.model import Model
+from saltus.systems.model import Model, check_sides
 from saltus.systems.rocking_block import RockingBlock
 from saltus.systems.two_layer import TwoLayer
 from saltus.systems.wall_oscillator import WallOscillator
@@ -28,8 +28,13 @@ T = TypeVar("T", type[Model], type[ImpactLaw])
 
 
 def register(cls: T) -> T:
-    """Make a model or an impact law of your own known by its class name, so that files can name it; use as a decorator."""
+    """Make a model or an impact law of your own known by its class name, so that files can name it; use as a decorator.
+
+    Raises:
+        ParameterError: what is neither; a model whose sides and reset do not go together.
+    """
     if issubclass(cls, Model):
+        check_sides(cls)
         MODELS[cls.__name__] = cls
     elif issubclass(cls, ImpactLaw):
         IMPACTS[cls.__name__] = cls

@@ -12,7 +12,7 @@ from saltus.checks import check_kind
 from saltus.errors import ParameterError, near
 from saltus.systems.impact import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
-from saltus.systems.model import Model
+from saltus.systems.model import Model, check_sides
 from saltus.systems.parameters import children, numbers, replace
 from saltus.systems.serial import from_dict, to_dict
 
@@ -35,6 +35,7 @@ class System:
     def __post_init__(self) -> None:
         for name, kind in (("model", Model), ("load", Load), ("impact", ImpactLaw)):
             check_kind(name, getattr(self, name), kind)
+        check_sides(self.model)
         for channel in self.load.channels:
             if channel not in self.model.channels:
                 known = [*self.model.channels, "frequency"]

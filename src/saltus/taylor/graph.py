@@ -22,6 +22,10 @@ ALLOWED = (
     f"+ - * /, powers, NumPy's {', '.join(function.numpy.__name__ for function in FUNCTIONS.values())}, tan, and abs of the "
     "coordinate (the sign of the coordinate is `side`)"
 )
+FRICTION = (
+    "a force that jumps with the sign of a velocity (dry friction, stick-slip) is out of scope, as only the coordinate has a "
+    "contact; a smooth one, such as -tanh(velocity / w), can be traced"
+)
 ARITHMETIC = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow"}  # NumPy's names, and ours
 _AS_THEY_ARE = ("tan", "square", "absolute", "negative", "positive", *POINTWISE)
 UFUNCS = ARITHMETIC | {name: name for name in _AS_THEY_ARE} | {f.numpy.__name__: name for name, f in FUNCTIONS.items()}
@@ -86,7 +90,7 @@ class Expr:
 
     def __abs__(self) -> Expr:
         if self.op != "coordinate":
-            raise TraceError(f"abs of an expression that is not a coordinate cannot be traced; allowed are {ALLOWED}")
+            raise TraceError(f"abs of an expression that is not a coordinate cannot be traced; {_what_is_allowed(self)}")
         return Expr("side") * self
 
     def __gt__(self, other: Any) -> Expr:
@@ -102,7 +106,8 @@ class Expr:
         return combine("less_equal", self, other)
 
     def __bool__(self) -> bool:
-        raise TraceError("a traced model may not branch on its state or parameters (if, and, or, min, max); use `side`")
+        hint = FRICTION if uses_velocity(self) else "use `side`"
+        raise TraceError(f"a traced model may not branch on its state or parameters (if, and, or, min, max); {hint}")
 
     def __float__(self) -> float:
         raise TraceError(f"a traced quantity has no number yet: use NumPy's functions, not math's; allowed are {ALLOWED}")
@@ -120,7 +125,7 @@ class Expr:
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Expr:
         name = UFUNCS.get(ufunc.__name__)
         if method != "__call__" or kwargs or name is None:
-            raise TraceError(f"np.{ufunc.__name__} cannot be traced; allowed are {ALLOWED}")
+            raise TraceError(f"np.{ufunc.__name__} cannot be traced; {_what_is_allowed(*inputs)}")
         return _apply(name, inputs)
 
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Expr:
@@ -137,6 +142,16 @@ class Expr:
         if self.op in LEAVES:
             return self.op if self.value is None else f"{self.op}[{self.value}]"
         return f"{self.op}({', '.join(map(repr, self.args))})"
+
+
+def _what_is_allowed(*operands: Any) -> str:
+    """What may be traced; of what changes with the sign of a velocity, that it may not."""
+    return FRICTION if uses_velocity(*operands) else f"allowed are {ALLOWED}"
+
+
+def uses_velocity(*operands: Any) -> bool:
+    """Whether any of the operands depends on a velocity."""
+    return any(node.op == "velocity" for node in ordered([x for x in operands if isinstance(x, Expr)]))
 
 
 def _degree(op: str, args: tuple[Expr, ...]) -> int | None:

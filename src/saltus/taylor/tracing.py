@@ -11,7 +11,19 @@ from saltus.errors import ParameterError, SaltusError, TraceError, near
 from saltus.systems import Record, System
 from saltus.systems import substitute as substitute_numbers
 from saltus.taylor import derivatives as tangent
-from saltus.taylor.graph import POINTWISE, RECORD_WIDTH, Expr, combine, differentiate, number, ordered, substitute
+from saltus.taylor.graph import (
+    FRICTION,
+    POINTWISE,
+    RECORD_WIDTH,
+    Expr,
+    combine,
+    differentiate,
+    number,
+    ordered,
+    substitute,
+    uses_velocity,
+)
+from saltus.taylor.normal_form import constant_value, normal_form, provably_equal
 
 
 class LoadTime:
@@ -158,11 +170,35 @@ def _trace_contact(result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v
     result.gap = combine("add", ask(model, "gap", q[0], side), 0.0)
     result.contact = combine("add", model.contact, 0.0)
     at_contact: dict[Expr, Any] = {q[0]: result.contact, v[0]: 0.0}
+    _check_gap(result.gap, q[0], type(model).__name__)
     result.gap_rate = substitute(differentiate(result.gap, q[0]), at_contact)
     result.contact_acceleration = result.gap_rate * substitute(result.acceleration[0], at_contact)
     result.contact_damping = -substitute(differentiate(result.acceleration[0], v[0]), at_contact)
     next_side, after = ask(model, "reset", t, v[0], side, load, twin.impact)
     result.next_side, result.velocity_after = combine("add", next_side, 0.0), combine("add", after, 0.0)
+    _check_next_side(result.next_side, model.sides, type(model).__name__)
+
+
+def _check_gap(gap: Expr, coordinate: Expr, model: str) -> None:
+    """Refuse a gap that is not, for certain, a polynomial of degree 1 in the coordinate: the flow has one contact point."""
+    slope = differentiate(gap, coordinate)
+    if not provably_equal(differentiate(slope, coordinate), number(0.0)):
+        raise TraceError(
+            f"{model}.gap must be linear in the coordinate, such as side * (x - d): a model has one contact point, not two stops"
+        )
+    if provably_equal(slope, number(0.0)):
+        raise TraceError(f"{model}.gap must depend on the coordinate, such as side * (x - d)")
+
+
+def _check_next_side(next_side: Expr, sides: tuple[int, ...], model: str) -> None:
+    """Refuse a reset that is known to lead to a side that the model does not have."""
+    for side in sides:
+        following = constant_value(normal_form(substitute(next_side, {Expr("side"): side})))
+        if following is not None and following not in sides:
+            raise TraceError(
+                f"{model}.reset leads from side {side} to side {float(following):g}, and the model has the sides {sides}; "
+                "a reset returns the next side and the velocity there"
+            )
 
 
 def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]) -> None:
@@ -184,7 +220,8 @@ def _check(result: Trace, model: str) -> None:
         expanded += [result.gap]
     for node in ordered(expanded):
         if node.op in POINTWISE:
-            raise TraceError(f"{model} uses {node.op} in an acceleration, a gap or a margin; only an impact law may compare")
+            where = f"{model} uses {node.op} in an acceleration, a gap or a margin"
+            raise TraceError(f"{where}; {FRICTION if uses_velocity(*node.args) else 'only an impact law may compare'}")
     if result.gap is not None:
         for node in ordered([result.gap]):
             if node.op in ("time", "record", "velocity"):

@@ -17,7 +17,7 @@ from saltus.flow.ensemble.lane_layout import JobLabel, JobNumber
 from saltus.flow.ensemble.threads import Jobs, Lanes
 from saltus.flow.ensemble.wanted import Sample, Until, Wanted, read_last, read_names, read_side, read_threads
 from saltus.flow.forcing_time import Clock, clock
-from saltus.flow.structures import Program, check_gap, limits_of, program
+from saltus.flow.structures import Program, check_contact, limits_of, program
 from saltus.progress import Progress, silent
 from saltus.systems import System, check_system, numbers
 
@@ -101,7 +101,7 @@ def _run(
     driver = compile_driver_aside()
     run = program(system, wanted.limits, wanted.paths)
     if system.model.sides:
-        check_gap(system.model)
+        check_contact(system)
     jobs = _jobs(system, run, inputs, wanted.periods, duration, side)
     if Until.REST in wanted.until:
         jobs.numbers[:, JobNumber.CAPTURE_SPEED] = _capture(system, inputs.parameters, wanted.limits)

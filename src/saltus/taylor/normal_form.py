@@ -1,0 +1,131 @@
+"""Whether two traced expressions are the same function: decided on their graphs, in exact arithmetic, and never by values.
+
+An expression becomes a polynomial with rational coefficients in its atoms, which are its leaves and the functions of such
+polynomials. Two expressions with one normal form are equal wherever both have a value. The converse does not hold:
+sin(x)^2 + cos(x)^2 is not known to be 1. So "equal" is proved, and anything else means only that no proof was found.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping
+from fractions import Fraction
+
+import numpy as np
+
+from saltus.taylor.graph import Expr, ordered
+from saltus.taylor.rules import FUNCTIONS
+
+Monomial = tuple[tuple[int, int], ...]  # (number of the atom, its power), by rising number
+Form = dict[Monomial, Fraction]
+
+ONE: Monomial = ()
+MOST_TERMS = 1000  # A longer polynomial is not written out: models have a few dozen terms, and products of sums grow fast.
+ODD, EVEN = ("sin", "sinh", "tanh", "atan"), ("cos", "cosh")
+
+_atoms: dict[Hashable, int] = {}
+
+
+class NoNormalForm(Exception):
+    """What has no normal form, as it is not finite or too long: nothing is then proved of it."""
+
+
+def normal_form(root: Expr, leaves: Mapping[Expr, Form] | None = None) -> Form:
+    """The normal form of an expression, with some of its leaves replaced by normal forms.
+
+    Raises:
+        NoNormalForm: a number that is not finite, a division by 0, a polynomial that is too long.
+    """
+    forms: dict[int, Form] = {id(leaf): form for leaf, form in (leaves or {}).items()}
+    for node in ordered([root]):
+        if id(node) not in forms:
+            forms[id(node)] = _form(node, [forms[id(a)] for a in node.args])
+    return forms[id(root)]
+
+
+def provably_equal(one: Expr, other: Expr, leaves: Mapping[Expr, Form] | None = None) -> bool:
+    """Whether two expressions are the same function of the leaves that are left; False means that no proof was found."""
+    try:
+        return normal_form(one, leaves) == normal_form(other, leaves)
+    except NoNormalForm:
+        return False
+
+
+def constant(value: float) -> Form:
+    """A number, exactly as it is stored."""
+    if not math.isfinite(value):
+        raise NoNormalForm
+    return {ONE: Fraction(value)} if value else {}
+
+
+def constant_value(form: Form) -> Fraction | None:
+    """The number that a normal form is, or None where it depends on anything."""
+    return form.get(ONE, Fraction(0)) if set(form) <= {ONE} else None
+
+
+def _form(node: Expr, args: list[Form]) -> Form:
+    if node.op == "number":
+        return constant(node.value)
+    if not args:
+        return _atom((node.op, node.value))
+    if node.op in ("add", "sub"):
+        return _sum(args[0], args[1], 1 if node.op == "add" else -1)
+    if node.op == "mul":
+        return _product(*args)
+    if node.op == "div":
+        return _product(args[0], _inverse(args[1]))
+    return _function(node.op, args)
+
+
+def _atom(key: Hashable, factor: Fraction = Fraction(1)) -> Form:
+    return {((_atoms.setdefault(key, len(_atoms)), 1),): factor}
+
+
+def _sum(a: Form, b: Form, sign: int) -> Form:
+    total = dict(a)
+    for monomial, factor in b.items():
+        total[monomial] = total.get(monomial, Fraction(0)) + sign * factor
+    return {monomial: factor for monomial, factor in total.items() if factor}
+
+
+def _product(a: Form, b: Form) -> Form:
+    if len(a) * len(b) > MOST_TERMS:
+        raise NoNormalForm
+    total: Form = {}
+    for one, first in a.items():
+        for other, second in b.items():
+            monomial = _times(one, other)
+            total[monomial] = total.get(monomial, Fraction(0)) + first * second
+    return {monomial: factor for monomial, factor in total.items() if factor}
+
+
+def _times(one: Monomial, other: Monomial) -> Monomial:
+    powers = dict(one)
+    for atom, power in other:
+        powers[atom] = powers.get(atom, 0) + power
+    return tuple(sorted((atom, power) for atom, power in powers.items() if power))
+
+
+def _inverse(a: Form) -> Form:
+    """1 / a: of one term the term with its powers turned, of a sum an atom of the sum scaled to a first coefficient of 1."""
+    if not a:
+        raise NoNormalForm
+    first, factor = min(a.items())
+    if len(a) == 1:
+        return {tuple((atom, -power) for atom, power in first): 1 / factor}
+    return _atom(("inverse", _key({m: c / factor for m, c in a.items()})), 1 / factor)
+
+
+def _function(op: str, args: list[Form]) -> Form:
+    """An atom for a function of normal forms; odd and even functions have arguments whose first coefficient is positive."""
+    sign = 1
+    if op in FUNCTIONS and not args[0]:
+        at_zero = float(FUNCTIONS[op].numpy(np.float64(0.0))) if op != "log" else math.nan
+        return constant(at_zero)
+    if op in (*ODD, *EVEN) and min(args[0].items())[1] < 0:
+        args, sign = [{m: -c for m, c in args[0].items()}], -1 if op in ODD else 1
+    return _atom((op, *map(_key, args)), Fraction(sign))
+
+
+def _key(form: Form) -> Hashable:
+    return frozenset(form.items())
