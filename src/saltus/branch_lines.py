@@ -1,27 +1,38 @@
 """Branches of a diagram's DataTree as lines over the parameter, and borders of a chart's: what pictures draw and measures read.
 
 A diagram has children `branch_000`, `branch_001`, ... (see `saltus.orbits`), each with `parameter`, `stable`, `impact_count` and
-quantities such as `amplitude` over its points, and the `kind` of its special points with their places.
+quantities such as `amplitude` over its points, the model's margins as `margin_...`, and the `kind` of its special points with
+their places.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
+from enum import StrEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 
 STEPS_BETWEEN = 6  # into which the step between two points of a branch is divided where the line is smoothed
 STABILITY_CHANGES = ("LP", "PD", "BPC", "GR", "NS")  # the kinds of special points at which the stability can change
+MARGIN = "margin_"  # the names of the variables of a branch that hold the least value of a margin begin so
+
+
+class ModelValidity(StrEnum):
+    """Whether motions of a model are those of its mechanism, by the margins that they pass and the `margin_kind` of each."""
+
+    HOLDS = "holds"  # none but landmarks
+    ASSUMPTION = "assumption"  # an assumption of the model fails: the mechanism does something else
+    LIMIT = "limit"  # the mechanism has no such positions
 
 
 class BranchLine(NamedTuple):
-    """A part of a branch with one stability and one number of impacts."""
+    """A part of a branch with one stability, one validity and one number of impacts."""
 
     stable: bool
+    validity: ModelValidity
     points: range  # of the branch
-    places: np.ndarray  # (n, 2), parameter and quantity: those points, and the special points where the stability changes
+    places: np.ndarray  # (n, 2), parameter and quantity: those points, and the special points at which the part ends
 
 
 def branches_of(diagram: Any) -> Iterator[tuple[str, Any]]:
@@ -38,25 +49,59 @@ def border_curves(tree: Any) -> list[Any]:
 
 
 def branch_lines(branch: Any, quantity: str = "amplitude") -> Iterator[BranchLine]:
-    """A branch cut where the stability changes and at every grazing, where curves have corners."""
-    x, y = np.asarray(branch["parameter"].values), np.asarray(branch[quantity].values)
-    stable, impacts = np.asarray(branch["stable"].values, dtype=bool), branch["impact_count"].values
-    turned = stable[1:] != stable[:-1]
-    cuts = [int(cut) + 1 for cut in np.flatnonzero(turned | (impacts[1:] != impacts[:-1]))]
-    turns = {cut: [_stability_change(branch, quantity, cut)] if turned[cut - 1] else [] for cut in cuts}
-    for first, last in pairwise([0, *cuts, len(x)]):
-        points = [(x[k], y[k]) for k in range(first, last)]
-        before = turns.get(first, []) or [(x[first - 1], y[first - 1])] * (first > 0)
-        yield BranchLine(bool(stable[first]), range(first, last), np.array([*before, *points, *turns.get(last, [])]))
+    """A branch cut where the stability or the validity changes, and at every grazing, where curves have corners."""
+    places = np.stack([branch["parameter"].values, branch[quantity].values], axis=1)
+    stable, validity = np.asarray(branch["stable"].values, dtype=bool), validity_of(branch)
+    changed = [values[1:] != values[:-1] for values in (stable, validity, branch["impact_count"].values)]
+    first, begin = 0, np.empty((0, 2))
+    for cut in (int(step) + 1 for step in np.flatnonzero(np.any(changed, axis=0))):
+        turns = _turns(branch, quantity, cut, *(bool(change[cut - 1]) for change in changed[:2]))
+        ends = np.array([place for place, _ in turns]).reshape(-1, 2)
+        yield BranchLine(
+            bool(stable[first]), validity[first], range(first, cut), np.concatenate([begin, places[first:cut], ends[:1]])
+        )
+        if len(turns) > 1:  # the stability and the validity change one after the other, between the same two points
+            mixed = (stable[cut], validity[first]) if turns[0][1] else (stable[first], validity[cut])
+            yield BranchLine(bool(mixed[0]), mixed[1], range(cut, cut), ends)
+        first, begin = cut, ends[-1:] if len(ends) else places[cut - 1 : cut]
+    yield BranchLine(bool(stable[first]), validity[first], range(first, len(places)), np.concatenate([begin, places[first:]]))
 
 
-def smooth_lines(branch: Any, quantity: str = "amplitude") -> Iterator[tuple[bool, np.ndarray, np.ndarray]]:
-    """(stable, parameter, quantity) of the same lines, as monotone cubics of the length along them between their points."""
+def validity_of(branch: Any) -> np.ndarray:
+    """The `ModelValidity` of each point of a branch, (n,)."""
+    result = np.full(branch.sizes["point"], ModelValidity.HOLDS, dtype=object)
+    for validity in (ModelValidity.ASSUMPTION, ModelValidity.LIMIT):  # the graver one last
+        for name in margins_of(branch, validity):
+            result[branch[MARGIN + name].values < 0] = validity
+    return result
+
+
+def margins_of(branch: Any, kind: ModelValidity) -> list[str]:
+    """The margins that are of a kind."""
+    margins = [str(name) for name in branch.data_vars if str(name).startswith(MARGIN)]
+    return [name.removeprefix(MARGIN) for name in margins if branch[name].attrs.get("margin_kind") == kind]
+
+
+def _turns(branch: Any, quantity: str, cut: int, stability: bool, validity: bool) -> list[tuple[np.ndarray, bool]]:
+    """Where the stability, the validity or both change between the points cut - 1 and cut, in order; True for the stability."""
+    margins = tuple(name for kind in (ModelValidity.ASSUMPTION, ModelValidity.LIMIT) for name in margins_of(branch, kind))
+    kinds = [(STABILITY_CHANGES, True)] * stability + [((*margins, "GR"), False)] * validity
+    found = [(_place_of_change(branch, quantity, cut, names), of_stability) for names, of_stability in kinds]
+    if len(found) == 2:
+        if np.array_equal(found[0][0], found[1][0]):
+            return found[:1]
+        here = np.array([branch["parameter"].values[cut - 1], branch[quantity].values[cut - 1]])
+        found.sort(key=lambda turn: float(np.linalg.norm(turn[0] - here)))
+    return found
+
+
+def smooth_lines(branch: Any, quantity: str = "amplitude") -> Iterator[BranchLine]:
+    """The same lines, with places on monotone cubics of the length along them between their points."""
     for line in branch_lines(branch, quantity):
-        yield line.stable, *_smoothed(line.places)
+        yield line._replace(places=_smoothed(line.places))
 
 
-def _smoothed(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _smoothed(line: np.ndarray) -> np.ndarray:
     """A denser row of points on the monotone cubics through the given ones, (n, 2)."""
     from scipy.interpolate import PchipInterpolator
 
@@ -64,27 +109,26 @@ def _smoothed(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     steps = np.linalg.norm(np.diff(line, axis=0) / np.where(size > 0, size, 1.0), axis=1)
     line = line[np.append(True, steps > 1e-9)]
     if len(line) < 3:
-        return line[:, 0], line[:, 1]
+        return line
     length = np.append(0.0, np.cumsum(steps[steps > 1e-9]))
     shares = np.arange(STEPS_BETWEEN) / STEPS_BETWEEN
     along = np.append((length[:-1, None] + np.diff(length)[:, None] * shares).ravel(), length[-1])
-    dense = PchipInterpolator(length, line)(along)
-    return dense[:, 0], dense[:, 1]
+    return np.asarray(PchipInterpolator(length, line)(along))
 
 
-def _stability_change(branch: Any, quantity: str, cut: int) -> tuple[float, float]:
-    """Where the stability changes between the points cut - 1 and cut: at the special point there, or in their middle."""
+def _place_of_change(branch: Any, quantity: str, cut: int, kinds: tuple[str, ...]) -> np.ndarray:
+    """Where something changes between the points cut - 1 and cut: at the special point of such kinds there, or in the middle."""
     names = ("parameter", quantity)
     a, b = (np.array([float(branch[name][k]) for name in names]) for k in (cut - 1, cut))
     size = np.array([np.ptp(branch[name].values) or 1.0 for name in names])
-    middle = (float(a[0] + b[0]) / 2, float(a[1] + b[1]) / 2)
+    middle = (a + b) / 2
     if "kind" not in branch:
         return middle
-    known = np.isin(branch["kind"].values, STABILITY_CHANGES)
+    known = np.isin(branch["kind"].values, kinds)
     places = np.stack([branch[f"special_{name}"].values[known] for name in names], axis=1)
     if not len(places):
         return middle
     detour = np.linalg.norm((places - a) / size, axis=1) + np.linalg.norm((places - b) / size, axis=1)
     best = int(detour.argmin())
     near = detour[best] < 3 * np.linalg.norm((b - a) / size) + 1e-3
-    return (float(places[best, 0]), float(places[best, 1])) if near else middle
+    return np.asarray(places[best]) if near else middle

@@ -98,6 +98,18 @@ def test_detached_loop_closes():
     assert all(o.period == 3 for o in loop.orbits)
 
 
+def test_the_dataset_of_a_branch_says_what_its_margins_mean_and_simulation_agrees_with_their_signs():
+    found = branch("Hhat 0.5")
+    data = found.to_xarray()
+    kinds = {"line_limit": "landmark", "kinematic_limit": "limit", "reaction": "assumption"}
+    assert {name: data[f"margin_{name}"].attrs["margin_kind"] for name in kinds} == kinds
+    for i in range(3, len(found.orbits), 20):
+        violated = found.orbits[i].validity.first
+        for name in kinds:
+            least = float(data[f"margin_{name}"][i])
+            assert abs(least) < 1e-6 or (violated[name] is not None) == (least < 0.0)
+
+
 # --- every point of every branch -----------------------------------------------------------------------------------------
 
 

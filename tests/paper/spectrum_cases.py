@@ -3,9 +3,13 @@
 import numpy as np
 import xarray as xr
 
+KINDS = {"straight": "landmark", "reaction": "assumption", "reach": "limit"}  # of the margins of these diagrams
 
-def branch(parameter, amplitude, stable, *, special=(), origin="start", ends=("bound", "bound"), periods=1, crossings=2):
-    """A branch's dataset with the given points; `special` holds (kind, parameter, amplitude)."""
+
+def branch(
+    parameter, amplitude, stable, *, special=(), origin="start", ends=("bound", "bound"), periods=1, crossings=2, margins=None
+):
+    """A branch's dataset with the given points; `special` holds (kind, parameter, amplitude), `margins` values by name."""
     amplitude = np.asarray(amplitude, float)
     n = len(amplitude)
     data = {
@@ -18,6 +22,8 @@ def branch(parameter, amplitude, stable, *, special=(), origin="start", ends=("b
         "period": ("point", np.full(n, periods)),
         "impact_count": ("point", np.broadcast_to(crossings, n).copy()),
     }
+    for name, values in (margins or {}).items():
+        data[f"margin_{name}"] = ("point", np.asarray(values, float), {"margin_kind": KINDS[name]})
     if special:
         kinds, places, sizes = zip(*special, strict=True)
         data["kind"] = ("special", np.array(kinds))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from spectrum_cases import branch, diagram, folded, loop
 
-from saltus.branch_lines import smooth_lines
+from saltus.branch_lines import ModelValidity, branch_lines, smooth_lines
 from saltus.plots import conventions as style
 from saltus.plots import response
 
@@ -30,44 +30,75 @@ def axes():
 
 def test_runs_of_one_stability_meet_at_the_fold_between_them():
     runs = list(smooth_lines(folded()))
-    assert [stable for stable, _, _ in runs] == [True, False, True]
-    for (_, x, y), (_, u, v), fold in zip(runs[:-1], runs[1:], [(2.0, 2.0), (1.5, 1.1)], strict=True):
-        assert (x[-1], y[-1]) == pytest.approx(fold)
-        assert (u[0], v[0]) == pytest.approx(fold)
+    assert [run.stable for run in runs] == [True, False, True]
+    for one, two, fold in zip(runs[:-1], runs[1:], [(2.0, 2.0), (1.5, 1.1)], strict=True):
+        assert one.places[-1] == pytest.approx(fold)
+        assert two.places[0] == pytest.approx(fold)
 
 
 def test_the_line_passes_every_point_and_leaves_the_range_of_its_neighbours_nowhere():
     data = folded()
-    x, y = (np.concatenate(parts) for parts in zip(*[(x, y) for _, x, y in smooth_lines(data)], strict=True))
+    places = np.concatenate([run.places for run in smooth_lines(data)])
     for point in zip(data["parameter"].values, data["amplitude"].values, strict=True):
-        assert np.hypot(x - point[0], y - point[1]).min() < 1e-12
-    (_, first, _), (_, second, _), _ = smooth_lines(data)
+        assert np.linalg.norm(places - point, axis=1).min() < 1e-12
+    first, second, _ = (run.places[:, 0] for run in smooth_lines(data))
     assert (first.max(), second.max(), second.min()) == pytest.approx((2.0, 2.0, 1.5))
-    assert y.max() == pytest.approx(2.1)
-    assert y.min() == pytest.approx(0.4)
+    assert places[:, 1].max() == pytest.approx(2.1)
+    assert places[:, 1].min() == pytest.approx(0.4)
 
 
 def test_a_smooth_curve_looks_smooth_between_its_points():
     angle = np.linspace(0, 2 * np.pi, 41)
     (run,) = smooth_lines(branch(1.5 + np.cos(angle), 2 + np.sin(angle), np.ones(41)))
-    assert np.abs(np.hypot(run[1] - 1.5, run[2] - 2) - 1).max() < 1.5e-3
+    assert np.abs(np.linalg.norm(run.places - (1.5, 2), axis=1) - 1).max() < 1.5e-3
     chords = 1 - np.cos(np.pi / 40)
     assert chords > 1.5e-3
 
 
 def test_a_grazing_keeps_its_corner():
     data = branch([0, 1, 2, 2, 1, 0], [0, 1, 2, 2, 3, 4], np.ones(6), crossings=[2, 2, 2, 6, 6, 6])
-    one, two = smooth_lines(data)
-    for _, x, y in (one, two):
-        corner = (x[-1], y[-1]) if (x[-1], y[-1]) == (2, 2) else (x[0], y[0])
-        assert corner == (2, 2)
-    assert one[1] == pytest.approx(one[2])
-    assert two[1] + two[2] == pytest.approx(4)
+    one, two = (run.places for run in smooth_lines(data))
+    for places in (one, two):
+        assert (2, 2) in (tuple(places[-1]), tuple(places[0]))
+    assert one[:, 0] == pytest.approx(one[:, 1])
+    assert two.sum(axis=1) == pytest.approx(4)
 
 
 def test_without_a_special_point_runs_meet_in_the_middle():
     first, second = smooth_lines(branch([0, 1, 2, 3], [1, 1, 2, 2], [1, 1, 0, 0]))
-    assert (first[1][-1], first[2][-1]) == (second[1][0], second[2][0]) == (1.5, 1.5)
+    assert tuple(first.places[-1]) == tuple(second.places[0]) == (1.5, 1.5)
+
+
+def test_a_branch_is_cut_at_the_zero_of_a_margin_and_the_graver_one_counts():
+    margins = {"reaction": [1, 0.2, -1, -1], "reach": [1, 1, 0.5, -0.5], "straight": [1, -1, -1, -1]}
+    zeros = [("reaction", 1.25, 1.2), ("reach", 2.5, 2.6), ("straight", 0.5, 0.5)]
+    runs = list(branch_lines(branch([0, 1, 2, 3], [0, 1, 2, 3], [1, 1, 1, 1], margins=margins, special=zeros)))
+    assert [run.validity for run in runs] == [ModelValidity.HOLDS, ModelValidity.ASSUMPTION, ModelValidity.LIMIT]
+    ends = [(tuple(run.places[0]), tuple(run.places[-1])) for run in runs]
+    assert ends == [((0, 0), (1.25, 1.2)), ((1.25, 1.2), (2.5, 2.6)), ((2.5, 2.6), (3, 3))]
+
+
+@pytest.mark.parametrize(("fold", "zero"), [(1.2, 1.8), (1.8, 1.2)])
+def test_stability_and_validity_may_change_between_the_same_two_points(fold, zero):
+    special = [("LP", fold, fold), ("reaction", zero, zero)]
+    data = branch([0, 1, 2, 3], [0, 1, 2, 3], [1, 1, 0, 0], margins={"reaction": [1, 1, -1, -1]}, special=special)
+    first, between, last = branch_lines(data)
+    assert (first.stable, first.validity) == (True, ModelValidity.HOLDS)
+    expected = (False, ModelValidity.HOLDS) if fold < zero else (True, ModelValidity.ASSUMPTION)
+    assert (between.stable, between.validity) == expected
+    assert between.places[:, 0] == pytest.approx(sorted([fold, zero]))
+    assert (last.stable, last.validity) == (False, ModelValidity.ASSUMPTION)
+    assert last.places[0] == pytest.approx(between.places[-1])
+
+
+def test_a_margin_that_jumps_where_impacts_are_born_is_cut_at_the_grazing():
+    margins = {"reaction": [1, 1, -1, -1]}
+    crossings, special = [2, 2, 6, 6], [("GR", 1.9, 1.0)]
+    holds, violated = branch_lines(
+        branch([0, 1, 2, 3], np.ones(4), np.ones(4), crossings=crossings, margins=margins, special=special)
+    )
+    assert tuple(holds.places[-1]) == tuple(violated.places[0]) == (1.9, 1.0)
+    assert violated.validity is ModelValidity.ASSUMPTION
 
 
 def test_stable_is_solid_blue_unstable_dashed_red_in_the_given_unit(axes):
@@ -75,6 +106,21 @@ def test_stable_is_solid_blue_unstable_dashed_red_in_the_given_unit(axes):
     blue, red = lines(axes, style.STABLE_LINE), lines(axes, style.UNSTABLE_LINE)
     assert (len(blue), len(red)) == (2, 1)
     assert max(line.get_ydata().max() for line in blue + red) == pytest.approx(2.1 / 2.0)
+
+
+def test_validity_is_seen_in_colour_and_in_grey(axes):
+    margins = {"reaction": [1, 1, -1, -1, -1, -1], "reach": [1, 1, 1, 1, -1, -1]}
+    one = branch(np.arange(6), np.ones(6), np.ones(6), margins=margins)
+    two = branch(np.arange(6), 2 * np.ones(6), np.zeros(6), margins=margins)
+    response.draw_branches(axes, diagram(one, two))
+    looks = {}
+    for line in axes.lines:
+        grey = np.dot(mpl.colors.to_rgb(line.get_color()), (0.299, 0.587, 0.114))
+        looks.setdefault(line.get_linestyle(), []).append((round(line.get_linewidth(), 3), grey))
+    for holds, violated, beyond in looks.values():  # solid and dashed
+        assert holds[0] >= 2 * violated[0]
+        assert beyond[1] - violated[1] > 0.25
+    assert set(looks) == {"-", "--"}
 
 
 def test_marks_name_the_kinds_that_are_inside_and_are_thinned_out(axes):
@@ -129,6 +175,17 @@ def test_the_legend_names_only_the_kinds_and_bands_that_are_there():
     assert "fold (LP)" in names
     assert "chaotic" in names
     assert not {"grazing (GR)", "period doubling (PD)", "quasi-periodic"} & set(names)
+
+
+def test_the_legend_says_what_is_violated_and_what_is_beyond():
+    valid = branch([0, 3], [1, 1], [1, 1], margins={"reaction": [1, 1], "reach": [1, 1]})
+    wrong = branch([0, 3], [1, 1], [1, 1], margins={"reaction": [-1, -1], "reach": [1, 1]})
+    beyond = branch([0, 3], [1, 1], [1, 1], margins={"reaction": [-1, -1], "reach": [-1, -1]})
+    model, violated, farther = "stable, unstable (model holds)", "reaction violated", "beyond reach"
+    cases = [([valid], [model]), ([valid, wrong], [model, violated]), ([wrong, beyond], [violated, farther])]
+    for branches, expected in cases:
+        assert [label for label, _ in response.line_labels([diagram(*branches)])] == expected
+    assert [label for label, _ in response.line_labels([diagram(folded())])] == ["stable", "unstable"]
 
 
 def test_the_extremes_are_those_within_the_range():

@@ -17,6 +17,7 @@ from saltus.systems import (
     Harmonic,
     InelasticImpact,
     Load,
+    MarginKind,
     Metainterface,
     Model,
     Record,
@@ -287,3 +288,12 @@ def test_a_bare_model_says_what_it_lacks():
         Bare().acceleration(0.0, 0.0, 0.0, 1, Load())
     with pytest.raises(ParameterError, match="Bare defines no kinetic_energy"):
         EnergyRestitution(0.5).velocity_after(Bare(), 0.0, 1.0, 1, -1, Load())
+
+
+@pytest.mark.parametrize("model", [Metainterface(beta0=1.4), TwoLayer(beta0=1.4), RockingBlock(alpha=0.2), WallOscillator()])
+def test_a_model_says_what_it_means_to_pass_each_of_its_margins(model):
+    still = 0.0 if len(model.coordinates) == 1 else (0.0, 0.0)
+    margins = model.margins(0.0, still, still, still, (*model.sides, 1)[0], Load())
+    assert set(model.margin_kinds) == set(margins)
+    assert model.margin_kind("one that a user wrote") is MarginKind.ASSUMPTION
+    assert set(model.stops) <= {name for name in margins if model.margin_kind(name) is MarginKind.LIMIT}

@@ -67,7 +67,8 @@ def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[st
         ("residual", column(lambda o: o.residual), {}),
     ]
     for name in orbits[0].problem.margins:
-        columns.append((f"margin_{name}", column(lambda o, name=name: o.margins[name]), {"long_name": f"least {name}"}))
+        attrs = {"long_name": f"least {name}", "margin_kind": str(model.margin_kind(name))}
+        columns.append((f"margin_{name}", column(lambda o, name=name: o.margins[name]), attrs))
     return columns
 
 

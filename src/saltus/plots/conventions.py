@@ -1,7 +1,8 @@
 """The look of every picture: the paper's conventions, colours that survive greyscale and colour-blindness, journal widths.
 
 Stable is a solid blue line, unstable a dashed red one, a separatrix dashed grey, a limit of the mechanism dash-dotted green; no
-two of them share both a line style and a lightness.
+two of them share both a line style and a lightness. Along a branch such a line is heavy where the model holds, thin where an
+assumption of the model fails, and thin and pale beyond a limit of the mechanism.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ P = ParamSpec("P")
 
 STABLE = "#0b4fa0"
 UNSTABLE = "#d1342f"
+PALE_STABLE = "#8db3de"
+PALE_UNSTABLE = "#efaaa5"
 SEPARATRIX = "#7a7a7a"
 LIMIT = "#009060"
 FAINT = "#bdbdbd"  # grids, axes of symmetry, the discontinuity plane

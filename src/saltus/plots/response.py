@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import branches_of, smooth_lines
-from saltus.plots.conventions import INK, LIMIT, LIMIT_LINE, STABLE_LINE, UNSTABLE_LINE
+from saltus.branch_lines import ModelValidity, branches_of, margins_of, smooth_lines, validity_of
+from saltus.plots.conventions import INK, LIMIT, LIMIT_LINE, PALE_STABLE, PALE_UNSTABLE, STABLE_LINE, UNSTABLE_LINE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,6 +21,7 @@ class ResponseSettings:
 
     inset_places: int = 24  # The number of places along each side of the axes that are tried for an inset.
     inset_margin: float = 0.05  # The ticks of an inset take this share of the axes.
+    inset_weight: float = 0.65  # Lines in an inset are drawn with this share of their width, as they lie closer together.
     mark_distance: float = 1.5  # Marks of one kind that are nearer, in mm, are left to the insets and to the data.
 
 
@@ -28,6 +29,9 @@ SETTINGS = ResponseSettings()
 
 QSB_LINE: dict[str, Any] = {"color": "#7b2d9b", "linestyle": (0, (3, 2)), "linewidth": 1.0}
 FARTHEST_LINE: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (1, 1.2)), "linewidth": 1.2}
+# Heavy where the model holds, thin where an assumption fails, thin and pale beyond a limit: told apart in grey as well.
+WEIGHTS = {ModelValidity.HOLDS: 1.7, ModelValidity.ASSUMPTION: 0.75, ModelValidity.LIMIT: 0.75}
+PALE = {True: PALE_STABLE, False: PALE_UNSTABLE}
 BANDS = {"QP": "#cfe6f7", "CH": "#fbd9b0"}  # quasi-periodic light blue, chaotic light orange
 BAND_NAMES = {"QP": "quasi-periodic", "CH": "chaotic"}
 DOTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markersize": 2.4, "markeredgewidth": 0.0}
@@ -41,7 +45,7 @@ MARKS: dict[str, dict[str, Any]] = {
 MARK_NAMES = {
     "LP": "fold (LP)",
     "PD": "period doubling (PD)",
-    "BPC": "symmetry breaking or branch point (BPC)",
+    "BPC": "branch point (BPC)",
     "GR": "grazing (GR)",
     "NS": "Neimark–Sacker (NS)",
 }
@@ -63,12 +67,21 @@ def _inside(spectrum: Any, low: float, high: float, quantity: str) -> Iterator[n
         yield branch[quantity].values[(x >= low) & (x <= high)]
 
 
-def draw_branches(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
-    """Every branch, stable motions in solid blue, unstable ones in dashed red; `quantity` in units of `scale`."""
+def draw_branches(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0, weight: float = 1.0) -> None:
+    """Every branch, stable motions in solid blue, unstable ones in dashed red, heavier where the model holds.
+
+    `quantity` is drawn in units of `scale`, lines in `weight` times their usual width.
+    """
     for _, branch in branches_of(spectrum):
-        for stable, x, y in smooth_lines(branch, quantity):
-            line = STABLE_LINE if stable else UNSTABLE_LINE
-            ax.plot(x, y / scale, zorder=3.2 if stable else 3.0, **line)
+        for line in smooth_lines(branch, quantity):
+            x, y = line.places.T
+            ax.plot(x, y / scale, zorder=3.2 if line.stable else 3.0, **line_style(line.stable, line.validity, weight))
+
+
+def line_style(stable: bool, validity: ModelValidity, weight: float = 1.0) -> dict[str, Any]:
+    """How motions of a stability and a validity are drawn, in `weight` times the usual width."""
+    style = {**(STABLE_LINE if stable else UNSTABLE_LINE), "linewidth": weight * WEIGHTS[validity]}
+    return style | ({"color": PALE[stable]} if validity is ModelValidity.LIMIT else {})
 
 
 def draw_special(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
@@ -129,10 +142,10 @@ def draw_critical(ax: Any, critical: float) -> None:
     ax.axvline(critical, zorder=2, **QSB_LINE)
 
 
-def draw_response(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
+def draw_response(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0, weight: float = 1.0) -> None:
     """Bands, branches, dots and marks; the limits of the axes must be set before."""
     draw_bands(ax, spectrum)
-    draw_branches(ax, spectrum, quantity, scale)
+    draw_branches(ax, spectrum, quantity, scale, weight)
     draw_attractors(ax, spectrum, quantity, scale)
     draw_special(ax, spectrum, quantity, scale)
 
@@ -151,7 +164,7 @@ def draw_zoom(
     inset.set_ylim(window[2:])
     inset.tick_params(labelsize=6, length=2, pad=1.5)
     inset.locator_params(nbins=3)
-    draw_response(inset, spectrum, quantity, scale)
+    draw_response(inset, spectrum, quantity, scale, SETTINGS.inset_weight)
     box = ax.indicate_inset_zoom(inset, edgecolor=INK, linewidth=0.4, alpha=1.0)
     for connector in box.connectors:
         connector.set_visible(False)  # they would cross the curves
@@ -165,8 +178,8 @@ def free_place(
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
     marks = [np.empty((0, 2))]
     for _, branch in branches_of(spectrum):
-        for _, x, y in smooth_lines(branch, quantity):
-            marks.append(np.stack([(x - left) / (right - left), (y / scale - low) / (high - low)], axis=1))
+        for line in smooth_lines(branch, quantity):
+            marks.append((line.places / np.array([1.0, scale]) - np.array([left, low])) / np.array([right - left, high - low]))
     points = np.concatenate(marks)
     margin = SETTINGS.inset_margin
     lines = [(line.get_ydata()[0] - low) / (high - low) for line in ax.get_lines() if len(set(line.get_ydata())) == 1]
@@ -182,20 +195,54 @@ def free_place(
 
 
 def response_legend(figure: Any, spectra: list[Any], *, limits: bool = True, critical: bool = False, columns: int = 4) -> None:
-    """One legend for all panels, above them, of what is in them."""
+    """One legend for all panels, below them, of what is in them."""
+    from matplotlib.legend_handler import HandlerTuple
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    handles: list[Any] = [Line2D([], [], label="stable", **STABLE_LINE), Line2D([], [], label="unstable", **UNSTABLE_LINE)]
-    handles.append(Line2D([], [], label="attractors by direct simulation", **{**DOTS, "markersize": 4}))
+    handles: list[Any] = []
+    for label, styles in line_labels(spectra):
+        pair = tuple(Line2D([], [], label=label, **style) for style in styles)
+        handles.append(pair if len(pair) > 1 else pair[0])
+    labels = [(handle[0] if isinstance(handle, tuple) else handle).get_label() for handle in handles]
+    more: list[Any] = [Line2D([], [], label="direct simulation", **{**DOTS, "markersize": 4})]
     if limits:
-        handles.append(Line2D([], [], label=r"straight line, $\pi-\beta_0$", **LIMIT_LINE))
-        handles.append(Line2D([], [], label=r"kinematic limit, $2(\pi-\beta_0)$", **FARTHEST_LINE))
+        more.append(Line2D([], [], label=r"straight line, $\pi-\beta_0$", **LIMIT_LINE))
+        more.append(Line2D([], [], label=r"kinematic limit, $2(\pi-\beta_0)$", **FARTHEST_LINE))
     if critical:
-        handles.append(Line2D([], [], label="quasi-static bifurcation (QSB)", **QSB_LINE))
+        more.append(Line2D([], [], label="quasi-static bifurcation (QSB)", **QSB_LINE))
     for kind, style in MARKS.items():
         if any(len(special_places(spectrum, kind)) for spectrum in spectra):
-            handles.append(Line2D([], [], linestyle="none", label=MARK_NAMES[kind], **_mark(style)))
+            more.append(Line2D([], [], linestyle="none", label=MARK_NAMES[kind], **_mark(style)))
     found = {str(kind) for spectrum in spectra for kind in spectrum["bands"]["kind"].values}
-    handles += [Patch(color=BANDS[kind], label=BAND_NAMES[kind]) for kind in BANDS if kind in found]
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, columnspacing=1.4, handletextpad=0.5)
+    more += [Patch(color=BANDS[kind], label=BAND_NAMES[kind]) for kind in BANDS if kind in found]
+    handlers: dict[Any, Any] = {tuple: HandlerTuple(ndivide=None, pad=0.3)}
+    figure.legend(
+        handles=[*handles, *more],
+        labels=[*labels, *(handle.get_label() for handle in more)],
+        handler_map=handlers,
+        loc="outside lower center",
+        ncols=columns,
+        columnspacing=1.2,
+        handletextpad=0.5,
+        handlelength=3.6,
+    )
+
+
+def line_labels(spectra: list[Any]) -> list[tuple[str, list[dict[str, Any]]]]:
+    """What the lines of branches mean, with the styles of stable and unstable ones; by validity where any margin bears on it."""
+    branches = [branch for spectrum in spectra for _, branch in branches_of(spectrum)]
+    names = {kind: sorted({name for branch in branches for name in margins_of(branch, kind)}) for kind in ModelValidity}
+    if not any(names.values()):
+        return [(name, [line_style(name == "stable", ModelValidity.HOLDS)]) for name in ("stable", "unstable")]
+    found = {validity for branch in branches for validity in validity_of(branch)}
+    meaning = {
+        ModelValidity.HOLDS: "stable, unstable (model holds)",
+        ModelValidity.ASSUMPTION: " or ".join(names[ModelValidity.ASSUMPTION]).replace("_", " ") + " violated",
+        ModelValidity.LIMIT: "beyond " + " or ".join(names[ModelValidity.LIMIT]).replace("_", " "),
+    }
+    return [
+        (meaning[validity], [line_style(stable, validity) for stable in (True, False)])
+        for validity in ModelValidity
+        if validity in found
+    ]

@@ -2,7 +2,7 @@ from .cell_layout import CellLayout
 from .impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
 from .load import Channel, Load
 from .metainterface import Metainterface
-from .model import Model
+from .model import MarginKind, Model
 from .parameter_tables import broadcast_arrays, check_parameters, finite_array, parameter_table
 from .parameters import children, is_number, numbers, substitute
 from .registry import IMPACTS, MODELS, register
@@ -28,6 +28,7 @@ __all__ = [
     "InelasticImpact",
     "LayerState",
     "Load",
+    "MarginKind",
     "Metainterface",
     "Model",
     "NamedImpact",

@@ -11,7 +11,7 @@ import numpy as np
 from saltus.checks import RADIANS, settle_numbers
 from saltus.errors import ParameterError
 from saltus.systems.load import Load
-from saltus.systems.model import Model
+from saltus.systems.model import MarginKind, Model
 from saltus.systems.signals import Constant, Signal, scaled, vanishes
 
 
@@ -52,6 +52,11 @@ class Metainterface(Model):
         "ground_horizontal",
         "ground_vertical",
     )
+    margin_kinds: ClassVar[dict[str, MarginKind]] = {
+        "line_limit": MarginKind.LANDMARK,
+        "kinematic_limit": MarginKind.LIMIT,
+        "reaction": MarginKind.ASSUMPTION,
+    }
 
     def __post_init__(self) -> None:
         settle_numbers(self, "beta0", above=0.0, below=math.pi)

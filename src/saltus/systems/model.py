@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from enum import StrEnum
 from typing import Any, ClassVar
 
 from saltus.errors import ParameterError
+
+
+class MarginKind(StrEnum):
+    """What it means that a motion of a model passes one of its margins."""
+
+    LANDMARK = "landmark"  # a place worth a mark: the mechanism goes on through it
+    ASSUMPTION = "assumption"  # an assumption of the model fails: the mechanism does something else
+    LIMIT = "limit"  # the mechanism has no such positions
 
 
 class Model:
@@ -21,8 +31,9 @@ class Model:
        at which the gaps of all sides are zero. While the system rests there the accelerations at contact decide when it leaves;
     5. `reset`, the next side and the velocity after an impact, given the impact law; a model with one side must define it;
     6. optionally `mirror` (the symmetry that maps motions to motions), `kinetic_energy` (for impact laws that need
-       it), `margins` (what must stay positive), `stops` (the margins that end a motion unasked), `check_load`, and
-       `damping`, the coefficient of the velocity in the equation of motion.
+       it), `margins` (what must stay positive), `margin_kinds` (what it means to pass them; an assumption that fails where
+       a margin has none), `stops` (the margins that end a motion unasked), `check_load`, and `damping`, the coefficient of
+       the velocity in the equation of motion.
 
     Every argument may be a number, an array or a symbol. With one degree of freedom the coordinate, the velocity and the
     acceleration are scalars; with several they are tuples.
@@ -33,12 +44,17 @@ class Model:
     coordinates: ClassVar[tuple[str, ...]] = ("theta",)
     units: ClassVar[tuple[str, ...]] = ()
     channels: ClassVar[tuple[str, ...]] = ()
+    margin_kinds: ClassVar[Mapping[str, MarginKind]] = {}
     stops: ClassVar[tuple[str, ...]] = ()
     damping: float = 0.0  # small vibrations decay as exp(-damping tau / 2)
 
     def unit_of(self, coordinate: str) -> str:
         """The unit of one of the coordinates, such as "rad"."""
         return self.units[self.coordinates.index(coordinate)] if self.units else "1"
+
+    def margin_kind(self, margin: str) -> MarginKind:
+        """What it means to pass one of the margins."""
+        return self.margin_kinds.get(margin, MarginKind.ASSUMPTION)
 
     @property
     def sides(self) -> tuple[int, ...]:

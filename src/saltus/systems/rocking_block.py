@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
 from saltus.systems.load import Load
-from saltus.systems.model import Model
+from saltus.systems.model import MarginKind, Model
 from saltus.systems.signals import scaled
 
 
@@ -30,6 +30,7 @@ class RockingBlock(Model):
 
     units: ClassVar[tuple[str, ...]] = ("rad",)
     channels: ClassVar[tuple[str, ...]] = ("ground_horizontal", "ground_vertical")
+    margin_kinds: ClassVar[dict[str, MarginKind]] = {"overturned": MarginKind.LIMIT}
     stops: ClassVar[tuple[str, ...]] = ("overturned",)
 
     def __post_init__(self) -> None:

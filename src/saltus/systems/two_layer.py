@@ -11,7 +11,7 @@ import numpy as np
 from saltus.checks import RADIANS, settle_numbers
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
-from saltus.systems.model import Model
+from saltus.systems.model import MarginKind, Model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +40,11 @@ class TwoLayer(Model):
     coordinates: ClassVar[tuple[str, ...]] = ("theta_1", "theta_2")
     units: ClassVar[tuple[str, ...]] = ("rad", "rad")
     channels: ClassVar[tuple[str, ...]] = Metainterface.channels
+    margin_kinds: ClassVar[dict[str, MarginKind]] = {
+        **dict.fromkeys(("lower_line_limit", "upper_line_limit"), MarginKind.LANDMARK),
+        **dict.fromkeys(("lower_kinematic_limit", "upper_kinematic_limit"), MarginKind.LIMIT),
+        **dict.fromkeys(("lower_contact", "upper_contact"), MarginKind.LIMIT),
+    }
     stops: ClassVar[tuple[str, ...]] = ("lower_contact", "upper_contact")
 
     def __post_init__(self) -> None:

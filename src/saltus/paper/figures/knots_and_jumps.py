@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import branch_lines, smooth_lines
+from saltus.branch_lines import smooth_lines
 from saltus.flow import simulate_many
 from saltus.orbits import PeriodicOrbit, orbits_of, solve
 from saltus.paper.figure_data import dataset
@@ -79,12 +79,12 @@ def _stable_steps(branch: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The drawn line where it is stable: starts of its steps, their differences (n, 2), and the nearest points of the branch."""
     places = np.stack([branch["parameter"].values, branch["amplitude"].values], axis=1)
     starts, steps, near = [np.empty((0, 2))], [np.empty((0, 2))], [np.empty(0, dtype=int)]
-    for (stable, x, y), (_, points, _) in zip(smooth_lines(branch), branch_lines(branch), strict=True):
-        if stable:
-            line, own = np.stack([x, y], axis=1), places[points.start : points.stop]
-            distance = np.linalg.norm((line[:-1, None] - own) / np.ptp(places, axis=0), axis=2)
-            starts, steps = [*starts, line[:-1]], [*steps, np.diff(line, axis=0)]
-            near.append(points.start + distance.argmin(axis=1))
+    for line in smooth_lines(branch):
+        if line.stable:
+            own = np.array(line.points or [line.points.start - 1, line.points.start])
+            distance = np.linalg.norm((line.places[:-1, None] - places[own]) / np.ptp(places, axis=0), axis=2)
+            starts, steps = [*starts, line.places[:-1]], [*steps, np.diff(line.places, axis=0)]
+            near.append(own[distance.argmin(axis=1)])
     return np.concatenate(starts), np.concatenate(steps), np.concatenate(near)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import branch_lines, branches_of, smooth_lines
+from saltus.branch_lines import BranchLine, branch_lines, branches_of, smooth_lines
 
 PROMINENT = 0.05  # least height of a resonance above the minima beside it, as a share of the highest amplitude
 FREE_ENDS = {"closed", "bound"}  # the end reasons of a branch that is connected to no other
@@ -58,11 +58,12 @@ def amplitudes_at(branch: Any, value: float, stable: bool | None = None) -> np.n
     return passing(list(smooth_lines(branch)), value, stable)
 
 
-def passing(lines: list[Any], value: float, stable: bool | None = None) -> np.ndarray:
+def passing(lines: list[BranchLine], value: float, stable: bool | None = None) -> np.ndarray:
     """The same amplitudes for the lines of one or more branches, as `smooth_lines` gives them."""
     found = [np.empty(0)]
-    for holds, x, y in lines:
-        if stable in (None, holds):
+    for line in lines:
+        if stable in (None, line.stable):
+            x, y = line.places.T
             i = np.flatnonzero(_passes(x, value))
             found.append(y[i] + (value - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i]))
     return np.concatenate(found)
@@ -78,9 +79,9 @@ def stable_motions(spectrum: Any, values: np.ndarray) -> np.ndarray:
     values = np.asarray(values, dtype=float)
     number = np.zeros(values.shape, dtype=int)
     for _, branch in branches_of(spectrum):
-        for stable, x, _ in smooth_lines(branch):
-            if stable:
-                number += _passes(x, values[:, None]).sum(axis=1)
+        for line in smooth_lines(branch):
+            if line.stable:
+                number += _passes(line.places[:, 0], values[:, None]).sum(axis=1)
     return number
 
 
