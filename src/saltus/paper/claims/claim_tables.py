@@ -19,7 +19,8 @@ the part (a figure, table or group of statements) bears on:
     rests_on     the ids of the claims of which this one is a summary: nothing is measured for it either
     listing      "findings" or "validity": where the report lists the claim before all others
     headline     a template of what it says there
-    lists        how a field that is a list of rows is written: `each` row, what stands `between`, and what if there is `none`
+    lists        how a field that is a list is written: `each` row of fields or value (then as `{}`), what stands `between`, and
+                 what if there is `none`
     like         another claim, whose keys are taken where this one has none
 """
 
@@ -90,8 +91,9 @@ class ClaimEntry:
         texts = {name: self._listed(self.lists[name], rows) for name, rows in fields.items() if name in self.lists}
         return template.format(**{**fields, **texts})
 
-    def _listed(self, form: ListForm, rows: Iterable[Mapping[str, Any]]) -> str:
-        return form.between.join(self.filled(form.each, row) for row in rows) or form.none
+    def _listed(self, form: ListForm, rows: Iterable[Any]) -> str:
+        texts = (self.filled(form.each, row) if isinstance(row, Mapping) else form.each.format(row) for row in rows)
+        return form.between.join(texts) or form.none
 
 
 def claim_tables() -> dict[str, dict[str, ClaimEntry]]:

@@ -9,7 +9,7 @@ import numpy as np
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import TOLERANCE, tree
 from saltus.paper.figures.figure import paper_figure
-from saltus.paper.figures.phase_portraits import BETA0, VERTICAL, circled, constant_load, loop_area, portrait
+from saltus.paper.figures.phase_portraits import BETA0, VERTICAL, circled, constant_load, loop_area, outward, portrait
 from saltus.plots import DOUBLE_COLUMN, draw_portrait, new_figure, panel_label, styled
 
 STIFFNESS = {"a": 0.5, "b": 1.1}
@@ -49,12 +49,14 @@ def measure(data: Any) -> dict[str, Measured]:
     largest, limit = float(np.nanmax(data["a"]["separatrix_theta"].values)), float(data["a"]["kinematic_limit"])
     misprint, wrong = 1.384, data["a"]["wrong_reaction"].values
     stiffness = VERTICAL * float(np.cos(BETA0 + misprint)) / misprint
+    shifts = {side: max(_loop_shift(data[n], data["symmetric"], side) for n in "ab") for side in (1, -1)}
     rest = np.array(circled(data["a"])[1]), np.array(circled(data["b"])[2])
     return {
         "fig05a-theta-i": measured(soft),
         "fig05b-theta-i": measured(stiff, misprint=misprint, stiffness=stiffness),
         "fig05a-region": measured(soft_area > area, soft_area=soft_area, area=area),
         "fig05b-region": measured(stiff_area < area, stiff_area=stiff_area),
+        "fig05-upper": measured(shifts[-1], lower_shift=shifts[1]),
         "fig05a-two": measured(
             len(rest[0]) == 2 and 0.0 in rest[0] and bool((rest[0] >= 0).all()),
             start=STARTS["a"][1][0],
@@ -75,6 +77,14 @@ def measure(data: Any) -> dict[str, Measured]:
             share=float(data["a"]["beyond_limit"][-1]),
         ),
     }
+
+
+def _loop_shift(panel: Any, other: Any, side: int) -> float:
+    """The largest distance between the separatrices round the deformed equilibria on a side, and of these equilibria."""
+    ends = [float((side * p["equilibrium"]).max()) for p in (panel, other)]
+    loops = [next(curve for curve in outward(p) if side * curve[0, 0] > 0) for p in (panel, other)]
+    count = min(len(loop) for loop in loops)
+    return max(abs(ends[0] - ends[1]), float(np.abs(loops[0][:count] - loops[1][:count]).max()))
 
 
 def _summary(panel: Any) -> tuple[float, float, float]:

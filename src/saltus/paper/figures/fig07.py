@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,12 +13,14 @@ from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import TOLERANCE, dataset, scalar_dataset, scalars, tree
 from saltus.paper.figures.figure import paper_figure
 from saltus.plots import DOUBLE_COLUMN, draw_family, new_figure, panel_label, styled
-from saltus.systems import Load, Metainterface, System
-from saltus.theory import peaks, reciprocal
+from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
+from saltus.theory import peaks, potential_energy, reciprocal
 
 LOAD_ANGLES = (2.0, 4.0, 6.0, 8.0, 10.0)  # degrees
 LOADS = (0.0, 0.25, 0.5, 0.75, 1.0)
 STIFFEST = 1e3  # k
+FAR = (1e3, 1e5, 1e7)  # k of the limit; 1/k of that on the other side
+CYCLES = 4
 
 
 def compute(samples: int = 49) -> Any:
@@ -26,6 +30,8 @@ def compute(samples: int = 49) -> Any:
         "a": _panel(stiffness, [(-0.5, -np.deg2rad(angle)) for angle in LOAD_ANGLES]),
         "b": _panel(stiffness, [(-load, -np.deg2rad(5.0)) for load in LOADS]),
         "balance": _balance(),
+        "limit": _limits(),
+        "disturbed": _disturbed(),
     }
     return tree(groups, what="peak ratio of conservative motion, beta0 = 80 deg, m = 0, C = 0, e = 1", tol=TOLERANCE)
 
@@ -64,6 +70,59 @@ def _panel(stiffness: np.ndarray, curves: list[tuple[float, float]]) -> Any:
         },
         what="P_R(k)",
         system=system(1.0, curves[0][0]),
+    )
+
+
+def _limits() -> Any:
+    """P_R sqrt(k) over its limit sqrt(2 P(theta0)) / abs(theta0) for large k on every curve, and P_R of motions for small k."""
+    curves = [(-0.5, -np.deg2rad(angle)) for angle in LOAD_ANGLES] + [(-load, -np.deg2rad(5.0)) for load in LOADS]
+    errors = np.empty((len(curves), len(FAR)))
+    for i, (vertical, start) in enumerate(curves):
+        limit = np.sqrt(2 * potential_energy(system(1.0, vertical), start)) / -start
+        errors[i] = [peaks(system(k, vertical), start).ratio * np.sqrt(k) / limit - 1 for k in FAR]
+    vertical, start = curves[0]
+    soft = [simulated_peak(system(1 / k, vertical / k), -start) / start for k in FAR]
+    limit = np.sqrt(2 * potential_energy(system(1.0, vertical), start)) / -start
+    stiff = simulated_peak(system(FAR[1], vertical), start) / -start
+    return dataset(
+        {
+            "error": (("curve", "stiffness_ratio"), errors, "1", "P_R sqrt(k) over its limit, less 1"),
+            "soft_ratio": ("stiffness_ratio", np.array(soft), "1", "P_R of the simulated motion from theta_max at 1/k, V/k"),
+            "soft_error": ("stiffness_ratio", np.array(soft) * np.sqrt(FAR) / limit - 1, "1", "the same over its limit, less 1"),
+            "stiff_error": ((), stiff * np.sqrt(FAR[1]) / limit - 1, "1", "of the simulated motion at the second k"),
+        },
+        {"stiffness_ratio": ("stiffness_ratio", np.array(FAR), "1", "k")},
+        what="the limits of P_R",
+        system=system(FAR[0], vertical),
+    )
+
+
+def _disturbed() -> Any:
+    """The ratio of the mean peaks of both sides of motions with a damping, a loss at impacts, or a horizontal force."""
+    start, stiffness = np.deg2rad(-5.0), np.array([1.0, 10.0, 100.0, STIFFEST])
+    changes: dict[str, dict[str, Any]] = {
+        "C = 0.05": {"model.damping": 0.05},
+        "e = 0.95": {"impact": VelocityReduction(0.95)},
+        "H = 0.01 sin τ": {"load": Load(frequency=1.0, horizontal=Harmonic(amplitude=0.01), vertical=-0.5)},
+    }
+    ratios = np.empty((len(changes), stiffness.size))
+    for i, change in enumerate(changes.values()):
+        for j, k in enumerate(stiffness):
+            plain = system(float(k), -0.5)
+            parts = {name: value for name, value in change.items() if name in ("impact", "load")}
+            disturbed = replace(plain, **parts).with_({n: v for n, v in change.items() if n not in parts})
+            motion = simulate(
+                disturbed, theta=start, velocity=0.0, duration=2 * CYCLES * peaks(plain, start).period, tol=TOLERANCE
+            )
+            times = motion.impacts.time[: 2 * CYCLES + 1]
+            tops = [float(abs(motion.at(np.linspace(a, b, 201))[0]).max()) for a, b in pairwise(times)]
+            first, second = np.mean(tops[::2]), np.mean(tops[1::2])
+            ratios[i, j] = min(first / second, second / first)
+    return dataset(
+        {"ratio": (("change", "stiffness_ratio"), ratios, "1", "ratio of the mean peaks of both sides")},
+        {"change": ("change", list(changes)), "stiffness_ratio": ("stiffness_ratio", stiffness, "1", "k")},
+        what="bouncing-like motion with losses and a load that varies",
+        system=system(1.0, -0.5),
     )
 
 
@@ -108,7 +167,6 @@ def measure(data: Any) -> dict[str, Measured]:
     deviation = max(_deviation(data["a"]), _deviation(data["b"]))
     unloaded = data["b"]["ratio"][0]
     falls = all((np.diff(data[p]["ratio"].values, axis=1) < 0).all() for p in "ab")
-    last = max(float(data[p]["ratio"][:, -1].max()) for p in "ab")
     twin = b["twin_theta_max"] / -b["twin_theta_min"]
     here, there = high / -low, b["other_side_theta_max"] / -b["other_side_theta_min"]
     return {
@@ -124,11 +182,32 @@ def measure(data: Any) -> dict[str, Measured]:
         "fig07-unloaded": measured(float(np.abs(unloaded - unloaded["stiffness_ratio"] ** -0.5).max())),
         "fig07-simulated": measured(deviation, motions=sum(data[p]["simulated"].size for p in "ab")),
         "fig07-monotonic": measured(falls, curves=data["a"].sizes["curve"] + data["b"].sizes["curve"], largest_k=STIFFEST),
-        "fig07-limit": measured(
-            bool(last * np.sqrt(STIFFEST) < 3), largest=last, largest_k=STIFFEST, scaled=last * np.sqrt(STIFFEST)
-        ),
+        **_far(data["limit"], data["disturbed"]),
         "reciprocity": measured(min(here, 1 / here) - min(twin, 1 / twin)),
     }
+
+
+def _far(limit: Any, disturbed: Any) -> dict[str, Measured]:
+    """The limits of k, and the motions with losses and a load that varies."""
+    errors, k = np.abs(limit["error"].values).max(axis=0), limit["stiffness_ratio"].values
+    soft, soft_errors = limit["soft_ratio"].values, np.abs(limit["soft_error"].values)
+    ratios = disturbed["ratio"].values
+    stiffness = disturbed["stiffness_ratio"].values
+    return {
+        "fig07-limit": measured(
+            bool((errors[1:] < 0.2 * errors[:-1]).all() and errors[-1] < 1e-3 and abs(float(limit["stiff_error"])) < errors[0]),
+            k=k.tolist(), errors=errors.tolist(), simulated_k=k[1], simulated_error=float(limit["stiff_error"]),
+        ),
+        "fig07-limit-soft": measured(
+            bool((soft_errors[1:] < 0.2 * soft_errors[:-1]).all() and soft[-1] < 1e-3),
+            k=(1 / k).tolist(), ratios=soft.tolist(), spread=soft_errors[-1],
+        ),
+        "fig07-disturbed": measured(
+            bool((np.diff(ratios, axis=1) < 0).all() and (ratios[:, -1] * np.sqrt(stiffness[-1]) < 3).all()),
+            k=stiffness.tolist(), cycles=CYCLES,
+            panels=[{"name": str(n), "ratios": row} for n, row in zip(disturbed["change"].values, ratios.tolist(), strict=True)],
+        ),
+    }  # fmt: skip
 
 
 def _deviation(panel: Any) -> float:

@@ -73,11 +73,32 @@ def _paths(beta0: float, loads: tuple[tuple[float, float, float], ...], what: st
             "vertical": (("path", "phase"), vertical, "1", "V"),
             "within": ("path", is_monostable(beta0, horizontal, vertical).all(axis=1), "1", "all of the path in the true domain"),
             "within_printed": ("path", paper_monostable(beta0, horizontal, vertical).all(axis=1), "1", "in the printed domain"),
+            "held": ("path", [_held(s) for s in systems], "1", "rests in all"),
+            "deformed": (
+                "path",
+                [_most_deformed(beta0, *row) for row in rows],
+                "1",
+                "deformed equilibria under constant loads of it",
+            ),
             "system": ("path", np.array(systems), "1", "the System as JSON"),
         },
         {"phase": ("phase", phase, "rad", "Omega tau")},
         what=what,
     )
+
+
+def _held(system: str) -> bool:
+    """Whether a motion from rest at theta = 0 rests through two periods of the loads of the path."""
+    motion = simulate(System.from_json(system), theta=0.0, velocity=0.0, periods=2)
+    return motion.stop is Stop.REST and len(motion.impacts) == 0
+
+
+def _most_deformed(beta0: float, horizontal: np.ndarray, vertical: np.ndarray) -> int:
+    """The largest number of deformed equilibria under the loads of 61 points of a path, each held constant."""
+    model = Metainterface(beta0=beta0)
+    points = zip(horizontal[::4], vertical[::4], strict=True)
+    systems = (System(model=model, load=Load(horizontal=float(h), vertical=float(v))) for h, v in points)
+    return max(sum(p.theta != 0.0 for p in equilibria(system)) for system in systems)
 
 
 def _numbers() -> Any:
@@ -146,13 +167,23 @@ def measure(data: Any) -> dict[str, Measured]:
             n["count_at_rest_below"] == 1, n["count_at_rest_above"] == 1 and n["count_at_rest_below"] > 1
         ),
         "fig08-paths": measured(
-            _both(i["within"].values) and _both(iii["within"].values),
+            all(_both(p["within"].values) and _borne_out(p) for p in (i, iii)),
             within_i=i["within"].values.tolist(),
             within_iii=iii["within"].values.tolist(),
+            held_i=i["held"].values.tolist(),
+            held_iii=iii["held"].values.tolist(),
+            most_i=i["deformed"].values.tolist(),
+            most_iii=iii["deformed"].values.tolist(),
         ),
         "fig08-critical": measured(n["held_below"] == 1 and n["held_above"] == 0),
     }
     return with_fields(n, found)
+
+
+def _borne_out(paths: Any) -> bool:
+    """Whether rest is held just on the paths within the printed border, and nothing deformed exists just in the true domain."""
+    held = (paths["held"].values.astype(bool) == paths["within_printed"].values.astype(bool)).all()
+    return bool(held and ((paths["deformed"].values == 0) == paths["within"].values.astype(bool)).all())
 
 
 def _both(flags: np.ndarray) -> bool:

@@ -12,6 +12,14 @@ from saltus.paper.figure_data import dataset, tree
 from saltus.paper.figures.figure import paper_figure
 from saltus.systems import LayerState, TwoLayer, name_impact, other_impulse, table_1
 
+# Table 1 as it is printed: deformed layers before, those after, and the scenario.
+PRINTED = (
+    (1, 1, "no bouncing"),
+    (1, 1, "bouncing"),
+    (1, 2, "partial bouncing"),
+    (2, 1, "no bouncing"),
+    (2, 2, "bouncing"),
+)
 OPEN = -0.3  # rad, theta_2 of the examples with both layers deformed
 EXAMPLES: tuple[tuple[float, tuple[float, float], float], ...] = (
     (0.0, (-0.5, 0.0), 0.0),  # theta_2, velocities before, theta_1' after: row 1
@@ -37,7 +45,7 @@ def compute(beta0: float = 80.0) -> Any:
     }
     data = dataset({name: ("row", np.array(values)) for name, values in columns.items()}, what="impact scenarios")
     return tree(
-        {"rows": data, "angles": _refusal(model)},
+        {"rows": data, "angles": _refusal(model), "random": _random_impacts(model, np.random.default_rng(11))},
         what="Table 1 with examples at beta0 = 80 deg, m = 0, s = 1",
         beta0_degrees=beta0,
     )
@@ -63,6 +71,41 @@ def _example(model: Any, theta_2: float, before: tuple[float, float], after_1: f
         "impulse": other_impulse(model, first, second, 1),
         "impulse_if_unchanged": other_impulse(model, first, held, 1),
     }
+
+
+def _random_impacts(model: Any, rng: np.random.Generator, impacts: int = 300) -> Any:
+    """How many random impacts on either layer are named otherwise than `impact_condition1` to `impact_condition3` say.
+
+    The conditions are those of the text, on the velocities of the hit and of the other layer; which layers are deformed
+    afterwards follows from a short motion with the velocities after the impact.
+    """
+    wrong, kinds = 0, set()
+    for _ in range(impacts):
+        s = int(rng.integers(2))
+        j, sign = 1 - s, (1.0, -1.0)[s]  # layer 1 opens to positive angles, layer 2 to negative ones
+        other_open, stops, holds = rng.random(3) < 0.5
+        theta, before, after = np.zeros(2), np.zeros(2), np.zeros(2)
+        theta[j], before[j] = (sign * OPEN, float(rng.normal())) if other_open else (0.0, 0.0)
+        before[s], after[s] = -sign * rng.uniform(0.1, 1), 0.0 if stops else sign * rng.uniform(0.1, 1)
+        row = model.mass_matrix(tuple(theta))[j]
+        after[j] = before[j] - row[s] / row[j] * (after[s] - before[s])
+        if not other_open:
+            after[j] = 0.0 if holds and not stops else -sign * abs(after[j])
+        soon = theta + 1e-6 * after
+        turned = "bouncing" if other_open or after[j] == before[j] else "partial bouncing"
+        said = "no bouncing" if after[s] == 0.0 else turned
+        expected = (1 + int(other_open), int((abs(soon) > 0).sum()), said)
+        named = name_impact(_state(theta, before), _state(theta, after), model=model)
+        kinds.add(expected)
+        wrong += (named.deformed_before, named.deformed_after, named.scenario.value) != expected or named.layer != s + 1
+    return dataset(
+        {"wrong": ((), wrong), "impacts": ((), impacts), "printed_kinds": ((), int(kinds == set(PRINTED)))},
+        what="random impacts named by the conditions of the text",
+    )
+
+
+def _state(theta: np.ndarray, velocity: np.ndarray) -> LayerState:
+    return LayerState((float(theta[0]), float(theta[1])), (float(velocity[0]), float(velocity[1])))
 
 
 def _refusal(model: Any) -> Any:
@@ -115,14 +158,18 @@ def _pretty(text: Any) -> str:
 def measure(data: Any) -> dict[str, Measured]:
     """The table's scenarios, and erratum 16."""
     rows, refused = data["rows"], bool(data["angles"]["refused"])
-    same = all((rows[a].values == rows[b].values).all() for a, b in (("named", "scenario"), ("named_after", "deformed_after")))
+    named = tuple(
+        (int(a), int(b), str(c)) for a, b, c in zip(*(rows[f"named{x}"].values for x in ("_before", "_after", "")), strict=True)
+    )
+    found = {name: int(data["random"][name]) for name in ("wrong", "impacts", "printed_kinds")}
+    same = named == PRINTED and found["wrong"] == 0 and found["printed_kinds"] == 1
     last = {name: float(rows[name][-1]) for name in ("impulse", "impulse_if_unchanged", "velocity_before_2", "velocity_after_2")}
-    found = {
-        "table1-scenarios": measured(bool(same), states=rows.sizes["row"], named=rows["named"].values.tolist()),
+    measures = {
+        "table1-scenarios": measured(same, states=rows.sizes["row"], named=rows["named"].values.tolist(), **found),
         "table1-angles": measured(not refused, refused, refusal=data["angles"].attrs["what"]),
         "table1-other-layer": measured(last["impulse_if_unchanged"], last["impulse"]),
     }
-    return with_fields(last, found)
+    return with_fields(last, measures)
 
 
 FIGURE = paper_figure("table1", compute=compute, table=table, measure=measure)

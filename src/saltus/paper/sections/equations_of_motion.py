@@ -17,7 +17,7 @@ def compute(states: int = 40) -> Any:
     rng = np.random.default_rng(2)
     rows = [_residuals(rng) for _ in range(states)]
     values = {name: max(row[name] for row in rows) for name in rows[0]}
-    values |= {**_equivalence(rng), **_symmetry(rng), **_closed_layer()}
+    values |= {**_equivalence(rng), **_symmetry(rng), **_closed_layer(), **_excitation()}
     return scalar_dataset(values, what="residuals of the equations of motion", states=states)
 
 
@@ -47,6 +47,8 @@ def _residuals(rng: np.random.Generator) -> dict[str, float]:
         "lagrange": _lagrange_residual(double, load, 0.2, theta, velocity, acceleration),
         "linear": _linear_residual(double, load),
         "reduction": _reduction_residual(single, double, load, theta, velocity),
+        "virtual_work": _virtual_work_residual(double, load, 0.2, theta),
+        "operators": _operators_residual(double, theta),
     }
 
 
@@ -63,6 +65,49 @@ def _kinetic_residual(model: Any, load: Any, t: float, theta: Any, velocity: Any
     speeds = (8 * (places(h) - places(-h)) - (places(2 * h) - places(-2 * h))) / (12 * h)
     energy = (model.mass_ratio * speeds[0] @ speeds[0] + speeds[1] @ speeds[1]) / 2
     return abs(float(energy - model.kinetic_energy(t, theta, velocity, 0, load)))
+
+
+def _virtual_work_residual(model: Any, load: Any, t: float, theta: Any) -> float:
+    """`ext_forces_beta` against the work of the forces on both masses of the drawn cell over small rotations."""
+    cell, h, worst = UnitCell(alpha0=0.3, beta0=model.beta0), 1e-3, 0.0
+    upper = np.array([load.horizontal(t), load.vertical(t)])
+    lower = np.array([load.lower_horizontal(t), load.lower_vertical(t)])
+
+    def work(angles: list[float]) -> float:
+        points = cell.layout(*angles).points
+        return float(lower @ np.array(points["mass_1"]) + upper @ np.array(points["mass_2"]))
+
+    for j, force in enumerate(model.generalised_forces(t, theta, load)):
+        w = [work([q + n * h * (i == j) for i, q in enumerate(theta)]) for n in (-2, -1, 1, 2)]
+        worst = max(worst, abs((8 * (w[2] - w[1]) - (w[3] - w[0])) / (12 * h) - force))
+    return worst
+
+
+def _operators_residual(model: Any, theta: Any) -> float:
+    """How far M is from symmetric, D from skew-symmetric, and C and K from diagonal."""
+    mass, twist = np.asarray(model.mass_matrix(theta)), np.asarray(model.velocity_matrix(theta))
+    diagonals = [np.asarray(matrix) for matrix in (model.damping_matrix(), model.stiffness_matrix())]
+    parts = [mass - mass.T, twist + twist.T, *(matrix - np.diag(np.diag(matrix)) for matrix in diagonals)]
+    return float(max(abs(part).max() for part in parts))
+
+
+def _excitation() -> dict[str, float]:
+    """By how much f0 and K0 change over a period when one channel alone varies: the least of the six, for beta0 = 80 and 90."""
+    times, found = np.linspace(0, 2 * np.pi, 13), dict[str, float]()
+    for degrees in (80, 90):
+        model, swings = TwoLayer(beta0=float(np.deg2rad(degrees)), mass_ratio=0.4), []
+        for name in Metainterface.channels:
+            load = Load(frequency=1.0, **{name: Harmonic(amplitude=0.3)})
+            force = np.array([model.force(t, (0.0, 0.0), load) for t in times])
+            stiffness = np.array([np.diag(model.linear_stiffness_matrix(t, load)) for t in times])
+            swings.append([float(np.ptp(values, axis=0).max()) for values in (force, stiffness)])
+        found |= {f"external_{degrees}": min(s[0] for s in swings), f"parametric_{degrees}": min(s[1] for s in swings)}
+    still = Load(horizontal=0.3, vertical=-0.5)
+    parts = [
+        np.array([model.force(t, (0.0, 0.0), still) for t in times]),
+        np.array([model.linear_stiffness_matrix(t, still) for t in times]),
+    ]
+    return found | {"excitation_still": float(max(np.ptp(part, axis=0).max() for part in parts))}
 
 
 def _lagrange_residual(model: Any, load: Any, t: float, theta: Any, velocity: Any, acceleration: Any) -> float:
@@ -187,7 +232,11 @@ def measure(data: Any) -> dict[str, Measured]:
     found = {
         "kinetic-energy": measured(r["kinetic"]),
         "lagrange": measured(r["lagrange"]),
+        "virtual-work": measured(r["virtual_work"]),
+        "operators": measured(r["operators"]),
         "linearised": measured(r["linear"]),
+        "external-parametric": measured(r["external_80"] > 0.01 and r["parametric_80"] > 0.01 and r["excitation_still"] == 0.0),
+        "asymmetry": measured(r["symmetry_unequal"] > 1e-3),
         "reduction": measured(r["reduction"]),
         "one-open-layer": measured(r["reaction_fast"] >= 0, r["reaction_slow"] > 0 > r["reaction_fast"]),
         "symmetry": measured(r["symmetry"]),

@@ -1,4 +1,4 @@
-"""Section 4: jumps of acceleration, energy and velocity at impacts (errata 4, 5, 25, 26, and our own 29)."""
+"""Section 4: jumps of acceleration, energy and velocity at impacts (errata 4, 5, 25, 26, and our own 29 and 40)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow import simulate
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import scalar_dataset, scalars
+from saltus.paper.figures.phase_portraits import constant_load
 from saltus.paper.sections.equations_of_motion import random_case
 from saltus.systems import (
     EnergyRestitution,
@@ -17,12 +19,13 @@ from saltus.systems import (
     LayerState,
     Load,
     Metainterface,
+    RockingBlock,
     System,
     TwoLayer,
     VelocityReduction,
     other_impulse,
 )
-from saltus.theory import energy_factor, energy_jump
+from saltus.theory import energy_factor, energy_jump, equilibria, total_energy
 
 TIME = 0.2  # at which the impacts take place: no load and no ground velocity is zero there
 
@@ -33,6 +36,7 @@ def compute(impacts: int = 400) -> Any:
     jumps = [_jump(rng, e) for e in np.where(rng.random(impacts // 4) < 0.3, 1.0, rng.uniform(0.1, 1, impacts // 4))]
     values: dict[str, Any] = {name: max(row[name] for row in jumps) for name in jumps[0]}
     values |= {**_no_jump(), **_energies(rng, impacts), **_still_ground(), **_without_root(), **_inelastic(rng), **_pushing(rng)}
+    values |= {**_energy_of_motion(), **_both_factors(rng), **_stable_states()}
     return scalar_dataset(values, what="impacts", impacts=impacts)
 
 
@@ -77,13 +81,15 @@ def _no_jump() -> dict[str, float]:
         load = Load(frequency=1.0, **{**load.channels, "ground_horizontal": Harmonic(amplitude=-shake, phase=np.pi / 2)})
         return float(model.acceleration(0.0, 0.0, 0.5, 1, load) - model.acceleration(0.0, 0.0, 0.5, -1, load))
 
-    return {"jump_vanishes": abs(jump(0.0)), "jump_with_ground": abs(jump(2.0) - jump(0.0))}
+    pressed = Load(vertical=-0.5)
+    at_rest = float(model.acceleration(0.0, 0.0, 0.5, 1, pressed) - model.acceleration(0.0, 0.0, 0.5, -1, pressed))
+    return {"jump_vanishes": abs(jump(0.0)), "jump_with_ground": abs(jump(2.0) - jump(0.0)), "jump_e_1": at_rest}
 
 
 def _energies(rng: np.random.Generator, impacts: int) -> dict[str, Any]:
     """r from the energies of both masses, against the paper's formula and the corrected one; the signs of [[T]]."""
-    counts = dict.fromkeys(("sign_printed", "sign_corrected"), 0)
-    worst = dict.fromkeys(("r_printed", "r_corrected"), 0.0)
+    counts = dict.fromkeys(("sign_printed", "sign_corrected", "sign_still", "gains_moving"), 0)
+    worst = dict.fromkeys(("r_printed", "r_corrected", "r_e_1_printed"), 0.0)
     changes = []
     for i in range(impacts):
         single, double, load = random_case(rng)
@@ -101,6 +107,11 @@ def _energies(rng: np.random.Generator, impacts: int) -> dict[str, Any]:
         if i % 2:  # the paper's formulas are for m = 0
             r, falls = _as_printed(load, single.beta0, velocity, e)
             counts["sign_printed"] += bool(falls != (jump < 0))
+            counts["sign_still"] += bool(
+                _both_masses(double, Load(), e * velocity, -side) >= _both_masses(double, Load(), velocity, side)
+            )
+            counts["gains_moving"] += bool(jump > 0)
+            worst["r_e_1_printed"] = max(worst["r_e_1_printed"], abs(_as_printed(load, single.beta0, velocity, 1.0)[0] - 1))
             worst["r_printed"] = max(worst["r_printed"], abs(r / (after / before) - 1))
             changes.append(abs(_both_masses(double, load, velocity, -side) / before - 1))
     return {**counts, **worst, "change_at_e_1": float(np.median(changes))}
@@ -175,6 +186,40 @@ def _least_factor(model: Any, layer: int) -> float:
     return -none / (full - none)
 
 
+def _energy_of_motion(e: float = 0.8, gap: float = 1e-9) -> dict[str, float]:
+    """The jumps of the total energy of a simulated motion over its impacts, less those of `eng_loss` with r = e^2 (m = 0)."""
+    system = constant_load(e=e)
+    motion = simulate(system, theta=0.42, velocity=0.0, duration=20.0, tol=1e-12)
+    worst = 0.0
+    for time, before in zip(motion.impacts.time, motion.impacts.velocity_before, strict=True):
+        first, last = (total_energy(system, *(float(x) for x in motion.at(t))) for t in (time - gap, time + gap))
+        worst = max(worst, abs(last - first + (1 - e * e) * before**2 / 2))
+    return {"energy_of_motion": worst, "impacts_of_motion": len(motion.impacts)}
+
+
+def _both_factors(rng: np.random.Generator, impacts: int = 60) -> dict[str, float]:
+    """The spread of r over random impacts and horizontal ground velocities, m = 0: e = 0.8 and 1, and on a ground at rest."""
+    model, spreads = Metainterface(beta0=1.3), {}
+    for name, e, shake in (("moving", 0.8, 1.0), ("moving_e_1", 1.0, 1.0), ("still", 0.8, 0.0)):
+        factors = []
+        for velocity, ground in zip(-rng.uniform(0.1, 2, impacts), rng.normal(size=impacts), strict=True):
+            load = Load(frequency=1.0, ground_horizontal=Harmonic(amplitude=shake * float(ground)))
+            factors.append(energy_factor(System(model=model, load=load), float(velocity), 1, e, 0.0))
+        spreads[f"spread_{name}"] = float(np.ptp(factors))
+    return spreads
+
+
+def _stable_states() -> dict[str, float]:
+    """How many stable equilibria the loaded cell has, and at most a rocking block of any slenderness, lying flat left out."""
+    block = 0
+    for alpha in np.linspace(0.05, 1.5, 30):
+        angle = np.linspace(1e-6, np.pi / 2, 4001)
+        turning = np.array([RockingBlock(alpha=float(alpha)).acceleration(0.0, x, 0.0, 1, Load()) for x in angle])
+        pushed_back = int(turning[0] < 0)  # at rest on its base
+        block = max(block, pushed_back + int(((turning[:-1] > 0) & (turning[1:] <= 0)).sum()))
+    return {"stable_of_cell": sum(p.stable for p in equilibria(constant_load())), "stable_of_block": block}
+
+
 def measure(data: Any) -> dict[str, Measured]:
     """Section 4."""
     r, n = scalars(data), int(data.attrs["impacts"])
@@ -183,6 +228,15 @@ def measure(data: Any) -> dict[str, Measured]:
         "accjump-symmetric": measured(r["reduced_printed"], r["reduced_corrected"]),
         "accjump-always": measured(r["jump_vanishes"] > 1e-9, r["jump_vanishes"] < 1e-15),
         "accjump-ground": measured(r["jump_with_ground"]),
+        "accjump-e-1": measured(abs(r["jump_e_1"]) > 1e-3),
+        "energy-jump": measured(r["energy_of_motion"]),
+        "energy-guarantee": measured(r["sign_still"] == 0 and r["gains_moving"] > 0),
+        "both-factors": measured(
+            r["spread_moving_e_1"] > 1e-3,
+            r["spread_moving"] > 1e-3 and r["spread_moving_e_1"] < 1e-12 and r["spread_still"] < 1e-12,
+            second=r["r_e_1_printed"],
+        ),
+        "multistable": measured(r["stable_of_cell"] == 3 and r["stable_of_block"] == 1),
         "restitution": measured(r["r_printed"], r["r_corrected"]),
         "restitution-still": measured(r["r_still"]),
         "restitution-decrease": measured(r["sign_printed"] == 0, r["sign_corrected"] == 0),

@@ -18,7 +18,7 @@ def compute() -> Any:
     """Largest residuals over several cells and openings."""
     rows = [_cell(*angles) for angles in UNIT_CELLS]
     worst = {name: max(row[name] for row in rows) for name in rows[0]}
-    values = {**worst, **_limits(), **_dimensions()}
+    values = {**worst, **_limits(), **_dimensions(), "closing_cells": _closing_cells()}
     return scalar_dataset(values, what="residuals of the kinematics")
 
 
@@ -38,6 +38,7 @@ def _cell(alpha0: float, beta0: float) -> dict[str, float]:
         "theta_1_corrected": float(abs(cell.theta(phi, layer=1) - theta).max()),
         "configalpha_printed": float(abs(_cos_alpha(cell, beta0 - theta, chi_printed) - exact).max()),
         "configalpha_corrected": float(abs(_cos_alpha(cell, beta0 + theta, cell.chi) - exact).max()),
+        "closed_side": float(max(beta0 - cell.beta_of_phi(sign * phi).min() for sign in (1, -1))),
         **_drawn(cell, theta[::10]),
     }
 
@@ -51,12 +52,13 @@ def _cos_alpha(cell: Any, angle: np.ndarray, chi: float) -> np.ndarray:
 
 def _drawn(cell: Any, openings: np.ndarray) -> dict[str, float]:
     """The constructed positions: lengths of the bars, angles alpha_j, displacements xi_j and heights eta_j."""
-    lengths, angles, places = 0.0, 0.0, 0.0
+    lengths, angles, places, turns = 0.0, 0.0, 0.0, 0.0
     for one, two in zip(openings, -openings[::-1], strict=True):
         layout = cell.layout(float(one), float(two))
         bars = [np.diff(layout.segment(pair), axis=0)[0] for pair in layout.bars]
         wanted = [cell.base, 1, 1, cell.base, 1, 1, cell.base, *[cell.lambda_] * 4]
         lengths = max(lengths, *(abs(float(np.hypot(*bar)) - length) for bar, length in zip(bars, wanted, strict=True)))
+        turns = max(turns, *(abs(math.atan2(bar[1], bar[0])) for bar in (bars[3], bars[6])))
         run = layout.points["middle_right"] - layout.points["lower_left"]
         angles = max(angles, abs(math.atan2(run[1], run[0]) - float(cell.alpha(one))))
         offset = math.sin(cell.alpha0 - cell.beta0) / (2 * math.sin(cell.alpha0))
@@ -64,7 +66,21 @@ def _drawn(cell: Any, openings: np.ndarray) -> dict[str, float]:
         found = (layout.points["mass_1"][0] + offset, layout.points["mass_1"][1], step[0] - math.cos(cell.beta0), step[1])
         stated = (cell.xi(one), cell.eta(one), cell.xi(two), cell.eta(two))
         places = max(places, *(abs(a - b) for a, b in zip(found, stated, strict=True)))
-    return {"bar_lengths": lengths, "alpha_drawn": angles, "places": places}
+    return {"bar_lengths": lengths, "alpha_drawn": angles, "places": places, "top_edges_turn": turns}
+
+
+def _closing_cells(count: int = 40) -> int:
+    """For how many pairs of angles in (0, pi) `restangle` and a triangle with edges of positive length say different things.
+
+    The base, the inclined bar of length 1 and the diagonal meet where two rays from the base's ends, at alpha0 and beta0, cross.
+    """
+    wrong = 0
+    for alpha0 in np.linspace(0.05, 3.1, count):
+        for beta0 in np.linspace(0.05, 3.1, count):
+            rays = np.array([[math.cos(alpha0), math.cos(beta0)], [math.sin(alpha0), -math.sin(beta0)]])
+            diagonal, bar = np.linalg.solve(rays, [1.0, 0.0])
+            wrong += bool(diagonal > 0 and bar > 0) != (alpha0 + beta0 < math.pi)
+    return wrong
 
 
 def _limits() -> dict[str, float]:
@@ -102,6 +118,9 @@ def measure(data: Any) -> dict[str, Measured]:
     r = scalars(data)
     found = {
         "chi": measured(r["chi_printed"], r["chi_corrected"]),
+        "one-sided": measured(max(0.0, r["closed_side"])),
+        "restangle": measured(r["closing_cells"] == 0),
+        "rotary-inertia": measured(r["top_edges_turn"]),
         "theta-definition": measured(r["theta_1_drop"] <= 0, r["theta_1_corrected"] < 1e-10),
         "configalpha": measured(r["configalpha_printed"], r["configalpha_corrected"]),
         "geometry": measured(max(r["bar_lengths"], r["alpha_drawn"])),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from saltus.flow import simulate
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import scalars
 from saltus.systems import Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction
-from saltus.theory import decayed_amplitude, final_time, rocking_energy_jump, rocking_period
+from saltus.theory import decayed_amplitude, final_time, housner_restitution, rocking_energy_jump, rocking_period
 
 
 def block(alpha: float, e: float = 1.0) -> Any:
@@ -28,6 +29,9 @@ def residuals(rng: np.random.Generator, n: int = 500) -> dict[str, Any]:
         **_conditions(rng, n),
         **_decay(),
         **_linear_terms(),
+        **_lagrange(rng),
+        **_housner(rng),
+        **_overturning(),
     }
 
 
@@ -47,6 +51,74 @@ def _energies(alpha: np.ndarray, theta: np.ndarray, velocity: np.ndarray, ground
     cross = 2 * velocity * ground * np.cos(alpha - abs(theta))
     printed, corrected = (velocity**2 + factor * ground**2 + cross for factor in (4, 4 / 3))
     return {"energy_printed": abs(printed - exact).max(), "energy_corrected": abs(corrected - exact).max()}
+
+
+def _places(alpha: float, theta: float, ground: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places (9, 2) and shares of the mass (9,) of the Gauss points of a block, R = 1, on a ground at U_h = 4/3 `ground`.
+
+    It turns about its right corner by theta > 0, clockwise, and about its left one by theta < 0.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    side, size = math.copysign(1.0, theta), abs(theta)
+    u, v = (grid.ravel() for grid in np.meshgrid(nodes, nodes))
+    x, y = side * math.sin(alpha) * (u - 1), math.cos(alpha) * (v + 1)  # from the pivot, before the turn
+    across = x * math.cos(theta) + y * math.sin(theta) if side > 0 else x * math.cos(size) - y * math.sin(size)
+    up = y * math.cos(size) - side * x * math.sin(size)
+    pivot = side * math.sin(alpha) + 4 / 3 * ground
+    return np.stack([pivot + across, up], axis=1), np.outer(weights, weights).ravel() / 4
+
+
+def _lagrange(rng: np.random.Generator, n: int = 40) -> dict[str, float]:
+    """`EOM&Rock` and Pi from the points of the block, the most over random states; g = 4/3, so that p = 1."""
+    numbers = (rng.uniform(0.1, 1.4, n), rng.uniform(0.05, 1.0, n) * rng.choice([-1, 1], n), *rng.normal(size=(2, n)))
+    rows = [(_lagrange_residual(*map(float, row)), _height_error(*map(float, row[:2]))) for row in zip(*numbers, strict=True)]
+    equation, height = np.max(rows, axis=0)
+    return {"rocking_eom": float(equation), "rocking_potential": float(height)}
+
+
+def _height_error(alpha: float, theta: float) -> float:
+    points, shares = _places(alpha, theta, 0.0)
+    return abs(float(shares @ points[:, 1]) - math.cos(alpha) - (math.cos(alpha - abs(theta)) - math.cos(alpha)))
+
+
+def _lagrange_residual(alpha: float, theta: float, velocity: float, shake: float) -> float:
+    """The sum of mass x (acceleration + weight) x dplace/dtheta over the points, by differences along the motion."""
+    load = Load(frequency=1.0, ground_horizontal=Harmonic(amplitude=-shake, phase=np.pi / 2))  # zeta''(0) = shake
+    side, h = math.copysign(1.0, theta), 1e-3
+    acceleration = float(RockingBlock(alpha=alpha).acceleration(0.0, theta, velocity, side, load))
+
+    def at(s: float) -> np.ndarray:
+        return _places(alpha, theta + velocity * s + acceleration * s * s / 2, shake * s * s / 2)[0]
+
+    def turned(n: int) -> np.ndarray:
+        return _places(alpha, theta + n * h, 0.0)[0]
+
+    shares = _places(alpha, theta, 0.0)[1]
+    second = (16 * (at(h) + at(-h)) - at(2 * h) - at(-2 * h) - 30 * at(0.0)) / (12 * h * h)
+    lever = (8 * (turned(1) - turned(-1)) - turned(2) + turned(-2)) / (12 * h)
+    return abs(float(shares @ ((second + np.array([0.0, 4 / 3])) * lever).sum(axis=1)))
+
+
+def _housner(rng: np.random.Generator, n: int = 40) -> dict[str, float]:
+    """Housner's restitution against the angular momentum of the block's points about the corner that it comes to turn about."""
+    worst = 0.0
+    for alpha in rng.uniform(0.05, 0.9, n):
+        points, shares = _places(float(alpha), 1e-300, 0.0)  # upright
+        corner = np.array([math.sin(alpha), 0.0])
+        old, new = points - corner, points + corner
+        kept = float(shares @ (new * old).sum(axis=1)) / float(shares @ (new * new).sum(axis=1))
+        worst = max(worst, abs(kept - (1 - 1.5 * math.sin(alpha) ** 2)), abs(housner_restitution(alpha) - kept**2))
+    return {"housner": worst}
+
+
+def _overturning() -> dict[str, float]:
+    """How many of blocks of several slendernesses come back from 0.999 alpha, and from 1.001 alpha, at rest."""
+    counts = {"back_inside": 0, "back_outside": 0, "blocks": 0}
+    for alpha in (0.1, 0.4, 0.8):
+        counts["blocks"] += 1
+        for name, share in (("back_inside", 0.999), ("back_outside", 1.001)):
+            counts[name] += len(simulate(block(alpha), theta=share * alpha, velocity=0.0, duration=12.0).impacts) > 0
+    return {name: float(count) for name, count in counts.items()}
 
 
 def _equations(alpha: np.ndarray, theta: np.ndarray, velocity: np.ndarray, push: np.ndarray) -> dict[str, float]:
@@ -116,6 +188,10 @@ def measure(data: Any) -> dict[str, Measured]:
     growth = float(slender.values[1].max() / thin.max())  # from 5 to 20 degrees: 16 for an error of order alpha^2
     found = {
         "rocking-energy": measured(r["energy_printed"], r["energy_corrected"]),
+        "rocking-potential": measured(r["rocking_potential"]),
+        "rocking-eom": measured(r["rocking_eom"]),
+        "rocking-housner": measured(r["housner"]),
+        "rocking-overturning": measured(r["back_inside"] == r["blocks"] and r["back_outside"] == 0),
         "rocking-eom2": measured(r["rock2_printed"], r["rock2_corrected"]),
         "rocking-analogy": measured(r["analogy"]),
         "rocking-linear-term": measured(

@@ -19,6 +19,7 @@ from saltus.theory import (
     linear_motion,
     linear_period,
     potential_energy,
+    potential_slope,
     short_period,
     undeformed_stability,
     upright_period,
@@ -68,6 +69,7 @@ def _periods() -> dict[str, float]:
         "short_period": float(short_period(SMALL, beta0=BETA0, vertical=VERTICAL)) / exact - 1,
         "upright_period": float(upright_period(theta0, beta0=upright, vertical=VERTICAL)) / close - 1,
         "upright_measured": _measured_period(free(beta0=upright), theta0, close) / close - 1,
+        "light_period": float(linear_period(0.1, beta0=BETA0, vertical=-1e-9)) / (2 * math.pi) - 1,
         "unloaded_frequency": 2 * math.pi / math.sqrt(1 + VERTICAL * math.sin(BETA0)) / exact,
     }
 
@@ -116,20 +118,58 @@ def _potential() -> dict[str, float]:
         worst = max(worst, abs(slope + system.model.acceleration(0.0, theta, 0.0, math.copysign(1, theta), system.load)))
     signs = [(v, b) for v in (-0.5, 0.5) for b in (1.2, 2.0)]
     right = all((undeformed_stability(free(v, beta0=b)) is Stability.STABLE) == (v * math.cos(b) < 0) for v, b in signs)
-    return {"potential": worst, "stability_signs": float(right)}
+    return {"potential": worst, "stability_signs": float(right), **_slope_order(system)}
+
+
+def _slope_order(system: Any) -> dict[str, float]:
+    """The order in theta of the error of `pot_balanceder`, which is of the first order itself: the least over both sides."""
+    small, orders = np.array([1e-2, 1e-3]), []
+    for side, k in ((1, 0.7), (-1, 1.0)):
+        exact = np.array([potential_slope(system, side * x) for x in small])
+        short = (k - 1.3 * math.sin(BETA0)) * side * small - side * -1.3 * math.cos(BETA0)
+        errors = np.log(abs(short - exact))
+        orders.append(float((errors[0] - errors[1]) / math.log(10)))
+    return {"slope_order": min(orders)}
+
+
+def leaves(theta0: float, vertical: float, *, beta0: float, stiffness: float = 1.0) -> bool:
+    """Whether a motion from a small theta0 at rest leaves the undeformed state for good: no impact while it grows tenfold."""
+    motion = simulate(free(vertical, beta0=beta0, stiffness=stiffness), theta=theta0, velocity=0.0, duration=60.0, tol=TOLERANCE)
+    before = float(motion.impacts.time[0]) if len(motion.impacts) else motion.time
+    theta = abs(motion.at(np.linspace(0.0, before, 400))[0])
+    return bool(theta.max() > 10 * abs(theta0))
 
 
 def _divergence() -> dict[str, float]:
-    """Whether small motions just inside theta_A come back and just outside do not, beta0 close to pi/2, V = -1.2."""
-    system = free(-1.2, beta0=math.radians(89.5))
-    linear = linear_equilibria(system)[-1].theta
-    full = min(p.theta for p in equilibria(system) if p.theta > 0)
-    back, away = (simulate(system, theta=f * full, velocity=0.0, duration=30.0, tol=TOLERANCE) for f in (0.98, 1.02))
+    """In how many cases of each bullet after `minmin` a simulated motion does the opposite of what it says, and of how many.
+
+    The starts of the second bullet are 0.98 and 1.02 of theta_A and theta_B of the full equation, for beta0 = 89.99 degrees.
+    """
+    first = [(v, b, s * 1e-4, v * (90 - b) > 0) for v in (-0.5, 0.5, -1.5) for b in (70.0, 85.0, 95.0, 110.0) for s in (1, -1)]
+    far = [(v, b, theta, out) for v, b, theta, out in first if out or v > -1.0]  # below -1 what it says depends on theta0
+    wrong_first = sum(leaves(theta, v, beta0=math.radians(b)) is not out for v, b, theta, out in far)
+    near, wrong_second, cases = math.radians(89.99), 0, 0
+    for vertical, k in ((-1.5, 1.2), (-1.1, 1.2), (-1.1, 0.8), (-0.9, 0.8)):
+        deformed = [p.theta for p in equilibria(free(vertical, stiffness=k, beta0=near)) if not p.stable and p.theta]
+        for side, bound in ((1, k), (-1, 1.0)):
+            limits = [theta for theta in deformed if side * theta > 0]
+            starts = [0.98 * limits[0], 1.02 * limits[0]] if limits and vertical < -bound else [side * 1e-4, side * 1e-2]
+            expected = [False, vertical < -bound]
+            wrong_second += sum(
+                leaves(t, vertical, beta0=near, stiffness=k) is not out for t, out in zip(starts, expected, strict=True)
+            )
+            cases += 2
+    upright = [(v, k, side) for v in (-1.5, -1.1, -0.9, -0.5) for k in (0.8, 1.2) for side in (1, -1)]
+    wrong_third = sum(
+        leaves(side * 1e-4, v, beta0=math.pi / 2, stiffness=k) is not (v < (-k if side > 0 else -1.0)) for v, k, side in upright
+    )
     return {
-        "theta_a": full,
-        "theta_a_linear": linear,
-        "impacts_inside": len(back.impacts),
-        "impacts_outside": len(away.impacts),
+        "divergence_1": wrong_first,
+        "divergence_2": wrong_second,
+        "divergence_3": wrong_third,
+        "cases_1": len(far),
+        "cases_2": cases,
+        "cases_3": len(upright),
     }
 
 
@@ -146,14 +186,34 @@ def _frequencies() -> dict[str, float]:
 
 
 def _upright() -> dict[str, float]:
-    """theta_A and its energy under the full equation against the paper's forms, beta0 = 89.9 deg, V = -1.3, k = 1.1."""
+    """theta_A, theta_B and their energies under the full equation against the paper's forms, beta0 = 89.9 deg, k = 1.1."""
     vertical, k, beta0 = -1.3, 1.1, math.radians(89.9)
-    full = min((p for p in equilibria(free(vertical, stiffness=k, beta0=beta0)) if p.theta > 0), key=lambda p: p.theta)
-    kappa, push = k + vertical * math.sin(beta0), vertical * math.cos(beta0)
+    found: dict[str, float] = {}
+    deformed = [p for p in equilibria(free(vertical, stiffness=k, beta0=beta0)) if p.theta and not p.stable]
+    for name, side, stiffness in (("a", 1, k), ("b", -1, 1.0)):
+        full = min((p for p in deformed if side * p.theta > 0), key=lambda p: abs(p.theta))
+        kappa, push = stiffness + vertical * math.sin(beta0), vertical * math.cos(beta0)
+        forms = {
+            "form": full.theta / (side * push / kappa),
+            "upright": full.theta / (side * vertical / (stiffness + vertical) * (math.pi / 2 - beta0)),
+            "energy": full.energy / (-(push**2) / (2 * kappa)),
+        }
+        found |= {f"theta_{name}_{key}": ratio - 1 for key, ratio in forms.items()}
+    return found | _stability_of_deformed()
+
+
+def _stability_of_deformed() -> dict[str, float]:
+    """The stability of the linear deformed states where theta = 0 is stable and where not; those of k = 1 about V = -1."""
+    pressed = linear_equilibria(free(-1.3, beta0=math.radians(89.9), stiffness=1.1))
+    pulled = linear_equilibria(free(0.3, beta0=math.radians(89.9), stiffness=1.1))
+    around = [equilibria(free(v, beta0=math.radians(89.9))) for v in (-0.98, -1.02)]
+    close = [sum(not p.stable and 0 < abs(p.theta) < 0.2 for p in found) for found in around]
     return {
-        "theta_a_form": full.theta / (push / kappa) - 1,
-        "theta_a_upright": full.theta / (vertical / (k + vertical) * (math.pi / 2 - beta0)) - 1,
-        "energy_form": full.energy / (-(push**2) / (2 * kappa)) - 1,
+        "stable_when_pressed": sum(p.stable for p in pressed if p.theta),
+        "stable_when_pulled": sum(p.stable for p in pulled if p.theta),
+        "deformed": len(pressed) + len(pulled) - 2,
+        "unstable_above_minus_1": close[0],
+        "unstable_below_minus_1": close[1],
     }
 
 
@@ -172,7 +232,11 @@ def measure(data: Any) -> dict[str, Measured]:
         "potential": measured(r["potential"]),
         "undeformed-stability": measured(bool(r["stability_signs"])),
         "frequencies": measured(r["frequencies"]),
-        "non-trivial": measured(max(abs(r["theta_a_form"]), abs(r["theta_a_upright"]), abs(r["energy_form"]))),
+        "potential-slope": measured(r["slope_order"] > 1.9),
+        "non-trivial": measured(max(abs(r[f"theta_a_{form}"]) for form in ("form", "upright", "energy"))),
+        "non-trivial-b": measured(max(abs(r[f"theta_b_{form}"]) for form in ("form", "upright", "energy"))),
+        "non-trivial-unstable": measured(r["deformed"] == 4 and r["stable_when_pressed"] == 0 and r["stable_when_pulled"] == 2),
+        "symmetric-unstable": measured(r["unstable_above_minus_1"] == 0 and r["unstable_below_minus_1"] == 2),
         "minmin": measured(
             r["beyond_min"] == 2,
             r["beyond_min"] == 1 and r["beyond_max"] == 2 and r["before_both"] == 0 and r["lowest_energy"] > 0,
@@ -196,7 +260,8 @@ def measure(data: Any) -> dict[str, Measured]:
             r["second_interval"] > r["first_interval"] and r["third_interval"] < r["second_interval"],
         ),
         "final-time": measured(r["end"]),
-        "divergence": measured(r["impacts_inside"] > 0 == r["impacts_outside"]),
+        **{f"divergence-{n}": measured(r[f"divergence_{n}"] == 0) for n in (1, 2, 3)},
+        "period-differs": measured(abs(r["unloaded_frequency"] - 1) > 0.1 and abs(r["light_period"]) < 1e-4),
     }
     more = {"e": e, "e4": e**4, "e8": e**8, "first_by_erratum": (1 + 2 * e) / 4, "theta0": SMALL, "vertical": VERTICAL}
     return with_fields(r | more, found)

@@ -8,21 +8,22 @@ from typing import Any
 from saltus.paper.claims.claim import Measured
 from saltus.paper.figure_data import tree
 from saltus.paper.figures.figure import paper_figure
-from saltus.paper.sections import equations_of_motion, impacts, kinematics, small_vibrations
+from saltus.paper.sections import equations_of_motion, impacts, kinematics, large_amplitude, misalignment, small_vibrations
 
 SECTIONS: dict[str, ModuleType] = {
     "kinematics": kinematics,
+    "misalignment": misalignment,
     "dynamics": equations_of_motion,
     "impacts": impacts,
     "vibrations": small_vibrations,
+    "amplitudes": large_amplitude,
 }
 
 
 def compute() -> Any:
     """The evidence of every section."""
-    return tree(
-        {name: section.compute() for name, section in SECTIONS.items()}, what="evidence for the statements of sections 2 to 5"
-    )
+    groups = {name: section.compute() for name, section in SECTIONS.items()}
+    return tree(groups, what="evidence for the statements of sections 2 to 5")
 
 
 def measure(data: Any) -> dict[str, Measured]:
