@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.attractors.lyapunov.averages import Estimate
 from saltus.attractors.lyapunov.settings import LYAPUNOV
-from saltus.flow import last_states, motions_from
+from saltus.flow import Stop, last_states, motions_from, stop_names
 from saltus.systems import System
 
 
@@ -54,7 +54,7 @@ def largest_exponents(
     states, direction = np.array(states, dtype=float), np.tile(np.sqrt([0.5, 0.5]), (len(states), 1))
     frequency = np.broadcast_to(parameters.get("load.frequency", np.array(system.load.frequency, dtype=float)), len(states))
     growth = np.full((LYAPUNOV.stretches, len(states)), np.nan)
-    options = {"periods": periods, "sensitivities": (), "sample": (), "tol": tol}
+    options = {"periods": periods, "sensitivities": (), "sample": (), "until": ("rest",), "tol": tol}
     for stretch in range(LYAPUNOV.stretches):
         here = np.flatnonzero(np.isfinite(states).all(axis=1))
         if not here.size:
@@ -63,7 +63,9 @@ def largest_exponents(
         ends = motions_from(system, states[here], parameters=columns, **options)
         grown = np.einsum("nij,nj->ni", ends["derivative"].values, direction[here])
         length = np.linalg.norm(grown, axis=1)
-        going = (ends["side"].values != 0) & np.isfinite(length) & (length > 0.0)
+        # What is captured at rest would have to be followed through all of its impacts, of which there are millions.
+        moving = (ends["side"].values != 0) & (stop_names(ends) != Stop.CAPTURED)
+        going = moving & np.isfinite(length) & (length > 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             growth[stretch, here] = np.where(going, np.log(length), np.nan)
             direction[here] = grown / length[:, None]
