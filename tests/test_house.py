@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "bounds": {"systems", "taylor"},
     "flow": {"systems", "taylor", "bounds"},
     "continuation": set(),
-    "orbits": {"systems", "taylor", "flow", "continuation"},
+    "orbits": {"systems", "taylor", "bounds", "flow", "continuation"},
     "attractors": {"systems", "taylor", "bounds", "flow", "continuation", "orbits", "sweep"},
     "sweep": set(),
     "studies": {"systems", "theory", "flow", "continuation", "orbits", "attractors", "sweep"},

@@ -21,6 +21,7 @@ from .recurrence import (
     return_distances,
     return_period,
 )
+from .regularity import ContactRegularity, contact_regularity
 from .sensitivity import Sensitivities, sensitivities
 from .simulation import simulate
 from .stops import Stop
@@ -30,6 +31,7 @@ from .validity import Validity
 __all__ = [
     "RECURRENCE",
     "STRUCTURE_SIZES",
+    "ContactRegularity",
     "DenseOutput",
     "Event",
     "EventKind",
@@ -51,6 +53,7 @@ __all__ = [
     "available_cores",
     "compiled_lanes",
     "contact_pull",
+    "contact_regularity",
     "find_recurrence",
     "last_states",
     "limits_of",

@@ -11,7 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import chatter, contact, event_derivatives, function_types, kernel, kernel_layout, roots, segments, steps
+from saltus.flow import (
+    chatter,
+    contact,
+    contact_side,
+    event_derivatives,
+    function_types,
+    kernel,
+    kernel_layout,
+    roots,
+    segments,
+    steps,
+)
 from saltus.flow.memory_layout import State
 from saltus.taylor import (
     Case,
@@ -81,7 +92,7 @@ def kernel_module() -> ModuleType:
 @cache
 def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
     """What periodic orbits are solved with: `fly_segments` and `impact_equations` of `segments.py`."""
-    module = load_module("segments", _text(kernel_layout, roots, steps, contact, chatter, segments))
+    module = load_module("segments", _text(kernel_layout, roots, steps, contact, contact_side, chatter, segments))
     return entry_point(module.fly_segments), entry_point(module.impact_equations)
 
 

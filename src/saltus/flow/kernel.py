@@ -36,25 +36,12 @@ from saltus.flow.kernel_layout import (
     Work,
 )
 from saltus.flow.memory_layout import EventCode, State
-from saltus.flow.roots import NEVER, SIMPLE, first_root, horner, scale_gap
+from saltus.flow.roots import NEVER, SIMPLE, contact_root, first_root, horner, scale_gap
 from saltus.flow.steps import column_step, expand, leaps, move, record_event, record_shift, record_step, step_size, work_arrays
 from saltus.taylor import lean_jit
 from saltus.taylor import not_here as cached_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
-
-
-@lean_jit
-def contact_root(g, skip, order, h, poly):
-    """The first zero of the gap within the step, its known zero of order `skip` at the start left out."""
-    if skip == 0 and g[0] <= 0.0:  # rounding left the last step's end on the wrong side of the contact
-        if g[1] < 0.0:
-            return SIMPLE, 0.0, NEVER
-        skip = 1
-    while skip < order - 2 and g[skip] <= 0.0:  # leaving from rest: lower coefficients are zero up to rounding
-        skip += 1
-    scale_gap(g, skip, order, h, poly)
-    return first_root(poly, order - skip)
 
 
 @lean_jit

@@ -171,3 +171,16 @@ def scale_gap(g, skip, order, h, p):
     for k in range(order - skip + 1):
         p[k] = g[k + skip] * power
         power *= h
+
+
+@jit
+def contact_root(g, skip, order, h, poly):
+    """The first zero of the gap within the step, its known zero of order `skip` at the start left out."""
+    if skip == 0 and g[0] <= 0.0:  # rounding left the last step's end on the wrong side of the contact
+        if g[1] < 0.0:
+            return SIMPLE, 0.0, NEVER
+        skip = 1
+    while skip < order - 2 and g[skip] <= 0.0:  # leaving from rest: lower coefficients are zero up to rounding
+        skip += 1
+    scale_gap(g, skip, order, h, poly)
+    return first_root(poly, order - skip)

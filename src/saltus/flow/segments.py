@@ -1,7 +1,8 @@
 """Smooth segments with their derivatives: what the boundary-value problem of a periodic orbit is made of (see `orbits/`).
 
 A segment is the smooth motion on one side from one instant to another, whatever the sign of the gap, forwards or backwards in
-time, started by an impact or from a state. The compiled parts of the kernel's files (see `kernel.py`) up to `chatter.py` and of
+time, started by an impact or from a state; or, where passing the contact is no singularity (`ContactRegularity.CONTINUOUS`), the
+motion through all sides from a state. The compiled parts of the kernel's files (see `kernel.py`) up to `chatter.py` and of
 this file are compiled as one, once for every model. Phases are those of time 0, so records, which have none, are left out.
 """
 
@@ -12,10 +13,23 @@ import math
 import numpy as np
 
 from saltus.flow.contact import rate_of, set_state
+from saltus.flow.contact_side import side_of_state
 from saltus.flow.function_types import IMPACT_EQUATIONS, SEGMENTS
 from saltus.flow.kernel_layout import ROUGHER, Geometry, ModelPart, Setting, Where, Work
 from saltus.flow.memory_layout import EventCode, State
-from saltus.flow.roots import DEPTH, NARROW, NOISE, horner, newton, scale_gap, split, to_bernstein, variations
+from saltus.flow.roots import (
+    DEPTH,
+    NARROW,
+    NOISE,
+    SIMPLE,
+    contact_root,
+    horner,
+    newton,
+    scale_gap,
+    split,
+    to_bernstein,
+    variations,
+)
 from saltus.flow.steps import column_step, expand, leaps, move, step_size, work_arrays
 from saltus.taylor import jit, lean_jit
 from saltus.taylor import not_here as cached_jit
@@ -23,9 +37,12 @@ from saltus.taylor import not_here as cached_jit
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 SEGMENT_START, SEGMENT_END, APPROACH = 0, 1, 2  # in `spans`: times, and the gap's speed before the impact that starts it
-BEFORE, ALONG = 0, 1  # in `sides`: the side before that impact (0: from a state), and the side of the segment
+BEFORE, ALONG = 0, 1  # in `sides`: the side before that impact (0: from a state), and the side of the segment (0: all)
 QUOTIENT, RESET_DRIFT, KINDS = 0, 1, 2  # in `ends`: (x - contact) / duration, dv+/dt; x, v, a at the end and at the start
-HUMP, HUMP_TIME, TOP, BOTTOM, LEAST_MARGIN = 0, 1, 2, 3, 4  # in `looks`: lowest inner minimum of the gap, when, range of x
+HUMP, HUMP_TIME, TOP, BOTTOM = 0, 1, 2, 3  # in `looks`: lowest inner minimum of the gap, when, range of x
+CROSSINGS, SHALLOWEST, DEEPEST = 4, 5, 6  # how often the contact is passed, the least depth of a side's arc, the last arc's depth
+LEAST_MARGIN = 7  # the margins' least values, from here on
+SLOWEST = 1e-9  # A slower passage has the tangent of this one: near a grazing two cancel, and 1e-16 / speed is their rounding.
 MOST_STEPS = 100_000  # of one segment
 SHORT = 1e-6  # a segment's duration below which the derivatives of its quotient are those of its beginning
 
@@ -75,6 +92,7 @@ def look(where, model, work, side, t, h, order, roots, seen):
     seen[TOP], seen[BOTTOM] = max(seen[TOP], q[0, 0]), min(seen[BOTTOM], q[0, 0])
     scale_gap(v[0], 0, order, h, poly)
     rate = rate_of(model, side) if where[Where.SIDES] > 0 else 1.0
+    seen[DEEPEST] = max(seen[DEEPEST], rate * (q[0, 0] - model[ModelPart.GEOMETRY][Geometry.CONTACT]))
     size = 0.0
     for k in range(order + 1):
         size += abs(poly[k])
@@ -82,6 +100,7 @@ def look(where, model, work, side, t, h, order, roots, seen):
         x = horner(q[0], order, roots[i] * h)
         seen[TOP], seen[BOTTOM] = max(seen[TOP], x), min(seen[BOTTOM], x)
         gap = rate * (x - model[ModelPart.GEOMETRY][Geometry.CONTACT])
+        seen[DEEPEST] = max(seen[DEEPEST], gap)
         turn = 0.0
         for k in range(order, 0, -1):
             turn = turn * roots[i] + k * poly[k]
@@ -169,6 +188,54 @@ def follow(where, state, settings, env, model, work, begin, end, side, looking, 
 
 
 @lean_jit
+def pass_contact(where, state, env, model, t, side):
+    """Pass the contact with the velocity that there is, the tangent too; returns the next side, or this one at a touch."""
+    place, inward = State.COORDINATES + where[Where.DOF], -math.copysign(1.0, rate_of(model, side))
+    velocity = state[place]
+    if not inward * velocity > 0.0:
+        set_state(where, state, model[ModelPart.GEOMETRY][Geometry.CONTACT], velocity)
+        return side
+    state[place] = inward * max(inward * velocity, SLOWEST)
+    model[ModelPart.TANGENT](EventCode.IMPACT, 0, t, 0.0, side, env, 0, state)
+    set_state(where, state, model[ModelPart.GEOMETRY][Geometry.CONTACT], velocity)
+    return -side
+
+
+@lean_jit
+def follow_through(where, state, settings, env, model, work, begin, end, side, looking, roots, seen):
+    """Follow one segment through all sides of a continuous contact. Returns the side at its end, or 0 where it fails."""
+    order, t, skip, first = where[Where.ORDER], begin, 0, np.inf
+    for _ in range(MOST_STEPS):
+        size = expand(where, state, env, model, work, t, 0.0, side, order)
+        natural = segment_step(where, settings, env, model, work, t, end, side, size)
+        if not natural > 0.0:
+            return 0.0
+        h = min(natural, end - t)
+        kind, u, _ = contact_root(work[Work.GAP], skip, order, h, work[Work.POLYNOMIAL])
+        tau = u * h if kind == SIMPLE else h
+        if looking:
+            look(where, model, work, side, t, tau, order, roots, seen)
+        move(where, state, work[Work.POSITIONS], work[Work.VELOCITIES], tau)
+        last, t, skip = kind != SIMPLE and h == end - t, t + tau, 0
+        if kind == SIMPLE:
+            following = pass_contact(where, state, env, model, t, side)
+            if looking and following != side:
+                if seen[CROSSINGS] == 0.0:  # the arc before the first passage goes on with that after the last one
+                    first = seen[DEEPEST]
+                else:
+                    seen[SHALLOWEST] = min(seen[SHALLOWEST], seen[DEEPEST])
+                seen[CROSSINGS], seen[DEEPEST] = seen[CROSSINGS] + 1.0, -np.inf
+            side, skip = following, 1
+        if looking:
+            seen[TOP], seen[BOTTOM] = max(seen[TOP], state[State.COORDINATES]), min(seen[BOTTOM], state[State.COORDINATES])
+        if last:
+            if looking and seen[CROSSINGS] > 0.0:
+                seen[SHALLOWEST] = min(seen[SHALLOWEST], max(first, seen[DEEPEST]))
+            return side
+    return 0.0
+
+
+@lean_jit
 def copy_state(where, state, work, ends, columns, first):
     """Put coordinates, velocities and accelerations into `ends` from `first` on, and into `columns` the tangent's columns."""
     own, coordinates, velocities = where[Where.OWN], State.COORDINATES, State.COORDINATES + where[Where.DOF]
@@ -187,6 +254,7 @@ def fly_segments(where, settings, env, model, spans, sides, states, ends, column
     A segment's columns are d/d(speed before its impact), d/d(its start) and the parameters, or, started from a state (its
     coordinates and velocities in `states`), its derivatives to that state and to the parameters. They stand in `columns` at the
     end (first the coordinates, then the velocities) and then at the start. With `looks` empty nothing is recorded between.
+    From a state with the side 0 a segment goes through all sides.
     """
     dof, own = where[Where.DOF], where[Where.OWN]
     work, roots, nothing = work_arrays(where), np.zeros(where[Where.ORDER] + 2), np.zeros(1)
@@ -194,6 +262,10 @@ def fly_segments(where, settings, env, model, spans, sides, states, ends, column
     looking = looks.shape[0] > 0
     for s in range(spans.shape[0]):
         begin, end, side, drift = spans[s, SEGMENT_START], spans[s, SEGMENT_END], float(sides[s, ALONG]), 0.0
+        through = sides[s, BEFORE] == 0 and sides[s, ALONG] == 0
+        if through:
+            _, start = side_of_state(where[Where.SIDES], states[s, 0], states[s, own], model[ModelPart.GEOMETRY])
+            side = float(start)
         if sides[s, BEFORE] != 0:
             side, drift = start_by_impact(where, state, env, model, work, begin, float(sides[s, BEFORE]), spans[s, APPROACH])
         else:
@@ -201,9 +273,13 @@ def fly_segments(where, settings, env, model, spans, sides, states, ends, column
         copy_state(where, state, work, ends[s], columns[s, 2 * own :], KINDS + 3 * own)
         if looking:
             looks[s] = np.inf
-            looks[s, TOP] = -np.inf
+            looks[s, TOP], looks[s, DEEPEST], looks[s, CROSSINGS] = -np.inf, -np.inf, 0.0
         seen = looks[s] if looking else nothing
-        ends[s, QUOTIENT] = follow(where, state, settings, env, model, work, begin, end, side, looking, roots, seen)
+        if through:
+            side = follow_through(where, state, settings, env, model, work, begin, end, side, looking, roots, seen)
+            ends[s, QUOTIENT] = math.nan if side == 0.0 else 0.0
+        else:
+            ends[s, QUOTIENT] = follow(where, state, settings, env, model, work, begin, end, side, looking, roots, seen)
         ends[s, RESET_DRIFT] = drift
         expand(where, state, env, model, work, end, 0.0, side, 0)
         copy_state(where, state, work, ends[s], columns[s], KINDS)

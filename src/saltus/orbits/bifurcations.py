@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from saltus.bounds import area_contraction
 from saltus.continuation import TestFunction
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitPoint
@@ -41,18 +43,37 @@ def scaled_determinant(matrix: np.ndarray) -> float:
 
 @lru_cache(maxsize=4)
 def torus(point: OrbitPoint) -> float:
-    """The modulus of a complex pair of multipliers less 1; -1 where there is none.
-
-    For one degree of freedom that the impacts and the damping contract there is never one (errata 22).
-    """
+    """The modulus of a complex pair of multipliers less 1; -1 where there is none, and where there cannot be one (errata 22)."""
     values = point.orbit.multipliers
     pairs = values[np.abs(values.imag) > 1e-9]
     return float(np.abs(pairs).max(initial=0.0)) - 1.0
 
 
+def never_torus(orbit: PeriodicOrbit) -> bool:
+    """Whether areas of states never grow, so that no pair of multipliers leaves the unit circle (errata 22)."""
+    return area_contraction(orbit.system) is not None
+
+
 def grazing(point: OrbitPoint) -> float:
-    """The least of the impacts' speeds and of the gap's inner minima: below 0 there is no orbit."""
-    return min(point.orbit.slowest, point.orbit.clearance)
+    """The least of the impacts' speeds and of the gap's inner minima: below 0 there is no orbit.
+
+    Where the contact is no singularity there is one on both sides, and nothing to stop at.
+    """
+    return math.inf if point.orbit.problem.passes_contact else min(point.orbit.slowest, point.orbit.clearance)
+
+
+def touches(point: OrbitPoint) -> Test:
+    """The grazings of a contact that is no singularity, where the number of passages changes from that of a point."""
+    count = point.orbit.crossings
+
+    def depth(other: OrbitPoint) -> float:
+        least = min(NEAREST, other.orbit.clearance, other.orbit.shallowest)
+        return least if other.orbit.crossings == count else -least
+
+    return Test(SpecialKind.GR, depth)
+
+
+NEAREST = 1.0  # upper limit of the distance of an orbit from a grazing, which would be infinite for one that never turns
 
 
 FLIP = {symmetric: Test(SpecialKind.BPC if symmetric else SpecialKind.PD, flip) for symmetric in (True, False)}
@@ -63,6 +84,8 @@ GRAZING = Test(SpecialKind.GR, grazing, 1e-15)  # narrower than others: beside a
 def branch_tests(point: OrbitPoint, functions: dict[str, UserFunction]) -> Iterator[Test]:
     """The test functions of a branch at a point that are zero at a special point, but for grazings."""
     yield from (FOLD, FLIP[point.orbit.symmetric], CROSSING, TORUS)
+    if point.orbit.problem.passes_contact:
+        yield touches(point)
     yield from orbit_tests(point.orbit, functions)
 
 

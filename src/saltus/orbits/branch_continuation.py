@@ -10,11 +10,13 @@ from saltus.continuation import STEPS, Continuation, End, both_ways
 from saltus.errors import ParameterError
 from saltus.orbits.branch import START, Branch
 from saltus.orbits.branch_events import BranchEvents
+from saltus.orbits.find import orbit_near
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitPoint, start
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.resting_family import RestingEvents, first_point, resting_steps
+from saltus.orbits.signature import Signature
 from saltus.orbits.special_point import SpecialKind, UserFunction
 from saltus.orbits.symmetry import full_period, half, keeps_symmetry
 from saltus.progress import Progress, silent
@@ -108,11 +110,21 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
     system, signature = orbit.system, orbit.signature
     symmetric = keeps_symmetry(system, path)
     problem = Problem(system, signature, (path,))
-    found = PeriodicOrbit.near(problem, orbit.solution.unknowns, problem.values)
+    if Problem(system, Signature((), 1), (path,)).passes_contact != orbit.problem.passes_contact:
+        found = _in_other_equations(orbit, path)
+    else:
+        found = PeriodicOrbit.near(problem, orbit.solution.unknowns, problem.values)
     if found is None:
         raise ParameterError(f"the orbit does not solve its own equations to be continued along {path}; find it again")
-    if signature.symmetric and not symmetric:
+    if found.symmetric and not symmetric:
         found = full_period(found)
     elif symmetric:
         found = half(found) or found
     return found, symmetric
+
+
+def _in_other_equations(orbit: PeriodicOrbit, path: str) -> PeriodicOrbit | None:
+    """An orbit whose contact is a singularity for other values of the parameter, or no longer one, as a solution there."""
+    position, velocity = orbit.state
+    state = {orbit.system.model.coordinates[0]: position, "velocity": velocity}
+    return orbit_near(Problem(orbit.system, Signature((), 1), (path,)), state, orbit.period)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.continuation import Continuation, Cut, End, Events, Zero, located
-from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, grazing
+from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, grazing, never_torus, torus
 from saltus.orbits.grazing import other_side
 from saltus.orbits.images import asymmetry, falls_onto_image, halves_of, nearest, passes_image, repetition
 from saltus.orbits.orbit_curve import OrbitPoint
@@ -35,6 +35,8 @@ class BranchLimits:
     steepest: float = 1e8
     smallest: float = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
     same_fold: float = 1e-8  # A fold and a crossing of branches whose parameters differ by less than this are one point.
+    # A complex pair of multipliers beyond the unit circle by more than this, where areas never grow, is an error of the package.
+    impossible_pair: float = 1e-6
     # Distances to both sides along a parent's branch, tried in turn until its special point lies between the two ends.
     reaches: tuple[float, ...] = tuple(10.0 ** np.arange(-8, -0.9))
 
@@ -89,14 +91,18 @@ class BranchEvents(OrbitEvents):
         return branch_tests(point, self.functions)
 
     def distinct(self, found: list[Zero]) -> list[Zero]:
-        """Special points without the crossings of branches that are folds."""
+        """Special points without the crossings of branches that are folds, and without pairs of multipliers on the unit circle
+        by rounding, where areas never grow."""
         folds = [zero.parameter for zero in found if zero.kind == SpecialKind.LP]
 
         def is_fold(zero: Zero) -> bool:
             crossing = zero.kind == SpecialKind.BPC and not zero.point.orbit.symmetric
             return crossing and any(abs(zero.parameter - p) < SETTINGS.same_fold for p in folds)
 
-        return [zero for zero in found if not is_fold(zero)]
+        def impossible(zero: Zero) -> bool:
+            return zero.kind == SpecialKind.NS and never_torus(zero.point.orbit)
+
+        return [zero for zero in found if not is_fold(zero) and not impossible(zero)]
 
     def last(self, special: Zero) -> End | None:
         """The end at the first special point of the kind that is looked for."""
@@ -104,6 +110,11 @@ class BranchEvents(OrbitEvents):
 
     def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
         """The end of an orbit that has shrunk to rest, or has lost its stability."""
+        if torus(ahead) > SETTINGS.impossible_pair and never_torus(ahead.orbit):
+            run.missed.append(
+                f"NS near {ahead.parameter:.9g}: a complex pair of multipliers has the modulus {1.0 + torus(ahead):.9g}, "
+                "although areas of states never grow (errata 22), so the multipliers are wrong there"
+            )
         if self.while_stable and cut is None and not ahead.orbit.stable:
             return super().ended(run, ahead, cut) or End(OrbitEnd.UNSTABLE, ahead.parameter)
         return super().ended(run, ahead, cut)

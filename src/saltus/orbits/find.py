@@ -193,6 +193,8 @@ def orbit_near(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOr
 
 def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tuple[Problem, np.ndarray]:
     """The problem with a motion's signature, and its unknowns along the motion."""
+    if base.passes_contact:
+        return base.with_signature(Signature((), periods)), state
     impacts = motion.impacts
     # with two sides an odd impact is one near the section that was counted once too often, or not at all
     count = len(impacts) - (len(impacts) % 2 if len(base.system.model.sides) == 2 else 0)

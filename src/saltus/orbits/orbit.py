@@ -130,6 +130,16 @@ class PeriodicOrbit:
         return float(self._looks[:, at.HUMP].min())
 
     @property
+    def crossings(self) -> int:
+        """How often it passes a contact that is no singularity, in one of its periods; 0 where it has impacts."""
+        return int(self._looks[:, at.CROSSINGS].sum()) * (2 if self.symmetric else 1)
+
+    @property
+    def shallowest(self) -> float:
+        """The least depth to which it goes beyond a contact that is no singularity, on either side; inf without passages."""
+        return float(self._looks[:, at.SHALLOWEST].min())
+
+    @property
     def slowest(self) -> float:
         """The least speed of an impact; inf where there is none; below 0: no orbit."""
         return float(self.speeds.min(initial=math.inf))
@@ -159,8 +169,11 @@ class PeriodicOrbit:
 
     @property
     def grazes(self) -> bool:
-        """Whether it touches the contact without speed: motions beside it then have no derivative, and multipliers no meaning."""
-        return min(abs(self.clearance), abs(self.slowest)) < TOLERANCES.touch
+        """Whether it touches the contact without speed: motions beside it then have no derivative, and multipliers no meaning.
+
+        Where the contact is no singularity (`ContactRegularity.CONTINUOUS`) it never does in this sense.
+        """
+        return not self.problem.passes_contact and min(abs(self.clearance), abs(self.slowest)) < TOLERANCES.touch
 
     @property
     def stable(self) -> bool:

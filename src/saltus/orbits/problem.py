@@ -7,7 +7,9 @@ gap w between them; the last one ends with the first impact, a period later. For
     w(t_{i+1}) / (t_{i+1} - t_i) = 0,        -w'(t_{i+1}) - v_{i+1} = 0,
 
 regular at v_i = 0 as well, where the signature changes. An orbit without impacts has the state at phase 0 as its unknowns and
-the state a period later as its equation. A symmetric orbit is closed after half a period by its mirror image.
+the state a period later as its equation. So has every orbit of a system whose contact is no singularity (`flow/regularity.py`):
+it is followed through all sides, and a grazing is an orbit like any other. A symmetric orbit is closed after half a period by
+its mirror image.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.flow import STRUCTURE_SIZES, Where, load_segments, program, taylor_order
+from saltus.flow import STRUCTURE_SIZES, ContactRegularity, Where, contact_regularity, load_segments, program, taylor_order
 from saltus.flow import segments as at
 from saltus.orbits.signature import Signature
 from saltus.systems import System, numbers
@@ -111,6 +113,13 @@ class Problem:
         self._where[STRUCTURE_SIZES] = self._run.structure.sizes
         self._settings, self._records = np.array([0.0, 0.0, tol]), record_table(system, [])
 
+    @cached_property
+    def passes_contact(self) -> bool:
+        """Whether orbits are followed through a contact that is no singularity, whatever the parameters at `paths`."""
+        if self.signature.sides or not self.system.model.sides:
+            return False
+        return contact_regularity(self._run.trace, tuple(self._values), self.paths) is ContactRegularity.CONTINUOUS
+
     @property
     def values(self) -> np.ndarray:
         """The parameters of the system itself."""
@@ -174,7 +183,7 @@ class Problem:
     def carried(self, state: np.ndarray, begin: float, end: float, values: np.ndarray) -> np.ndarray | None:
         """The state at phase `end` of the smooth motion without impacts from a state at phase `begin`."""
         frequency = self.frequency(values)
-        spans, sides = np.array([[begin / frequency, end / frequency, 0.0]]), np.array([[0, self.signature.side]])
+        spans, sides = np.array([[begin / frequency, end / frequency, 0.0]]), np.array([[0, *self._along()]])
         flown = self.fly(Segments(spans, sides, state.reshape(1, -1)), values)
         return None if flown is None else flown.ends[0, at.KINDS : at.KINDS + 2 * self.own]
 
@@ -191,7 +200,7 @@ class Problem:
 
     def _segments(self, unknowns: np.ndarray, frequency: float) -> Segments:
         """The segments between the impacts."""
-        sides, along = self.signature.sides, self.signature.along()
+        sides, along = self.signature.sides, self._along()
         if not sides:
             spans = np.array([[0.0, self.closing / frequency, 0.0]])
             return Segments(spans, np.array([[0, along[0]]]), unknowns.reshape(1, -1).copy())
@@ -199,6 +208,10 @@ class Problem:
         ends = np.append(phases[1:], phases[0] + self.closing)
         spans = np.stack([phases / frequency, ends / frequency, speeds], axis=1)
         return Segments(spans, np.stack([sides, along], axis=1).astype(np.int64), np.zeros((len(sides), 2)))
+
+    def _along(self) -> tuple[int, ...]:
+        """The side of each segment, 0 for all sides."""
+        return (0,) if self.passes_contact else self.signature.along()
 
     def _shooting(self, unknowns: np.ndarray, frequency: float, flown: Flown) -> Equations:
         own, sign = self.own, -1.0 if self.signature.symmetric else 1.0

@@ -95,6 +95,11 @@ def continue_special(
         raise ParameterError(
             "curves are followed of orbits between impacts only, and this one rests; continue it along one parameter"
         )
+    if special.kind == SpecialKind.GR and special.orbit.problem.passes_contact:
+        raise ParameterError(
+            "this GR is no singularity, as neither the velocity nor the acceleration changes at the contact: nothing begins or "
+            "ends there, and no curve of such points is followed; choose an LP, PD or BPC"
+        )
     first_path, system = special.orbit.problem.paths[0], special.orbit.system
     if path == first_path:
         raise ParameterError(f"the branch already runs along {path}; name another parameter to follow its {special.kind} in")
@@ -155,6 +160,11 @@ def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrb
         orbit = _evaluated(Problem(system, signature, paths), unknowns, values)
         return orbit, Slow(orbit.problem, _first_without_speed(orbit.problem, unknowns))
     problem = Problem(system, old.signature, paths)
+    if old.passes_contact and not problem.passes_contact:
+        raise ParameterError(
+            f"{paths[1]} makes the contact a singularity, which it is not at {system.parameters[paths[1]]:g}; change it "
+            f"a little, follow the branch again, and continue the {kind} from there"
+        )
     if kind == SpecialKind.LP and old.signature.symmetric and not symmetric:
         problem, unknowns = over_full_period(problem, unknowns)
     orbit = _evaluated(problem, unknowns, values)

@@ -51,7 +51,7 @@ def half(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
         first, second = unknowns.reshape(2, n, 2)
         if n % 2 == 0 or np.abs(second - first - [np.pi * signature.period, 0.0]).max() > TOLERANCES.halves:
             return None
-    elif problem.system.model.sides:
+    elif problem.system.model.sides and not problem.passes_contact:
         return None
     short = problem.with_signature(Signature(signature.sides[:n], signature.period, True, signature.side))
     found = PeriodicOrbit.near(short, unknowns[: short.size], orbit.solution.values)

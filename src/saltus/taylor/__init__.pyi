@@ -1,6 +1,7 @@
 from .cache import cache_directory, compiled_part, digest, is_compiled, load_module, module_name
 from .derivatives import FREQUENCY, derivative_along, partial_derivative, tangent_leaves, time_derivative
 from .equations import equations_of
+from .exact_algebra import Form, NoNormalForm, constant, constant_value, normal_form
 from .generated import Case, function_text, generated_header
 from .graph import RECORD_WIDTH, Expr, differentiate, is_steep, number, ordered, substitute
 from .lane_vectors import (
@@ -45,6 +46,8 @@ __all__ = [
     "WIDTH",
     "Case",
     "Expr",
+    "Form",
+    "NoNormalForm",
     "Places",
     "Rows",
     "Trace",
@@ -53,6 +56,8 @@ __all__ = [
     "bits",
     "cache_directory",
     "compiled_part",
+    "constant",
+    "constant_value",
     "derivative_along",
     "differentiate",
     "digest",
@@ -76,6 +81,7 @@ __all__ = [
     "maximum",
     "minimum",
     "module_name",
+    "normal_form",
     "not_here",
     "number",
     "ordered",

@@ -11,6 +11,7 @@ from saltus.errors import ParameterError, SaltusError, TraceError, near
 from saltus.systems import Record, System
 from saltus.systems import substitute as substitute_numbers
 from saltus.taylor import derivatives as tangent
+from saltus.taylor.exact_algebra import constant_value, normal_form, provably_equal
 from saltus.taylor.graph import (
     FRICTION,
     POINTWISE,
@@ -23,7 +24,6 @@ from saltus.taylor.graph import (
     substitute,
     uses_velocity,
 )
-from saltus.taylor.normal_form import constant_value, normal_form, provably_equal
 
 
 class LoadTime:
@@ -72,7 +72,7 @@ class DeclaredLoad:
         return getattr(self._load, name)
 
 
-@dataclass
+@dataclass(eq=False)
 class Trace:
     """The expressions of a system's motion; leaves are the time, the coordinates, the velocities, the side and the parameters.
 

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from saltus.attractors.stroboscopic_section import check_periodic
-from saltus.bounds import Interval, Leaves, enclose, reads
+from saltus.bounds import area_contraction, enclose, leaves_over_a_period, on_side
 from saltus.systems import System, check_system
-from saltus.taylor import Expr, Trace, differentiate, substitute, trace
-
-PERIOD_CELLS = 4096  # number of intervals into which the forcing period is divided
-EVERYWHERE = Interval(-1e300, 1e300)
-VELOCITY = Expr("velocity", (), 0)
+from saltus.taylor import trace
 
 
 def excludes_tori(system: System) -> str | None:
@@ -39,12 +34,11 @@ def excludes_tori(system: System) -> str | None:
     check_periodic(system)
     if len(system.model.coordinates) > 1:
         return None
-    traced = trace(system)
-    leaves = Leaves([Interval(value) for value in system.parameters.values()], [], time=_cells(system))
-    rate = _slowest_contraction(traced, leaves)
-    continuous = None if rate is None or not _loses(traced, leaves) else _continuous(system, traced, leaves)
+    rate = area_contraction(system)
+    continuous = None if rate is None or rate == 0.0 else _continuous(system)
     if continuous is None:
         return None
+    assert rate is not None
     if system.load.period is None:
         return f"under constant loads a motion of one coordinate has no room for a torus, and {continuous} and areas shrink"
     left = math.exp(-rate * system.load.period)
@@ -54,53 +48,15 @@ def excludes_tori(system: System) -> str | None:
     )
 
 
-def _cells(system: System) -> Interval:
-    period = system.load.period
-    if period is None:
-        return EVERYWHERE
-    edges = np.linspace(0.0, period, PERIOD_CELLS + 1)
-    return Interval(edges[:-1] * (1 - 1e-12), edges[1:] * (1 + 1e-12))
-
-
-def _on(side: int, root: Expr) -> Expr:
-    return substitute(root, {Expr("side"): float(side)})
-
-
-def _sides(traced: Trace) -> tuple[int, ...]:
-    return (1, -1)[: traced.sides] or (1,)
-
-
-def _slowest_contraction(traced: Trace, leaves: Leaves) -> Any:
-    """The least -da/dv over all sides, times and states; None if it may be 0 or below."""
-    slopes = [_on(s, differentiate(traced.acceleration[0], VELOCITY)) for s in _sides(traced)]
-    anywhere = Leaves(leaves.parameters, [], leaves.time, EVERYWHERE, EVERYWHERE)
-    least = min(float(np.min(-bounds.hi)) for bounds in enclose(slopes, anywhere))
-    return least if least > 0.0 else None
-
-
-def _loses(traced: Trace, leaves: Leaves) -> bool:
-    """Whether no impact can raise the speed: the law is linear in it, with factors of at most 1."""
-    if traced.velocity_after is None:
-        return True
-    for side in _sides(traced):
-        after = _on(side, traced.velocity_after)
-        slope = differentiate(after, VELOCITY)
-        if reads(slope, "velocity", "time", "record"):
-            return False
-        at_rest, factor = enclose([substitute(after, {VELOCITY: 0.0}), slope], leaves)
-        if not (np.max(at_rest.magnitude()) == 0.0 and np.max(factor.magnitude()) <= 1.0 + 1e-14):
-            return False
-    return True
-
-
-def _continuous(system: System, traced: Trace, leaves: Leaves) -> str | None:
+def _continuous(system: System) -> str | None:
     """Why motions that begin close together stay so for a while; None where the contact may push away on both sides."""
+    traced = trace(system)
     if traced.sides == 0:
         return "the motion has no contact"
     if traced.sides == 1:
         return "a bounce from one wall joins its states before and after without a gap"
     assert traced.contact_acceleration is not None
-    pushes = enclose([_on(s, traced.contact_acceleration) for s in _sides(traced)], leaves)
+    pushes = enclose([on_side(s, traced.contact_acceleration) for s in (1, -1)], leaves_over_a_period(system))
     if not np.all(np.minimum(*(push.hi for push in pushes)) < 0.0):
         return None
     if np.all(np.maximum(*(push.hi for push in pushes)) < 0.0):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from saltus.taylor.exact_algebra import constant, constant_value, normal_form, provably_equal
 from saltus.taylor.graph import Expr, combine, number, substitute
-from saltus.taylor.normal_form import constant, constant_value, normal_form, provably_equal
 
 X, V, P, Q = Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("parameter", (), 0), Expr("parameter", (), 1)
 
