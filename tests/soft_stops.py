@@ -47,7 +47,8 @@ def soft_stop(model=SoftStop, *, amplitude=0.5, frequency=0.8, mean=0.0, e=1.0, 
 def variational_map(system, state, longest=np.inf):
     """The state after a forcing period and its derivative to the state, by DOP853 with a restart at every passage (e = 1).
 
-    A passage and its end within one step, of at most `longest`, are not seen. The derivative is that of the variational equation; at a passage of the edge, with its damper, it is kinked by the damper alone.
+    A passage and its end within one step, of at most `longest`, are not seen. The derivative is that of the variational equation,
+    which has a kink at a passage by the damper alone.
     """
     model, load = system.model, system.load
     end, t = load.period, 0.0

@@ -66,7 +66,7 @@ def test_marks_are_the_same_at_other_steps(name):
 
 @every_case
 def test_the_branch_has_the_special_points_that_a_shooting_method_of_another_integrator_shows_and_no_others(name):
-    """det(M - 1) and det(M + 1) of DOP853 vanish at LP and PD, and change their sign along the branch as often as there are such."""
+    """det(M - 1) and det(M + 1) of DOP853 vanish at LP and PD, and change sign along the branch as often as there are such."""
     branch = branch_of(name)
     points = [p for p in branch.points if not any(np.array_equal(p.place, s.point.place) for s in branch.special)]
     matrices = [variational_map(p.orbit.system, np.array(p.orbit.state))[1] for p in points]
