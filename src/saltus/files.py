@@ -1,54 +1,188 @@
-"""Files that are complete or not there: every output is written beside its place and moved there once complete."""
+"""Files that are complete or not there, and that notice when they are damaged.
+
+Every output is made in memory, written beside its place, brought to the disk and moved there. A netCDF file ends with a checksum
+of all its bytes, behind what HDF5 reads, so that it is checked before HDF5 opens it.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import io
 import os
 import secrets
+import sys
 import tempfile
-from collections.abc import Callable
+import time
+import traceback
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from saltus.errors import ParameterError
 
+PART = ".part"
+STALE = 60.0  # s; where there are no locks, what has not been touched for so long was left by a killed run
+HEAD, TAIL = b"\nsha256 of the bytes before: ", b" (saltus)\n"  # of the checksum: wiping out 64 bytes leaves one of them
 
-def write_atomically(path: Path | str, writer: Callable[[Path], object]) -> Path:
-    """Let `writer` fill a temporary file in the folder of `path`, then move it to `path` in one step.
 
-    Folders are made as needed; the temporary name ends as `path` does. If the writer fails or is interrupted, `path` is what
-    it was before and the temporary file is gone. Returns `path`.
+# --- writing ---------------------------------------------------------------------------------------------------------------
+
+
+def write_durably(path: Path, content: bytes) -> None:
+    """Write a file so that whoever finds it finds all of it, after a kill or a power failure too.
+
+    It is written beside its place, brought to the disk, and moved there; its folder is made as needed. If that fails or is
+    interrupted, `path` is what it was before and nothing is left.
+
+    Raises:
+        OSError: with the name of the file.
     """
-    path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.stem}.{secrets.token_hex(6)}.part{path.suffix}")
+    part = path.with_name(f".{path.name}.{secrets.token_hex(6)}{PART}")
     try:
-        writer(part)
-        os.replace(part, path)
-    except BaseException:  # KeyboardInterrupt too
-        with contextlib.suppress(FileNotFoundError):
+        with part.open("xb") as file:
+            lock(file)  # by which `sweep_up` knows that somebody still writes it
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+            os.replace(part, path)
+    except BaseException as error:  # KeyboardInterrupt too
+        with contextlib.suppress(OSError):
             part.unlink()
+        if isinstance(error, OSError):
+            raise OSError(error.errno, error.strerror or str(error), str(path)) from error
         raise
+
+
+def write_bytes(path: Path | str, content: bytes) -> Path:
+    """Write `content` to `path` durably, and remove what killed runs left half-written in its folder. Returns `path`."""
+    path = Path(path)
+    write_durably(path, content)
+    sweep_up(path.parent.glob(f".*{PART}"))
     return path
 
 
 def write_text(path: Path | str, text: str) -> Path:
-    """Write `text` to `path` atomically, as UTF-8."""
-    return write_atomically(path, lambda part: part.write_text(text, encoding="utf-8"))
+    """Write `text` to `path` as `write_bytes` does, as UTF-8."""
+    return write_bytes(path, text.encode())
 
 
 def write_dataset(path: Path | str, dataset: Any) -> Path:
-    """Write an xarray Dataset or DataTree to `path` atomically, as netCDF."""
-    return write_atomically(path, lambda part: dataset.to_netcdf(part, engine="h5netcdf"))
+    """Write an xarray Dataset or DataTree to `path` as `write_bytes` does, as netCDF with a checksum at its end."""
+    buffer = io.BytesIO()
+    dataset.to_netcdf(buffer, engine="h5netcdf")
+    content = buffer.getvalue()
+    return write_bytes(path, content + HEAD + _digest(content) + TAIL)
 
 
-def write_figure(stem: Path | str, figure: Any, formats: tuple[str, ...] = ("png", "pdf"), **options: Any) -> list[Path]:
-    """Write a matplotlib Figure atomically in each of `formats`, as `stem`.png and so on; `options` go to savefig."""
+def write_figure(stem: Path | str, figure: Any, title: str | None = None) -> list[Path]:
+    """Write a matplotlib Figure as `stem`.png and `stem`.pdf, the same bytes for the same figure; `title` is that of the PDF."""
+    kinds: dict[str, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": None, "Title": title}}
+    return [_write_picture(Path(f"{stem}.{kind}"), figure, kind, about) for kind, about in kinds.items()]
 
-    def save(part: Path) -> None:
-        figure.savefig(part, format=part.suffix[1:], **options)
 
-    return [write_atomically(f"{stem}.{kind}", save) for kind in formats]
+def _write_picture(path: Path, figure: Any, kind: str, metadata: dict[str, Any]) -> Path:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=kind, metadata=metadata)
+    return write_bytes(path, buffer.getvalue())
+
+
+def sweep_up(parts: Iterable[Path]) -> None:
+    """Remove those of the files that no process is writing: killed runs left them."""
+    for part in parts:
+        with contextlib.suppress(OSError), part.open("rb") as file:
+            mine = lock(file)
+            if mine or (mine is None and time.time() - part.stat().st_mtime > STALE):
+                part.unlink()
+
+
+def lock(file: IO[bytes], shared: bool = False) -> bool | None:
+    """Try to lock an open file until it is closed or its process ends: whether it could, None where there are no locks."""
+    try:
+        import fcntl
+    except ImportError:
+        return None
+    try:
+        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return None
+    return True
+
+
+# --- reading ---------------------------------------------------------------------------------------------------------------
+
+
+def read_dataset(path: Path | str) -> Any:
+    """The Dataset or DataTree in a netCDF file, in memory; its checksum is compared before HDF5 sees it.
+
+    A file without a checksum, which another program wrote, is read as it is.
+
+    Raises:
+        ParameterError: there is no such file, it is damaged, or it is no netCDF file.
+    """
+    import xarray
+
+    path = Path(path)
+    content = checked_content(path)
+    try:
+        with xarray.open_datatree(io.BytesIO(content), engine="h5netcdf") as tree:
+            tree.load()
+    except Exception as error:  # h5netcdf, HDF5 and xarray have many ways to say so
+        with _without_unraisable():
+            traceback.clear_frames(error.__traceback__)
+        said = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise ParameterError(f"{path} is no netCDF file that can be read ({said:.80})") from error
+    return tree if tree.children else tree.to_dataset()
+
+
+@contextlib.contextmanager
+def _without_unraisable() -> Iterator[None]:
+    """Let objects go in silence: a file that h5netcdf could open only half prints a traceback when it is closed."""
+    hook = sys.unraisablehook
+    sys.unraisablehook = lambda lost: None
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
+
+
+def checked_content(path: Path) -> bytes:
+    """The bytes of a netCDF file, without its checksum.
+
+    Raises:
+        ParameterError: it cannot be read, or its checksum is not that of its bytes.
+    """
+    try:
+        if path.exists() and not path.is_file():  # a device or a pipe may have no end
+            raise ParameterError(f"{path} is no file that can be read")
+        content = path.read_bytes()
+    except OSError as error:
+        raise ParameterError(f"{path} cannot be read ({(error.strerror or str(error)).lower()})") from error
+    if not has_checksum(content):
+        return content
+    head, middle, tail = content[:-_END], content[-_END : -len(TAIL)], content[-len(TAIL) :]
+    if middle != HEAD + _digest(head) or tail != TAIL:
+        raise ParameterError(f"{path} is damaged: its checksum is not that of its bytes; compute it again, or take a copy of it")
+    return head
+
+
+def has_checksum(content: bytes) -> bool:
+    """Whether bytes end with a checksum, or with what is left of one."""
+    end = content[-2 * _END :]
+    return HEAD in end or TAIL in end
+
+
+_END = len(HEAD) + 64 + len(TAIL)
+
+
+def _digest(content: bytes) -> bytes:
+    return hashlib.sha256(content).hexdigest().encode()
+
+
+# --- folders ---------------------------------------------------------------------------------------------------------------
 
 
 def check_writable(folder: Path | str) -> None:

@@ -40,15 +40,15 @@ def identity(system: System) -> dict[str, Any]:
     return {"result_version": RESULT_VERSION, "equations": json.dumps(equations_of(system))}
 
 
-def check_provenance(attributes: Mapping[str, Any], system: System, what: str) -> None:
+def check_provenance(attributes: Mapping[str, Any], system: System, what: str, remedy: str = "compute it again") -> None:
     """Refuse a result, `what`, whose attributes are not those of this system and of this version of saltus.
 
     Raises:
-        ParameterError: with what differs: the version, or the part of the equations.
+        ParameterError: with what differs: the version, or the part of the equations; and with the `remedy`.
     """
     differ = "; ".join(_differences(attributes, system))
     if differ:
-        raise ParameterError(f"{what} is not of what is computed now: {differ}; compute it again")
+        raise ParameterError(f"{what} is not of what is computed now: {differ}; {remedy}")
 
 
 def _differences(attributes: Mapping[str, Any], system: System) -> Iterator[str]:

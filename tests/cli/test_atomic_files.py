@@ -1,14 +1,24 @@
-"""Files are whole or not there."""
+"""Files are whole or not there, on a full disk too, and notice when a bit of them is flipped."""
 
+import errno
 import os
-import signal
+import random
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+import xarray
 
+from saltus import files
 from saltus.errors import ParameterError
-from saltus.files import check_writable, write_atomically, write_text
+from saltus.files import check_writable, has_checksum, read_dataset, write_bytes, write_dataset, write_figure, write_text
+
+
+def small():
+    """A dataset with numbers, words and attributes."""
+    variables = {"wave": ("x", np.sin(np.arange(5.0))), "name": ("x", list("abcde")), "side": ("x", np.arange(5, dtype="i1"))}
+    return xarray.Dataset(variables, {"x": np.arange(5.0)}, {"kind": "waves", "tol": 1e-12, "window": [0.0, 1.0]})
 
 
 def test_the_file_and_its_folders_are_made(tmp_path):
@@ -17,40 +27,135 @@ def test_the_file_and_its_folders_are_made(tmp_path):
     assert os.listdir(path.parent) == ["b.txt"]
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError, SystemExit])
-def test_a_failed_writer_leaves_what_was_there(tmp_path, error):
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))])
+def test_a_failed_write_leaves_what_was_there(tmp_path, monkeypatch, error):
     path = tmp_path / "b.txt"
     path.write_text("old")
 
-    def writer(part):
-        part.write_text("half")
+    def fail(_):
         raise error
 
-    with pytest.raises(error):
-        write_atomically(path, writer)
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(type(error) if isinstance(error, OSError) else error):
+        write_text(path, "new")
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["b.txt"]
 
 
-def test_the_temporary_file_keeps_the_suffix_and_the_folder(tmp_path):
-    seen = []
-    write_atomically(tmp_path / "b.png", lambda part: (seen.append(part), part.touch()))
-    assert seen[0].suffix == ".png"
-    assert seen[0].parent == tmp_path
-
-
 def test_an_interrupt_in_the_middle_of_writing_leaves_no_half_file(tmp_path, started):
     script = (
-        "import signal, sys; from saltus.files import write_atomically\n"
-        "def writer(part):\n    part.write_text('half'); print('half', flush=True); signal.pause()\n"
-        f"write_atomically({str(tmp_path / 'out.txt')!r}, writer)"
+        "import os, signal, sys; from saltus import files\n"
+        "os.fsync = lambda _: (print('half', flush=True), signal.pause())\n"
+        f"files.write_text({str(tmp_path / 'out.txt')!r}, 'text')"
     )
     process = started([sys.executable, "-c", script], stdout=subprocess.PIPE)
     assert process.stdout.readline() == "half\n"
     assert len(os.listdir(tmp_path)) == 1
-    process.send_signal(signal.SIGINT)
+    process.send_signal(2)
     process.communicate(timeout=60)
     assert os.listdir(tmp_path) == []
+
+
+def test_what_a_killed_process_left_is_removed_and_what_another_writes_is_not(tmp_path):
+    (tmp_path / ".motion.pdf.0a1b2c3d4e5f.part").write_text("half")
+    other = tmp_path / ".chart.nc.0a1b2c3d4e5f.part"
+    with other.open("wb") as file:
+        assert files.lock(file)
+        write_text(tmp_path / "a.txt", "a")
+        assert sorted(os.listdir(tmp_path)) == [other.name, "a.txt"]
+    write_text(tmp_path / "a.txt", "a")
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_a_disk_that_is_full_at_any_byte_is_told(tmp_path):
+    """The system lets a file grow to so many bytes only; the process lives, and nothing half is there."""
+    script = (
+        "import resource, sys; sys.path[:0] = [{tests!r}]\n"
+        "from test_atomic_files import small\n"
+        "from saltus.cli.guard import guarded\n"
+        "from saltus.files import write_dataset\n"
+        "data = small()\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"
+        "with guarded():\n"
+        "    write_dataset({path!r}, data)\n"
+    )
+    size = len(write_dataset(tmp_path / "whole.nc", small()).read_bytes())
+    (tmp_path / "whole.nc").unlink()
+    for limit in (0, 1, size // 2, size - 1):
+        text = script.format(tests=os.path.dirname(__file__), limit=limit, path=str(tmp_path / "a.nc"))
+        done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False)
+        assert f"saltus: {tmp_path / 'a.nc'} cannot be read or written (file too large)" in done.stderr
+        assert done.returncode > 0  # not ended by a signal
+        assert os.listdir(tmp_path) == []
+
+
+# --- checksums -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_dataset_comes_back_and_other_programs_read_it(tmp_path):
+    path = write_dataset(tmp_path / "a.nc", small())
+    assert has_checksum(path.read_bytes())
+    assert read_dataset(path).identical(small())
+    with xarray.open_dataset(path) as data:
+        assert data.load().identical(small())
+    assert path.read_bytes() == write_dataset(tmp_path / "b.nc", small()).read_bytes()
+    small().to_netcdf(tmp_path / "foreign.nc", engine="h5netcdf")
+    assert read_dataset(tmp_path / "foreign.nc").identical(small())
+
+
+def flips(content: bytes, count: int):
+    """So many copies, each with one bit flipped; the last bits, of the checksum, among them."""
+    rng = random.Random(0)
+    places = [rng.randrange(8 * len(content)) for _ in range(count)] + list(range(8 * len(content) - 8, 8 * len(content)))
+    for place in places:
+        flipped = bytearray(content)
+        flipped[place // 8] ^= 1 << place % 8
+        yield bytes(flipped)
+
+
+@pytest.mark.parametrize("count", [300, pytest.param(5000, marks=pytest.mark.thorough)])
+def test_a_flipped_bit_is_noticed(tmp_path, count):
+    path = write_dataset(tmp_path / "a.nc", small())
+    for content in flips(path.read_bytes(), count):
+        path.write_bytes(content)
+        with pytest.raises(ParameterError, match=r"a\.nc is damaged: its checksum is not that of its bytes; compute it again"):
+            read_dataset(path)
+
+
+@pytest.mark.parametrize("begin", [8, b"HDF", b"wave", b"kind", -200, -100, -64, -40])
+def test_zeroed_bytes_are_noticed_before_hdf5_opens_the_file(tmp_path, begin, monkeypatch):
+    path = write_dataset(tmp_path / "a.nc", small())
+    content = bytearray(path.read_bytes())
+    begin = content.index(begin) if isinstance(begin, bytes) else begin % len(content)
+    length = min(64, len(content) - begin)
+    content[begin : begin + length] = bytes(length)
+    path.write_bytes(content)
+    monkeypatch.setattr(xarray, "open_datatree", lambda *_, **__: pytest.fail("opened"))
+    with pytest.raises(ParameterError, match="is damaged"):
+        read_dataset(path)
+
+
+@pytest.mark.parametrize("size", [0, 1, 100, 2000, -1, -60, -200])
+def test_a_cut_file_is_told(tmp_path, size):
+    path = write_dataset(tmp_path / "a.nc", small())
+    path.write_bytes(path.read_bytes()[:size])
+    with pytest.raises(ParameterError, match=r"a\.nc is (damaged|no netCDF file that can be read)"):
+        read_dataset(path)
+
+
+def test_pictures_are_the_same_bytes_for_the_same_data(tmp_path):
+    from matplotlib.figure import Figure
+
+    for name in ("a", "b"):
+        figure = Figure()
+        figure.add_subplot().plot(np.arange(3.0))
+        write_figure(tmp_path / name, figure)
+    for kind in ("png", "pdf"):
+        assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
+    assert b"CreationDate" not in (tmp_path / "a.pdf").read_bytes()
+
+
+# --- folders ---------------------------------------------------------------------------------------------------------------
 
 
 def test_check_writable_leaves_nothing_behind(tmp_path):
@@ -75,3 +180,12 @@ def test_a_folder_without_permission_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "TemporaryFile", refuse)  # a real folder would let the superuser in
     with pytest.raises(ParameterError, match=r"cannot be written to \(permission denied\)"):
         check_writable(tmp_path / "a")
+
+
+def test_what_has_no_end_is_not_read(tmp_path):
+    with pytest.raises(ParameterError, match="/dev/zero is no file that can be read"):
+        read_dataset("/dev/zero")
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ParameterError, match="is no file that can be read"):
+        read_dataset(tmp_path / "pipe")
+    assert write_bytes(tmp_path / "empty", b"").read_bytes() == b""

@@ -89,7 +89,7 @@ def test_a_file_that_opens_only_half_is_told_without_a_traceback(refused, tmp_pa
 @pytest.mark.parametrize("kind", ASKS)
 def test_a_result_that_lacks_what_its_kind_has_is_told(kind, refused, tmp_path):
     netcdf(tmp_path / "broken.nc", {"kind": kind}, x=("day", [1.0]))
-    assert f"of the kind '{kind}', but lacks" in refused("plot", tmp_path / "broken.nc")
+    assert f"of the kind '{kind}', but it cannot be drawn (" in refused("plot", tmp_path / "broken.nc")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["broken.nc"]
 
 
@@ -119,7 +119,7 @@ def plan(kind):
 def test_sweeps_that_have_no_picture_are_told(refused, tmp_path):
     run(plan("stability_chart"), tmp_path / "half.zarr")
     files.chunk_file(tmp_path / "half.zarr", "c", (1,), 0).unlink()
-    assert "half.zarr has 1 of 2 chunks; run the study again to go on, then plot it" in refused("plot", tmp_path / "half.zarr")
+    assert "half.zarr has 1 of 2 chunks; run the sweep again to complete it" in refused("plot", tmp_path / "half.zarr")
     run(plan("basin_cells"), tmp_path / "basins.zarr")
     assert "plot basins.nc beside it" in refused("plot", tmp_path / "basins.zarr")
     run(plan("squares"), tmp_path / "mine.zarr")

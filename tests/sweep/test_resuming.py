@@ -169,7 +169,7 @@ def test_two_that_begin_at_once_make_one_store(tree, tmp_path, monkeypatch):
 
 def test_where_there_are_no_locks_two_runs_write_the_same(tree, tmp_path, monkeypatch):
     """Without a lock, two runs at once cost time, not the store: files are whole, and both write the same bytes."""
-    monkeypatch.setattr(files, "_lock", lambda file, shared=False: None)
+    monkeypatch.setattr(files, "lock", lambda file, shared=False: None)
     plan = sweep_script.long_plan(chunks=12, pause=0.005)
     run(plan, tmp_path / "alone")
     both = [threading.Thread(target=run, args=(plan, tmp_path / "both")) for _ in range(2)]

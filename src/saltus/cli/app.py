@@ -76,7 +76,8 @@ def simulate(
 
     Writes motion.nc (netCDF, with units and provenance), motion.png and
     motion.pdf, and prints a summary: the state at the end, the impacts, why
-    the motion ended, and whether the mechanism could follow it.
+    the motion ended, and whether the mechanism could follow it. A model of
+    your own is Python code, and is run.
 
     Example: [cyan]saltus simulate study.toml --output runs/first[/]
     """
@@ -95,20 +96,24 @@ def run(
         str | None,
         typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786, for charts and basins."),
     ] = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Begin anew where a chart or basins of another study, model or version are.")
+    ] = False,
 ) -> None:
     r"""Answer all that a study asks: a motion, a diagram, a chart, basins, ...
 
     The study's tables say what: \[simulate], \[phase_portrait],
     \[response_spectrum], \[bifurcation_diagram], \[attractors], \[basins],
     \[stability_chart]. All is checked before anything is computed. A chart,
-    or basins, that were stopped go on where they were.
+    or basins, that were stopped go on where they were. A model of your own is
+    Python code, and is run.
 
     Example: [cyan]saltus run study.toml --output runs/first[/]
     """
     with guarded():
         from saltus.cli.run_command import run_study
 
-        run_study(study, output, plot, scheduler)
+        run_study(study, output, plot, scheduler, fresh)
 
 
 @app.command()
@@ -120,7 +125,8 @@ def plot(
 ) -> None:
     """Draw a result of `saltus run` or `saltus simulate` again.
 
-    Writes a PNG and a PDF file. Of basins, plot basins.nc.
+    Writes a PNG and a PDF file. Of basins, plot basins.nc. It reads files and
+    runs nothing that stands in them.
 
     Example: [cyan]saltus plot results/study/stability_chart.zarr[/]
     """
@@ -131,15 +137,24 @@ def plot(
 
 
 @app.command()
-def status(store: Annotated[Path, typer.Argument(metavar="STORE", help="The .zarr folder of a sweep.")]) -> None:
+def status(
+    store: Annotated[Path, typer.Argument(metavar="STORE", help="The .zarr folder of a sweep; with --verify any result.")],
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Compare every file with its checksum: of a .zarr, a .nc, or a folder of results.")
+    ] = False,
+) -> None:
     """Say how far a sweep is: running, stopped or complete, and what has failed.
 
+    It reads files and runs nothing.
+
     Example: [cyan]saltus status results/study/stability_chart.zarr[/]
+
+    Example: [cyan]saltus status --verify results[/]
     """
     with guarded():
         from saltus.cli.status_command import print_status
 
-        print_status(store)
+        print_status(store, verify)
 
 
 @app.command()
@@ -148,7 +163,8 @@ def info(study: Study) -> None:
 
     Its equilibria and their stability, its natural frequencies and periods,
     the critical loads, the limits of the mechanism, and whether it is
-    symmetric. The study needs no \\[simulate] for it.
+    symmetric. The study needs no \\[simulate] for it. A model of your own is
+    Python code, and is run.
 
     Example: [cyan]saltus info study.toml[/]
     """

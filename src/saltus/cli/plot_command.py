@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, SaltusError
 
 
 def plot_store(path: Path, output: Path | None) -> None:
@@ -23,7 +21,16 @@ def plot_store(path: Path, output: Path | None) -> None:
 
     folder = path.parent if output is None else output
     check_writable(folder)
-    files = draw_file(path, folder / path.stem, open_result(path))
+    data = open_result(path)
+    try:
+        files = draw_file(path, folder / path.stem, data)
+    except (SaltusError, OSError):
+        raise
+    except Exception as error:  # what another program wrote may lack anything, and may hold anything in its place
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        raise ParameterError(
+            f"{path} says that it is of the kind {kind_of(data)!r}, but it cannot be drawn ({said:.120})"
+        ) from None
     names = ", ".join(file.name for file in files)
     Console(highlight=False).print(f"The picture is in {folder}: {names}", markup=False, soft_wrap=True)
 
@@ -32,7 +39,7 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     """Draw a result as `stem`.png and `stem`.pdf.
 
     Raises:
-        ParameterError: it is of no kind that has a picture, or lacks what its kind has.
+        ParameterError: it is of no kind that has a picture.
     """
     from saltus.files import write_figure
     from saltus.plots import style
@@ -40,13 +47,9 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     kind, drawn = kind_of(data), drawings()
     if kind not in drawn:
         what = f"its kind is {kind!r}" if kind else "it does not say of what kind it is"
-        raise ParameterError(f"{path} is no result that `saltus plot` draws: {what}; it draws {', '.join(drawn)}")
-    try:
-        figure = drawn[kind](data)
-    except (LookupError, AttributeError, StopIteration) as error:
-        raise ParameterError(f"{path} says that it is of the kind {kind!r}, but lacks {error}; compute it again") from error
+        raise ParameterError(f"{path} is no result that `saltus plot` draws: {what:.60}; it draws {', '.join(drawn)}")
     with style():
-        return write_figure(stem, figure)
+        return write_figure(stem, drawn[kind](data))
 
 
 def drawings() -> dict[str, Callable[[Any], Any]]:
@@ -65,55 +68,27 @@ def drawings() -> dict[str, Callable[[Any], Any]]:
 
 
 def open_result(path: Path) -> Any:
-    """The Dataset or DataTree at `path`.
+    """The Dataset or DataTree at `path`; nothing in it is run, and its system is not made.
 
     Raises:
-        ParameterError: no such file, or one that is not of saltus; a sweep that is not complete.
+        ParameterError: no such file, or one that is not of saltus, or is damaged; a sweep that is not complete.
     """
-    import traceback
-
-    import xarray
+    from saltus.files import read_dataset
 
     if not path.exists():
         raise ParameterError(f"there is no file or folder {path}; give the .nc or .zarr that `saltus run` has written")
-    if path.is_dir():
-        return _open_store(path)
-    try:
-        with xarray.open_datatree(path, engine="h5netcdf") as tree:
-            tree.load()
-    except (OSError, ValueError, KeyError, TypeError) as error:  # h5netcdf has many ways to say so
-        with _without_unraisable():
-            traceback.clear_frames(error.__traceback__)
-        raise ParameterError(f"{path} is no netCDF file that can be read ({_first_line(error)})") from error
-    return tree if tree.children else tree.to_dataset()
-
-
-@contextmanager
-def _without_unraisable() -> Iterator[None]:
-    """Let objects go in silence: a file that h5netcdf could open only half prints a traceback when it is closed."""
-    hook = sys.unraisablehook
-    sys.unraisablehook = lambda lost: None
-    try:
-        yield
-    finally:
-        sys.unraisablehook = hook
+    return _open_store(path) if path.is_dir() else read_dataset(path)
 
 
 def _open_store(path: Path) -> Any:
     """The dataset of a complete sweep."""
-    from saltus.sweep import open_store, status
+    from saltus.sweep import open_store, read_plan
 
-    found = status(path)
-    if not found.complete:
-        raise ParameterError(f"{path} has {found.done} of {found.total} chunks; run the study again to go on, then plot it")
+    read_plan(path)
     data = open_store(path)
     if kind_of(data) == "basin_cells":
         raise ParameterError(f"{path} keeps the cells of basins alone; plot {path.with_suffix('.nc').name} beside it")
     return data
-
-
-def _first_line(error: Exception) -> str:
-    return f"{next(iter(str(error).splitlines()), type(error).__name__):.80}"
 
 
 def kind_of(data: Any) -> str:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 SWEPT = ("basins", "stability_chart")  # computed chunk by chunk into a store, from which a run that was stopped goes on
 
 
-def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None) -> None:
-    """Answer every question of the study at `path` into `output`, the motion first.
+def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None, fresh: bool = False) -> None:
+    """Answer every question of the study at `path` into `output`, the motion first; `fresh` begins every store anew.
 
     Raises:
         SaltusError: a bad study or one that asks nothing, a folder that cannot be written to, a scheduler that does not answer,
@@ -26,6 +26,7 @@ def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None
     from saltus.cli.simulate_command import simulate_study
     from saltus.config import load_study
     from saltus.files import check_writable
+    from saltus.sweep import remove_store
 
     study = load_study(path)
     if study.simulate is None and not study.asks:
@@ -35,23 +36,26 @@ def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None
     output = Path("results") / study.name if output is None else output
     check_writable(output)
     for ask in study.asks:
-        check(study, ask, output)
+        check(study, ask, None if fresh else output)
     if scheduler is not None:
         check_scheduler(study, scheduler)
+    for ask in study.asks if fresh else ():
+        remove_store(output / f"{ask.kind}.zarr")
     if study.simulate is not None:
         simulate_study(path, output, plot)
     for ask in study.asks:
         answer(study, ask, output, plot, scheduler)
 
 
-def check(study: Study, ask: Ask, output: Path) -> None:
+def check(study: Study, ask: Ask, output: Path | None) -> None:
     """Refuse what the function of a question would refuse.
 
     Raises:
-        ParameterError: an argument without meaning, or in `output` the store of something else.
+        ParameterError: an argument without meaning, or in `output`, if it is given, the store of something else.
     """
     function: Any = ask.function
-    study.answer(ask, function.check, **({"store": output / f"{ask.kind}.zarr"} if ask.kind in SWEPT else {}))
+    store = {} if output is None or ask.kind not in SWEPT else {"store": output / f"{ask.kind}.zarr"}
+    study.answer(ask, function.check, **store)
 
 
 def check_scheduler(study: Study, scheduler: str) -> None:

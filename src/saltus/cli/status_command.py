@@ -12,6 +12,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from saltus.errors import ParameterError
+
 if TYPE_CHECKING:
     from saltus.sweep import StoreStatus
 
@@ -19,17 +21,22 @@ BAR_WIDTH = 40  # columns of the bar
 FAILURES_NAMED = 5  # failed chunks that are named
 
 
-def print_status(path: Path) -> None:
+def print_status(path: Path, verify: bool = False) -> None:
     """Print how far the sweep in the store at `path` is, from its files alone: it may be running, stopped or killed.
 
-    Raises:
-        ParameterError: there is no store of a sweep at `path`.
-    """
-    from saltus.sweep import status
+    To `verify` compares every file with its checksum, also of a netCDF file, or of all results in a folder.
 
-    found = status(path)
+    Raises:
+        ParameterError: there is no store of a sweep at `path`, or what was verified is damaged.
+    """
+    from saltus.sweep import damage, status
+
+    if verify and not (path / "zarr.json").is_file() and (path.suffix != ".zarr" or not path.exists()):
+        print_verified(path)
+        return
+    found = status(path, verify=verify)
     console = Console(highlight=False)
-    console.print(f"[bold]{found.kind[:1].upper()}{found.kind[1:].replace('_', ' ')}[/] ", end="")
+    console.print(Text(f"{found.kind[:1].upper()}{found.kind[1:].replace('_', ' ')} ", style="bold"), end="")
     console.print(f"in {path}", markup=False, soft_wrap=True)
     if console.is_terminal:
         console.print(ProgressBar(total=found.total, completed=found.done, width=BAR_WIDTH), "", sep="\n")
@@ -39,7 +46,41 @@ def print_status(path: Path) -> None:
     for head, text in rows(found):
         table.add_row(head, Text(text))
     console.print(table)
+    if found.damaged:
+        raise ParameterError(f"{damage(found)}; start the sweep again, and what they held is computed anew")
     console.print(ending(found), markup=False, soft_wrap=True)
+    if verify:
+        console.print("Every file is what was written.", markup=False)
+
+
+def print_verified(path: Path) -> None:
+    """Print of the netCDF file at `path`, or of each result below that folder, whether it is what was written.
+
+    Raises:
+        ParameterError: with all that is damaged; there is no result at `path`.
+    """
+    from saltus.files import checked_content, has_checksum
+    from saltus.sweep import damage, status
+
+    found = [path] if path.is_file() else [*sorted(path.rglob("*.nc")), *sorted(path.rglob("*.zarr"))]
+    console, wrong = Console(highlight=False), list[str]()
+    if not found:
+        raise ParameterError(f"there is no result of saltus at {path}; give a .nc file, a .zarr folder, or a folder with such")
+    for file in found:
+        try:
+            if file.is_dir():
+                store = status(file, verify=True)
+                said, bad = "sound", damage(store) if store.damaged else ""
+            else:
+                checked_content(file)
+                said, bad = "sound" if has_checksum(file.read_bytes()) else "has no checksum: another program wrote it", ""
+        except ParameterError as error:
+            bad = str(error)
+        wrong += [bad] if bad else []
+        console.print(f"{file}: {'damaged' if bad else said}", markup=False, soft_wrap=True)
+    if wrong:
+        more = f"; and {len(wrong) - 1} more of these results" if len(wrong) > 1 else ""
+        raise ParameterError(f"{wrong[0]}{more}")
 
 
 def rows(found: StoreStatus) -> Iterator[tuple[str, str]]:

@@ -13,7 +13,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import saltus
-from saltus.files import write_text
+from saltus.files import read_dataset, write_text
 from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import Claim, ClaimVerdict, with_summaries
 from saltus.paper.claims.claim_tables import Origin, section_titles
@@ -25,8 +25,8 @@ def compute_claims(figure: PaperFigure, folder: Path) -> list[Claim]:
     """The claims of a figure from the data that it left in `folder`."""
     import xarray
 
-    with xarray.open_datatree(folder / f"{figure.name}.nc", engine="h5netcdf") as tree:
-        return figure.claims(tree.load())
+    data = read_dataset(folder / f"{figure.name}.nc")
+    return figure.claims(xarray.DataTree(data) if isinstance(data, xarray.Dataset) else data)
 
 
 def write(figures: Iterable[PaperFigure], folder: Path, known: Mapping[str, Iterable[Claim]]) -> list[Claim]:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from saltus.errors import ParameterError, near
-from saltus.files import check_writable, write_atomically, write_dataset, write_text
+from saltus.files import check_writable, write_dataset, write_figure, write_text
 from saltus.paper import report
 from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import Claim
@@ -76,6 +75,4 @@ def _write(figure: PaperFigure, data: Any, output: Path) -> None:
     if figure.draw is not None:
         picture = figure.draw(data)
         with style():
-            for kind, metadata in (("png", None), ("pdf", {"CreationDate": None, "Title": figure.title})):
-                save = partial(picture.savefig, format=kind, metadata=metadata)
-                write_atomically(output / f"{figure.name}.{kind}", save)
+            write_figure(output / figure.name, picture, figure.title)

@@ -2,19 +2,22 @@ from .chunk_results import Failure
 from .cluster import on_cluster
 from .execution import SweepInterrupted, run
 from .plan import Plan, Variable
-from .store import check_store, open_store
-from .store_status import StoreStatus, read_plan, status
+from .store import BEGIN_ANEW, check_store, open_store, remove_store
+from .store_status import StoreStatus, damage, read_plan, status
 
 __all__ = [
+    "BEGIN_ANEW",
     "Failure",
     "Plan",
     "StoreStatus",
     "SweepInterrupted",
     "Variable",
     "check_store",
+    "damage",
     "on_cluster",
     "open_store",
     "read_plan",
+    "remove_store",
     "run",
     "status",
 ]

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 Index = tuple[int, ...]  # of a chunk: its place along each axis
+NAME = re.compile(r"[A-Za-z][\w.\-]*")  # of an axis, a dimension or a variable: it is a folder's name in a store
+MOST_CHUNKS = 1_000_000  # of a grid: each is a file, and all of them are looked for when a sweep begins
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import asyncio
 from zarr.core.buffer import Buffer
 from zarr.storage import LocalStore
 
-from saltus.sweep.store_files import write_durably
+from saltus.files import write_durably
 
 
 class DurableStore(LocalStore):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, near
-from saltus.sweep.chunk_grid import ChunkGrid, Index
+from saltus.sweep.chunk_grid import MOST_CHUNKS, NAME, ChunkGrid, Index
 from saltus.sweep.chunk_results import resolve
 from saltus.sweep.jsonable import as_json, one_line
 
-NAME = re.compile(r"[A-Za-z][\w.\-]*")  # of an axis, a dimension or a variable: it is a folder's name in a store
 RESERVED = ("zarr.json", "plan")
 WRITER = "saltus_version"  # an attribute that says who wrote a store, not what is computed: `result_version` says that
 
@@ -73,7 +71,8 @@ class Plan:
         attrs: provenance, JSON-able: kind, system, version, seed, ...
 
     Raises:
-        ParameterError: an unknown function, a bad name, axis or chunk, or something that JSON does not have.
+        ParameterError: an unknown function, a bad name, axis or chunk, or something that JSON does not have;
+            a grid of more chunks than can be looked through.
     """
 
     function: str
@@ -100,6 +99,8 @@ class Plan:
             raise ParameterError("attrs must not have the key 'plan'; the plan itself is kept there", "attrs")
         for name, value in values.items():
             object.__setattr__(self, name, value)
+        if self.chunks.total > MOST_CHUNKS:
+            raise ParameterError(f"chunk cuts the grid into {self.chunks.total} chunks, and {MOST_CHUNKS} are the most", "chunk")
 
     @cached_property
     def chunks(self) -> ChunkGrid:

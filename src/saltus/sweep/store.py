@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import shutil
+import tempfile
 import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -18,10 +20,16 @@ from saltus.sweep.chunk_grid import Index
 from saltus.sweep.chunk_results import Arrays, Failure
 from saltus.sweep.jsonable import differences
 from saltus.sweep.plan import Plan
-from saltus.sweep.store_status import read_plan, status
+from saltus.sweep.store_status import damage, read_plan, status
+from saltus.sweep.verification import damaged_chunks
 
 if TYPE_CHECKING:
     import xarray
+
+
+BEGIN_ANEW = "name another store, or remove this one to begin anew (`saltus run --fresh`)"
+
+log = logging.getLogger("saltus.sweep")
 
 
 class Store:
@@ -42,7 +50,19 @@ class Store:
             self.arrays = {name: group[name] for name in plan.variables}
 
     def missing(self) -> list[Index]:
-        """The chunks that are not done."""
+        """The chunks that are not done; a file that is damaged is removed first, so that its chunk is computed again.
+
+        Raises:
+            SweepError: a damaged file cannot be removed.
+        """
+        extra = {name: len(variable.extra) for name, variable in self.plan.variables.items()}
+        for name, index in damaged_chunks(self.path, self.arrays, self.plan.chunks, extra):
+            file = files.chunk_file(self.path, name, index, extra[name])
+            log.warning("%s is damaged; its chunk is computed again", file)
+            try:
+                file.unlink()
+            except OSError as error:
+                raise SweepError(f"{file} is damaged and cannot be removed ({reason(error)})") from error
         return [i for i in self.plan.chunks.indices() if not all(self._has(name, i) for name in self.plan.variables)]
 
     def write(self, index: Index, values: Arrays) -> None:
@@ -90,13 +110,15 @@ def opened(plan: Plan, path: Path) -> Iterator[Store]:
         SweepError: it cannot be made, or another run is writing to it.
     """
     check_store(plan, path)
-    if not (path / files.METADATA).is_file():
-        _create(plan, path)
+    if not (path / files.METADATA).is_file():  # it is what the lock is on
+        (_restore if (path / files.CHECKSUMS).is_file() else _create)(plan, path)
     with files.locked(path) as got:
         if got is False:
             raise SweepError(f"another run is writing to {path}; wait for it, or stop it, and run again")
         if got:
             files.sweep_up(path)
+        if files.damaged_files(path):
+            _restore(plan, path)
         yield Store(plan, path)
 
 
@@ -104,18 +126,72 @@ def check_store(plan: Plan, path: Path) -> None:
     """Refuse a path at which there is something else than the store of `plan`.
 
     Raises:
-        ParameterError: with what is there.
+        ParameterError: with what is there, or what is damaged so that it cannot be told whose store it is.
     """
-    if (path / files.METADATA).is_file():
+    if (path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file():
+        if files.damaged_files(path):
+            _restorable(plan, path)
+            return
         differ = list(differences(read_plan(path), plan.describe()))
         if differ:
             more = f"; and {len(differ) - 3} more" if len(differ) > 3 else ""
-            raise ParameterError(
-                f"{path} is the store of another plan: {'; '.join(differ[:3])}{more}; name another store", "store"
-            )
+            raise ParameterError(f"{path} is the store of another plan: {'; '.join(differ[:3])}{more}; {BEGIN_ANEW}", "store")
     elif path.is_file() or (path.is_dir() and any(path.iterdir())):
         kind = "a file" if path.is_file() else "a folder with something else in it"
         raise ParameterError(f"{path} is {kind}; name a store that does not exist yet, or one of this plan", "store")
+
+
+def remove_store(path: Path) -> None:
+    """Remove the store at `path`, if there is one.
+
+    Raises:
+        ParameterError: there is something else.
+        SweepError: a run is writing to it, or it cannot be removed.
+    """
+    if not path.exists():
+        return
+    if not ((path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file()):
+        raise ParameterError(f"{path} is no store, so it is not removed; name another place", "store")
+    if files.in_use(path):
+        raise SweepError(f"a run is writing to {path}; wait for it, or stop it, and run again")
+    try:
+        shutil.rmtree(path)
+    except OSError as error:
+        raise SweepError(f"{path} cannot be removed ({reason(error)})") from error
+
+
+def _restorable(plan: Plan, path: Path) -> dict[str, bytes]:
+    """The content of the damaged files of a store that is made anew from its plan: metadata and coordinates, no chunks.
+
+    Raises:
+        ParameterError: nothing that is left shows that the store is of this plan.
+    """
+    damaged = files.damaged_files(path)
+    with tempfile.TemporaryDirectory() as folder:
+        new = Path(folder)
+        _make(plan, new)
+        expected = files.checksums(new)
+        content = {name: (new / name).read_bytes() for name in (*expected, files.CHECKSUMS)}
+    try:
+        kept = files.checksums(path)
+    except (OSError, ValueError):
+        kept = {}
+    intact = {name for name in content if (path / name).is_file() and (path / name).read_bytes() == content[name]}
+    if files.METADATA in intact or kept.get(files.METADATA) == expected[files.METADATA]:  # it holds the plan
+        return {name: content[name] for name in content if name not in intact}
+    if files.METADATA not in damaged and all(kept.get(name, "") == expected.get(name) for name in damaged):
+        return {name: content[name] for name in damaged}
+    raise ParameterError(f"{path / damaged[0]} is damaged, so the store cannot be gone on with; {BEGIN_ANEW}", "store")
+
+
+def _restore(plan: Plan, path: Path) -> None:
+    """Write the damaged files of a store again, the list of checksums last."""
+    for name, content in _restorable(plan, path).items():
+        log.warning("%s is damaged; it is written again", path / name)
+        try:
+            files.write_durably(path / name, content)
+        except OSError as error:
+            raise SweepError(f"{path / name} is damaged and cannot be written again ({reason(error)})") from error
 
 
 def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
@@ -127,9 +203,11 @@ def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
 
     Raises:
         ParameterError: no store of a sweep.
-        SweepError: it is incomplete.
+        SweepError: it is incomplete or damaged.
     """
-    found = status(path)
+    found = status(path, verify=True)
+    if found.damaged:
+        raise SweepError(f"{damage(found)}; run the sweep again, and it is computed anew")
     if not (found.complete or partial):
         raise SweepError(
             f"{path} has {found.done} of {found.total} chunks; run the sweep again to complete it, or give partial=True"
@@ -161,8 +239,7 @@ def _create(plan: Plan, path: Path) -> None:
     try:
         part = files.begin(path)
         try:
-            _make(plan, _zarr_store(part))
-            _sort(part / files.METADATA)
+            _make(plan, part)
         except BaseException:
             shutil.rmtree(part, ignore_errors=True)
             raise
@@ -171,13 +248,17 @@ def _create(plan: Plan, path: Path) -> None:
         raise SweepError(f"the store {path} cannot be made ({reason(error)}); name another") from error
 
 
-def _make(plan: Plan, store: Any) -> None:
-    """Write the metadata and the coordinates; nothing of it is ever written again."""
+def _make(plan: Plan, folder: Path) -> None:
+    """Write the metadata and the coordinates, then their checksums; nothing of it is ever written again."""
     import zarr
+    from zarr.codecs import Crc32cCodec, ZstdCodec
 
+    store, codecs = _zarr_store(folder), [ZstdCodec(level=0), Crc32cCodec()]  # Zarr's own choice, and a checksum of each chunk
     group = zarr.create_group(store, zarr_format=3, attributes=plan.attributes)
     for name, values in plan.axes.items():
-        coordinate = group.create_array(name, shape=values.shape, chunks=values.shape, dtype=values.dtype, dimension_names=[name])
+        coordinate = group.create_array(
+            name, shape=values.shape, chunks=values.shape, dtype=values.dtype, dimension_names=[name], compressors=codecs
+        )
         coordinate[:] = values
     for name, variable in plan.variables.items():
         group.create_array(
@@ -187,11 +268,14 @@ def _make(plan: Plan, store: Any) -> None:
             dtype=np.dtype(variable.dtype),
             dimension_names=list(plan.dimensions(name)),
             fill_value=variable.fill,
+            compressors=codecs,
             attributes=dict(variable.attrs),
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that Zarr's specification does not have consolidated metadata yet; xarray reads it
         zarr.consolidate_metadata(store)
+    _sort(folder / files.METADATA)
+    files.write_checksums(folder)
 
 
 def _sort(metadata: Path) -> None:

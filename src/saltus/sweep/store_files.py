@@ -3,40 +3,56 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import json
 import os
 import secrets
 import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO
 
+from saltus.files import PART, STALE, lock, write_durably
 from saltus.sweep.chunk_grid import Index
 
 METADATA = "zarr.json"
 FAILURES = ".failures.json"
-PART = ".part"
-STALE = 60.0  # s; a store is made in much less, so what was begun earlier was left by a killed run
+CHECKSUMS = ".checksums.json"  # of the files that are written once, when the store is made: all but the chunks
 LOCK_PATIENCE = 1.0  # s to wait for a lock: a process that only looks whether there is one holds it for a moment
 
 
-def write_durably(path: Path, content: bytes) -> None:
-    """Write a file so that whoever finds it finds all of it, after a kill or a power failure too.
+def write_checksums(root: Path) -> None:
+    """Write down the SHA-256 of every file below the new store at `root`."""
+    found = {str(file.relative_to(root)): _sha256(file) for file in sorted(root.rglob("*")) if file.is_file()}
+    write_durably(root / CHECKSUMS, json.dumps(found, indent=1).encode())
 
-    It is written beside its place, brought to the disk, and moved there. If that fails nothing is left.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{secrets.token_hex(6)}{PART}")
+
+def damaged_files(root: Path) -> list[str]:
+    """The files, chunks left out, that are missing or are not what they were when the store at `root` was made."""
     try:
-        with part.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            part.unlink()
-        raise
+        known = checksums(root)
+    except (OSError, ValueError):
+        return [CHECKSUMS]
+    return [name for name, kept in known.items() if _sha256(root / name) != kept]
+
+
+def checksums(root: Path) -> dict[str, str]:
+    """The digests of the files that were written when the store at `root` was made.
+
+    Raises:
+        OSError, ValueError: they cannot be read.
+    """
+    known = json.loads((root / CHECKSUMS).read_bytes())
+    if not isinstance(known, dict) or METADATA not in known or not all(isinstance(text, str) for text in known.values()):
+        raise ValueError
+    return known
+
+
+def _sha256(file: Path) -> str | None:
+    try:
+        return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else None
+    except (OSError, ValueError):
+        return None
 
 
 def chunk_file(root: Path, variable: str, index: Index, extra: int) -> Path:
@@ -64,7 +80,7 @@ def finish(part: Path, path: Path) -> None:
 
 def sweep_up(path: Path) -> None:
     """Remove what killed runs left half-written, in the store at `path` and beside it. The caller has the lock."""
-    for part in path.rglob(f".*{PART}"):
+    for part in path.rglob(f".*{PART}"):  # only who has the lock writes here
         with contextlib.suppress(OSError):
             part.unlink()
     for part in path.parent.glob(f".{path.name}.*{PART}"):
@@ -86,7 +102,7 @@ def locked(path: Path) -> Iterator[bool | None]:
         return
     with file:
         deadline = time.monotonic() + LOCK_PATIENCE
-        while (got := _lock(file)) is False and time.monotonic() < deadline:
+        while (got := lock(file)) is False and time.monotonic() < deadline:
             time.sleep(0.05)
         yield got
 
@@ -95,22 +111,7 @@ def in_use(path: Path) -> bool | None:
     """Whether a run has the lock of the store at `path`; None where that cannot be told."""
     try:
         with (path / METADATA).open("rb") as file:
-            got = _lock(file, shared=True)
+            got = lock(file, shared=True)
     except OSError:
         return None
     return None if got is None else not got
-
-
-def _lock(file: IO[bytes], shared: bool = False) -> bool | None:
-    """Try to lock an open file until it is closed: whether it could, None where there are no locks."""
-    try:
-        import fcntl
-    except ImportError:
-        return None
-    try:
-        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return None
-    return True

@@ -11,8 +11,11 @@ from typing import Any
 
 from saltus.errors import ParameterError
 from saltus.sweep import store_files as files
-from saltus.sweep.chunk_grid import ChunkGrid
+from saltus.sweep.chunk_grid import MOST_CHUNKS, NAME, ChunkGrid, Index
 from saltus.sweep.chunk_results import Failure
+from saltus.sweep.verification import damaged_chunks
+
+NAMED = 3  # damaged files that a sentence names
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,8 @@ class StoreStatus:
 
     `done` and `failed` count chunks, of `total`; a failed chunk is one that raised when it was last tried. `bytes` is the size of
     the store's files. `started` is when the store was made, `updated` when the last chunk was written (None: none yet).
-    `running` is whether a run on this machine is writing to it, None where the file system has no locks.
+    `running` is whether a run on this machine is writing to it, None where the file system has no locks. `damaged` are the files
+    that are not what was written, if that was looked at; a chunk with such a file is not done.
     """
 
     path: Path
@@ -35,6 +39,7 @@ class StoreStatus:
     started: datetime.datetime
     updated: datetime.datetime | None
     running: bool | None
+    damaged: tuple[str, ...] = ()
 
     @property
     def failed(self) -> int:
@@ -47,17 +52,19 @@ class StoreStatus:
         return self.done == self.total
 
 
-def status(path: Path | str) -> StoreStatus:
-    """How far the sweep is whose store is at `path`.
+def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
+    """How far the sweep is whose store is at `path`; to `verify` reads all of it, and finds the files that are damaged.
 
     Raises:
-        ParameterError: there is no store of a sweep at `path`.
+        ParameterError: there is no store of a sweep at `path`, or its metadata are damaged.
     """
     path = Path(path)
     plan = read_plan(path)
-    chunks = ChunkGrid({name: plan["axes"][name]["size"] for name in plan["order"]}, plan["chunk"])
+    chunks = grid_of(plan)
     variables = {name: len(variable["extra"]) for name, variable in plan["variables"].items()}
-    missing, updated = set(), 0.0
+    damaged = list(files.damaged_files(path)) if verify else []
+    broken = _broken_chunks(path, chunks, variables) if verify and not damaged else {}
+    missing, updated = set(broken.values()), 0.0
     for index in chunks.indices():
         times = [_written(files.chunk_file(path, name, index, extra)) for name, extra in variables.items()]
         if not all(times):
@@ -75,30 +82,70 @@ def status(path: Path | str) -> StoreStatus:
         started=_moment(os.path.getmtime(path / files.METADATA)),
         updated=_moment(updated) if updated else None,
         running=files.in_use(path),
+        damaged=tuple(damaged or broken),
     )
+
+
+def damage(found: StoreStatus) -> str:
+    """What is damaged in a store, as the beginning of a sentence."""
+    count = len(found.damaged)
+    named = ", ".join(found.damaged[:NAMED]) + (f" and {count - NAMED} more" if count > NAMED else "")
+    return f"{found.path} has {count} damaged or missing file{'s' * (count > 1)} ({named})"
+
+
+def _broken_chunks(path: Path, chunks: ChunkGrid, extra: dict[str, int]) -> dict[str, Index]:
+    """The files of chunks that cannot be read, each with its chunk."""
+    import zarr
+
+    arrays: Any = zarr.open_group(str(path), mode="r")
+    broken = damaged_chunks(path, arrays, chunks, extra)
+    return {str(files.chunk_file(path, name, index, extra[name]).relative_to(path)): index for name, index in broken}
 
 
 def read_plan(path: Path) -> dict[str, Any]:
     """The plan that the store at `path` was made for, as JSON.
 
     Raises:
-        ParameterError: there is nothing at `path`, or no store, or one that is not of a sweep.
+        ParameterError: there is nothing at `path`, or no store, or one that is not of a sweep, or whose metadata are damaged.
     """
     if not path.exists():
         raise ParameterError(f"there is no store at {path}")
     if not path.is_dir():
         raise ParameterError(f"{path} is a file; the store of a sweep is a folder")
+    metadata = path / files.METADATA
+    if not metadata.is_file():
+        raise ParameterError(f"{path} is not a store: it has no {files.METADATA}")
+    damaged = [name for name in (files.METADATA, files.CHECKSUMS) if name in files.damaged_files(path)]
     try:
-        group = json.loads((path / files.METADATA).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ParameterError(f"{path} is not a store: it has no {files.METADATA}") from None
-    except (OSError, ValueError) as error:
-        raise ParameterError(f"{path / files.METADATA} cannot be read ({error})") from error
+        group = json.loads(metadata.read_bytes())
+    except (OSError, RecursionError, ValueError) as error:
+        raise ParameterError(f"{metadata} cannot be read ({error!s:.80})") from error
     try:
         plan = json.loads(group["attributes"]["plan"])
-        return {key: plan[key] for key in ("function", "arguments", "order", "axes", "chunk", "variables", "attrs")}
-    except (KeyError, TypeError, ValueError):
+        plan = {key: plan[key] for key in ("function", "arguments", "order", "axes", "chunk", "variables", "attrs")}
+        grid_of(plan)
+    except (RecursionError, KeyError, TypeError, ValueError, AttributeError):
         raise ParameterError(f"{path} is a Zarr store, but not of a sweep: it keeps no plan") from None
+    if damaged:
+        raise ParameterError(f"{path / damaged[0]} is damaged; run the sweep again, or remove the store and begin anew")
+    return plan
+
+
+def grid_of(plan: dict[str, Any]) -> ChunkGrid:
+    """How the grid of a plan that was read from a file is cut.
+
+    Raises:
+        KeyError, TypeError, ValueError, AttributeError: it is none that a plan can have.
+    """
+    sizes = {str(name): plan["axes"][name]["size"] for name in plan["order"]}
+    chunks = ChunkGrid(sizes, {name: plan["chunk"][name] for name in sizes})
+    counts = [*sizes.values(), *chunks.chunk.values(), *(size for v in plan["variables"].values() for _, size in v["extra"])]
+    texts = [plan["function"], *plan["variables"], *sizes]
+    whole = all(isinstance(count, int) and not isinstance(count, bool) and count > 0 for count in counts)
+    named = all(NAME.fullmatch(name) for name in texts[1:]) and isinstance(plan["function"], str)
+    if not (sizes and plan["variables"] and whole and named and isinstance(plan["attrs"], dict)) or chunks.total > MOST_CHUNKS:
+        raise ValueError
+    return chunks
 
 
 def _written(file: Path) -> float:
@@ -112,9 +159,9 @@ def _written(file: Path) -> float:
 def _failures(path: Path) -> tuple[Failure, ...]:
     try:
         entries = json.loads((path / files.FAILURES).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        failures = [Failure(tuple(map(int, e["index"])), str(e["place"]), str(e["error"]), int(e["attempts"])) for e in entries]
+    except (OSError, RecursionError, KeyError, TypeError, ValueError):  # a damaged list loses no result
         return ()
-    failures = (Failure(tuple(e["index"]), e["place"], e["error"], e["attempts"]) for e in entries)
     return tuple(sorted(failures, key=lambda failure: failure.index))  # workers fail in any order
 
 

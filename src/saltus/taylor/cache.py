@@ -2,42 +2,91 @@
 
 Numbers never compile anything. A file's name is a digest of all of its source and of the compiler's options, so that a change
 of either makes a new file. A file appears in one move, so that processes that compile at the same time do not disturb each other.
+What is found there is run only from a folder of the user's own, and only if it is what was written: a source is compared with the
+text that is wanted, and compiled code with its digest. What is damaged is made again, with a remark.
 """
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import hashlib
-import importlib.util
 import inspect
+import logging
 import os
 import re
+import shutil
+import stat
 import sys
 import tempfile
 import threading
 from enum import IntEnum
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
 from saltus.taylor import private_numba
 
 MARKER = "# --- compiled from here on"
+log = logging.getLogger("saltus.cache")
 _loading = threading.RLock()  # A module is in `sys.modules` while it is still being executed: other threads wait for it.
 
 
 def cache_directory() -> Path:
-    """Where compiled code is kept: SALTUS_CACHE_DIR, or the user's cache directory, or a temporary one if that is read-only."""
+    """Where compiled code is kept: SALTUS_CACHE_DIR, or the user's cache directory, or a temporary one if neither can be used.
+
+    Code that is found there is run, so it belongs to the user alone: no link, nobody else's, and nobody else may write to it.
+    """
     from platformdirs import user_cache_dir
 
     wanted = Path(os.environ.get("SALTUS_CACHE_DIR") or user_cache_dir("saltus", appauthor=False)) / "kernels"
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    for folder in (wanted, Path(tempfile.gettempdir()) / f"saltus-kernels-{user}"):
+        problem = _problem(folder)
+        if problem is None:
+            return folder
+        if (folder, problem) not in _remarked:
+            _remarked.add((folder, problem))
+            log.warning("compiled code is not kept in %s: %s", folder, problem)
+    return _own_folder()
+
+
+_remarked: set[tuple[Path, str]] = set()
+
+
+@cache
+def _own_folder() -> Path:
+    """A folder for this process alone, which goes with it."""
+    folder = tempfile.mkdtemp(prefix="saltus-kernels-")  # as nobody else can make it
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+def _problem(folder: Path) -> str | None:
+    """Why a folder is not one to keep code in, or None; it is made as needed."""
     try:
-        wanted.mkdir(parents=True, exist_ok=True)
-        if os.access(wanted, os.W_OK):
-            return wanted
-    except OSError:
-        pass
-    fallback = Path(tempfile.gettempdir()) / f"saltus-kernels-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
-    fallback.mkdir(parents=True, exist_ok=True)
-    return fallback
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir(mode=0o700)
+        for part in (folder, folder / "__pycache__"):  # the second is numba's
+            if part == folder or part.exists() or part.is_symlink():
+                found = _shared(part.lstat())
+                if found:
+                    return found
+    except OSError as error:
+        return f"it cannot be made ({(error.strerror or str(error)).lower()})"
+    return None if os.access(folder, os.W_OK) else "it cannot be written to"
+
+
+def _shared(found: os.stat_result) -> str | None:
+    """What makes a folder one that is not the user's alone, or None."""
+    if not stat.S_ISDIR(found.st_mode):
+        return "it is a link or a file"
+    if not hasattr(os, "getuid"):
+        return None
+    if found.st_uid != os.getuid():
+        return "it belongs to another user"
+    return "other users may write to it" if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else None
 
 
 def compiled_part(module: ModuleType) -> str:
@@ -74,22 +123,31 @@ def load_module(kind: str, text: str) -> ModuleType:
     with _loading:
         if name not in sys.modules:
             path = cache_directory() / f"{name.removeprefix('saltus_')}.py"
-            if not path.exists():
+            if not _holds(path, text):
                 _write(path, text)
-            _execute(name, path)
+            _execute(name, path, text)
         return sys.modules[name]
 
 
-def _execute(name: str, path: Path) -> None:
-    """Make a module of a source file."""
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
+def _holds(path: Path, text: str) -> bool:
+    """Whether a file has this text; what has another is remarked."""
+    try:
+        same = path.is_file() and path.read_bytes() == text.encode()
+    except OSError:
+        same = False
+    if not same and path.exists():
+        log.warning("%s is damaged; it is written again", path)
+    return same
+
+
+def _execute(name: str, path: Path, text: str) -> None:
+    """Make a module of a source, which stands in a file too: numba keeps its compiled code beside it."""
+    module = ModuleType(name)
+    module.__file__ = str(path)
     sys.modules[name] = module  # numba finds the functions of a cached module through here
     try:
         with private_numba.pointers():
-            spec.loader.exec_module(module)
+            exec(compile(text, str(path), "exec"), vars(module))
     except BaseException:  # interrupted while compiling: the next call starts afresh
         del sys.modules[name]
         raise
@@ -98,7 +156,12 @@ def _execute(name: str, path: Path) -> None:
 def _write(path: Path, text: str) -> None:
     """Write a file that appears in one move; all have the same time, as numba trusts what it kept for a file of the same time."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    with os.fdopen(handle, "w") as file:
-        file.write(text)
-    os.utime(temporary, (0, 0))
-    os.replace(temporary, path)
+    try:
+        with os.fdopen(handle, "w") as file:
+            file.write(text)
+        os.utime(temporary, (0, 0))
+        os.replace(temporary, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(temporary)
+        raise

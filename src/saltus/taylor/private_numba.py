@@ -9,17 +9,22 @@ plain answer where a numba lacks it:
 
 * the option `_nrt`, which turns reference counting off: then references are counted, which costs time;
 * `FunctionCache`, its `_load_overload` and `rtsys`, with which compiled code is loaded from disk without the registries of all
-  that numba could compile: then numba's own `cache=True`;
+  that numba could compile, and `IndexDataCacheFile`, whose files get a digest: then numba's own `cache=True`;
 * `WrapperAddressProtocol` and a compile result's `library` and `entry_point`, with which a function's address is looked up once
   and calls skip numba's dispatch: then numba looks it up, at every call.
 """
 
 from __future__ import annotations
 
+import hashlib
 import importlib
+import io
+import logging
+import os
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -38,9 +43,14 @@ def _private(module: str, name: str) -> Any:
 
 CPU_OPTIONS = _private("numba.core.cpu", "CPUTargetOptions")
 FUNCTION_CACHE = _private("numba.core.caching", "FunctionCache")
+CACHE_FILE = _private("numba.core.caching", "IndexDataCacheFile")
 RUNTIME = _private("numba.core.runtime", "rtsys")
 ADDRESS_PROTOCOL = _private("numba.core.types", "WrapperAddressProtocol")
 EXPERIMENTAL = _private("numba.core.errors", "NumbaExperimentalFeatureWarning")
+
+DIGEST = hashlib.sha256().digest_size  # bytes
+
+log = logging.getLogger("saltus.cache")
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
 # For functions that make no array and that only compiled code may call: numba then counts no references, which would cost more
@@ -65,10 +75,15 @@ inline_jit = _njit(**LEAN, forceinline=True)  # for what every step of the lanes
 
 def _kept(function: Any) -> Any:
     """A cache on disk that is read without the registries of all that numba could compile; None where numba has another one."""
-    if RUNTIME is None or not hasattr(FUNCTION_CACHE, "_load_overload"):
+    methods = ("_open_for_write", "_load_index", "_load_data")
+    if RUNTIME is None or not hasattr(FUNCTION_CACHE, "_load_overload") or not all(hasattr(CACHE_FILE, m) for m in methods):
         return None
 
     class Kept(FUNCTION_CACHE):  # type: ignore[misc,valid-type]
+        def __init__(self, py_func: Any) -> None:
+            super().__init__(py_func)
+            self._cache_file.__class__ = _with_digests()
+
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             """The code for a signature, or None."""
             RUNTIME.initialize(target_context)  # without which arrays cannot be counted
@@ -76,6 +91,44 @@ def _kept(function: Any) -> Any:
                 return self._load_overload(sig, target_context)
 
     return Kept(function)
+
+
+@cache
+def _with_digests() -> Any:
+    """numba's files of compiled code with the digest of their bytes at their ends, behind what numba reads."""
+
+    class CheckedFile(CACHE_FILE):  # type: ignore[misc,valid-type]
+        @contextmanager
+        def _open_for_write(self, filepath: str) -> Iterator[Any]:
+            content = io.BytesIO()
+            yield content
+            with super()._open_for_write(filepath) as file:
+                file.write(content.getvalue() + hashlib.sha256(content.getvalue()).digest())
+
+        def _load_index(self) -> Any:
+            return super()._load_index() if _sound(self._index_path) else {}
+
+        def _load_data(self, name: str) -> Any:
+            if not _sound(self._data_path(name)):
+                raise OSError("damaged")  # as if it were not there: it is compiled again
+            return super()._load_data(name)
+
+    return CheckedFile
+
+
+def _sound(path: str) -> bool:
+    """Whether a file is there and ends with the digest of its bytes; what is damaged is removed, with a remark."""
+    try:
+        with open(path, "rb") as file:
+            content = file.read()
+    except OSError:
+        return False
+    if hashlib.sha256(content[:-DIGEST]).digest() == content[-DIGEST:]:
+        return True
+    log.warning("%s is damaged; it is compiled again", path)
+    with suppress(OSError):
+        os.unlink(path)
+    return False
 
 
 def _compiled(signature: Any, **options: Any) -> Callable[[Any], Any]:

@@ -99,11 +99,9 @@ def _plan(system: System, labelling: Labelling, grid: Grid, rows: int) -> Plan:
 
 def check_basin_store(path: Path, system: System) -> None:
     """Refuse, before attractors are looked for, what is surely not the store of the basins of this system."""
-    from saltus.sweep import read_plan
+    from saltus.sweep import BEGIN_ANEW, read_plan
 
     kept = read_plan(path)
     if kept["function"] != FUNCTION or kept["arguments"]["system"] != json.loads(json.dumps(system.to_dict())):
-        raise ParameterError(
-            f"{path} is the store of another sweep, or of the basins of another system; name another store", "store"
-        )
-    check_provenance(kept["attrs"], system, str(path))
+        raise ParameterError(f"{path} is the store of another sweep, or of the basins of another system; {BEGIN_ANEW}", "store")
+    check_provenance(kept["attrs"], system, str(path), BEGIN_ANEW)

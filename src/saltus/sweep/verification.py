@@ -1,0 +1,38 @@
+"""Whether the files of a store are what was written: metadata by their digests, chunks by the checksum that each carries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from saltus.sweep import store_files as files
+from saltus.sweep.chunk_grid import ChunkGrid, Index
+
+
+def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, int]) -> Iterator[tuple[str, Index]]:
+    """The (variable, chunk) of every chunk in the store at `path` that is there and cannot be read.
+
+    Args:
+        path: of the store.
+        arrays: Zarr's array of each variable.
+        chunks: how the grid is cut.
+        extra: the number of dimensions of each variable beside the grid's axes.
+    """
+    for name, count in extra.items():
+        for row in range(chunks.grid[0]):
+            rows = chunks.slices((row, *(0 for _ in chunks.grid[1:])))[0]
+            if _can_be_read(arrays[name], (rows,)):
+                continue
+            for index in chunks.indices():
+                there = index[0] == row and files.chunk_file(path, name, index, count).exists()
+                if there and not _can_be_read(arrays[name], chunks.slices(index)):
+                    yield name, index
+
+
+def _can_be_read(array: Any, cut: tuple[slice, ...]) -> bool:
+    try:
+        array[cut]
+    except Exception:  # what is wrong is said by Zarr, by its codecs or by the system
+        return False
+    return True

@@ -1,0 +1,125 @@
+"""Compiled code is run only from a folder of the user's own, and only as it was written; what is damaged is made again."""
+
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from saltus.taylor import cache
+from saltus.taylor.cache import cache_directory, load_module
+
+SOURCE = """
+from numba import types
+from saltus.taylor.private_numba import cached_jit
+
+@cached_jit(types.float64(types.float64))
+def doubled(x):
+    return 2.0 * x
+"""
+SCRIPT = f"""
+import logging; logging.basicConfig(format="%(message)s")
+from saltus.taylor.cache import load_module
+print(load_module("safety", {SOURCE!r}).doubled(3.0))
+"""
+
+
+@pytest.fixture
+def home(tmp_path, monkeypatch):
+    """A cache and a temporary directory of the test's own."""
+    monkeypatch.setenv("SALTUS_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    return tmp_path
+
+
+def run(home):
+    """The printed number and the remarks of a process that loads the module."""
+    environment = os.environ | {"SALTUS_CACHE_DIR": str(home / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    return float(done.stdout), done.stderr
+
+
+def kept(home):
+    return {path: path.read_bytes() for path in (home / "cache").rglob("*") if path.is_file()}
+
+
+def test_a_new_folder_is_the_user_s_alone(home):
+    assert cache_directory() == home / "cache" / "kernels"
+    assert cache_directory().stat().st_mode & 0o777 == 0o700
+
+
+def link(path):
+    (path.parent / "elsewhere").mkdir(mode=0o700)
+    path.symlink_to(path.parent / "elsewhere")
+
+
+def open_to_all(path):
+    path.mkdir()
+    path.chmod(0o777)
+
+
+@pytest.mark.parametrize("prepare", [link, open_to_all])
+@pytest.mark.parametrize("inner", ["", "__pycache__"])
+def test_a_folder_in_which_others_can_plant_code_is_not_used(home, prepare, inner):
+    folder = home / "cache" / "kernels"
+    folder.parent.mkdir()
+    if inner:
+        folder.mkdir(mode=0o700)
+    prepare(folder / inner if inner else folder)
+    assert cache_directory() == home / "temporary" / f"saltus-kernels-{os.getuid()}"
+
+
+def test_a_folder_of_another_user_is_not_used(home, monkeypatch):
+    (home / "cache" / "kernels").mkdir(parents=True, mode=0o700)
+    fallback = home / "temporary" / f"saltus-kernels-{os.getuid() + 1}"
+    fallback.mkdir(mode=0o700)  # planted under the name that would be taken
+    monkeypatch.setattr(os, "getuid", lambda own=os.getuid(): own + 1)
+    cache._own_folder.cache_clear()
+    found = cache_directory()
+    assert found not in (home / "cache" / "kernels", fallback)
+    assert found.stat().st_mode & 0o777 == 0o700
+    assert found == cache_directory()
+    cache._own_folder.cache_clear()
+
+
+def test_another_text_under_the_name_of_a_source_is_not_run(home):
+    name = cache.module_name("safety", SOURCE)
+    path = cache_directory() / f"{name.removeprefix('saltus_')}.py"
+    path.write_text("raise SystemExit('planted')\n")
+    assert load_module("safety", SOURCE).doubled(3.0) == 6.0
+    assert path.read_text() == SOURCE
+    del sys.modules[name]
+
+
+@pytest.mark.parametrize("change", ["flip", "pickle", *(pytest.param(c, marks=pytest.mark.thorough) for c in ("cut", "empty"))])
+def test_damaged_compiled_code_is_made_again_with_a_remark(home, change):
+    """Every file of the cache in turn; a pickle that runs a command when it is read is not read."""
+    assert run(home) == (6.0, "")
+    for path, content in kept(home).items():
+        if change == "flip":
+            flipped = bytearray(content)
+            flipped[len(content) // 2] ^= 1
+            path.write_bytes(flipped)
+        elif change == "pickle":
+            path.write_bytes(pickle.dumps(Planted(str(home / "planted"))))
+        else:
+            path.write_bytes(content[: len(content) // 2] if change == "cut" else b"")
+        value, remarks = run(home)
+        assert value == 6.0
+        assert f"{path} is damaged" in remarks
+    assert run(home) == (6.0, "")
+    assert not (home / "planted").exists()
+
+
+class Planted:
+    """Makes a file when it is unpickled."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return Path.touch, (Path(self.path),)
