@@ -75,9 +75,10 @@ def test_a_folder_in_which_others_can_plant_code_is_not_used(home, prepare, inne
 
 def test_a_folder_of_another_user_is_not_used(home, monkeypatch):
     (home / "cache" / "kernels").mkdir(parents=True, mode=0o700)
-    fallback = home / "temporary" / f"saltus-kernels-{os.getuid() + 1}"
+    other = os.getuid() + 1
+    fallback = home / "temporary" / f"saltus-kernels-{other}"
     fallback.mkdir(mode=0o700)  # planted under the name that would be taken
-    monkeypatch.setattr(os, "getuid", lambda own=os.getuid(): own + 1)
+    monkeypatch.setattr(os, "getuid", lambda: other)
     cache._own_folder.cache_clear()
     found = cache_directory()
     assert found not in (home / "cache" / "kernels", fallback)
