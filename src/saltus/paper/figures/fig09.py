@@ -12,6 +12,7 @@ from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.figures.parallel_panels import each
 from saltus.paper.figures.response_panels import spectrum
 from saltus.paper.measures import chaos_measures, response_measures
+from saltus.paper.measures.validity_measures import validity
 from saltus.plots import (
     DOUBLE_COLUMN,
     draw_limits,
@@ -77,7 +78,8 @@ def zoom(ax: Any, tree: Any, window: tuple[float, float]) -> None:
 def measure(data: Any) -> dict[str, Measured | None]:
     """Every feature that the text names."""
     panels = {AMPLITUDES[name]: tree for name, tree in data.children.items()}
-    return {**response_measures.force_spectra(panels), **chaos_measures.force_spectra(panels)}
+    found = {**response_measures.force_spectra(panels), **chaos_measures.force_spectra(panels)}
+    return {**found, "fig09-validity": validity("Fig. 9", data.children)}
 
 
 FIGURE = paper_figure("fig09", compute=compute, draw=draw, measure=measure)

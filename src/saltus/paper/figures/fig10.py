@@ -14,6 +14,7 @@ from saltus.paper.figures.parallel_panels import each
 from saltus.paper.figures.response_panels import spectrum
 from saltus.paper.measures import chaos_measures, response_measures
 from saltus.paper.measures.spectrum_features import main_branch
+from saltus.paper.measures.validity_measures import validity
 from saltus.plots import DOUBLE_COLUMN, draw_zoom, highest, new_figure, response_legend, styled
 
 AMPLITUDES = {"a": 0.25, "b": 0.5}  # zetahat
@@ -53,7 +54,8 @@ def zoom(ax: Any, tree: Any) -> None:
 def measure(data: Any) -> dict[str, Measured | None]:
     """Every feature that the text names."""
     panels = {AMPLITUDES[name]: tree for name, tree in data.children.items()}
-    return {**response_measures.ground_spectra(panels), **chaos_measures.ground_spectra(panels)}
+    found = {**response_measures.ground_spectra(panels), **chaos_measures.ground_spectra(panels)}
+    return {**found, "fig10-validity": validity("Fig. 10", data.children)}
 
 
 FIGURE = paper_figure("fig10", compute=compute, draw=draw, measure=measure)

@@ -9,6 +9,7 @@ from saltus.paper.claims.claim import Measured
 from saltus.paper.figures import load_diagrams
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.measures import chaos_measures, response_measures
+from saltus.paper.measures.validity_measures import validity
 
 FREQUENCIES = {"a": 0.5, "b": 1.0}  # Omega
 LARGEST = dict.fromkeys(FREQUENCIES.values(), 4.0)  # Hhat: beyond the second region of chaos, or what is left of it
@@ -27,7 +28,8 @@ def draw(data: Any) -> Any:
 def measure(data: Any) -> dict[str, Measured | None]:
     """Every feature that the text names."""
     panels = {FREQUENCIES[name]: tree for name, tree in data.children.items()}
-    return {**response_measures.force_diagrams("fig11", panels), **chaos_measures.force_diagrams(panels)}
+    found = {**response_measures.force_diagrams("fig11", panels), **chaos_measures.force_diagrams(panels)}
+    return {**found, "fig11-validity": validity("Fig. 11", data.children)}
 
 
 FIGURE = paper_figure("fig11", compute=compute, draw=draw, measure=measure)

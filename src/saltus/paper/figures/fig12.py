@@ -9,6 +9,7 @@ from saltus.paper.claims.claim import Measured
 from saltus.paper.figures import load_diagrams
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.measures import chaos_measures, response_measures
+from saltus.paper.measures.validity_measures import validity
 
 FREQUENCIES = {"a": 2.0, "b": 4.0}  # Omega
 LARGEST = {2.0: 5.0, 4.0: 9.0}  # Hhat, by Omega: beyond the first chaos
@@ -27,7 +28,8 @@ def draw(data: Any) -> Any:
 def measure(data: Any) -> dict[str, Measured | None]:
     """Every feature that the text names."""
     panels = {FREQUENCIES[name]: tree for name, tree in data.children.items()}
-    return {**response_measures.force_diagrams("fig12", panels), "fig12-shift": chaos_measures.shifts(panels)}
+    found = {**response_measures.force_diagrams("fig12", panels), "fig12-shift": chaos_measures.shifts(panels)}
+    return {**found, "fig12-validity": validity("Fig. 12", data.children)}
 
 
 FIGURE = paper_figure("fig12", compute=compute, draw=draw, measure=measure)

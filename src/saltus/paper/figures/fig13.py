@@ -14,6 +14,7 @@ from saltus.paper.figures.harmonic_loads import on_ground, under_both, under_for
 from saltus.paper.figures.load_diagrams import LEAST, frame
 from saltus.paper.figures.response_panels import diagram
 from saltus.paper.measures.response_measures import both_diagram
+from saltus.paper.measures.validity_measures import validity
 from saltus.plots import DOUBLE_COLUMN, FAINT, draw_response, highest, lowest, new_figure, response_legend, styled
 
 LARGEST = 3.0  # Hhat
@@ -70,7 +71,7 @@ def draw(data: Any) -> Any:
 
 def measure(data: Any) -> dict[str, Measured]:
     """The loss of symmetry, and what else the text says."""
-    return both_diagram(data["a"], data["mirror"])
+    return {**both_diagram(data["a"], data["mirror"]), "fig13-validity": validity("Fig. 13", {"a": data["a"]})}
 
 
 FIGURE = paper_figure("fig13", compute=compute, draw=draw, measure=measure)

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from saltus.paper.figure_data import with_groups
+from saltus.paper.figures.closed_layer import closed_layer
 from saltus.paper.figures.harmonic_loads import AMPLITUDE, BETA0, FREQUENCY, GROUND_AMPLITUDE, VERTICAL
 from saltus.paper.figures.knots_and_jumps import jumps, knots
 from saltus.studies import bifurcation_diagram, response_spectrum
@@ -36,7 +37,7 @@ def static_scale(system: System) -> float:
 
 
 def _panel(tree: Any, scale: float) -> Any:
-    """A study's tree with the scale of its rotations, in rad, and Hcr among its attributes."""
+    """A study's tree with the reactions of its closed layer, and the scale of its rotations, in rad, and Hcr as attributes."""
     beta0 = math.radians(BETA0)
     tree.attrs = {**tree.attrs, "scale": scale, "critical": float(critical_horizontal(beta0, VERTICAL))}
-    return tree
+    return with_groups(tree, {"closed_layer": closed_layer(tree)})
