@@ -8,7 +8,7 @@ from saltus.paper.figures.figure import PaperFigure
 
 FIGURE_FILES = (
     *("fig01c", "fig02", "fig03", "table1"),
-    *("fig04", "fig05", "fig06", "fig07", "fig08"),
+    *("fig04", "fig05", "fig06", "fig07", "smoothing", "fig08"),
     *("fig09", "fig10", "quasi", "fig11", "fig12", "fig13"),
     *("fig14", "fig15", "appendix"),
 )

@@ -1,7 +1,20 @@
 from .attractors import draw_attractors
 from .basins import draw_basins
 from .chart import chart_legend, data_is_tree, draw_chart, draw_closed_form, draw_lines, draw_stability_chart
-from .conventions import DOUBLE_COLUMN, FAINT, SINGLE_COLUMN, STABLE, UNSTABLE, new_figure, panel_label, style, styled
+from .conventions import (
+    DOUBLE_COLUMN,
+    FAINT,
+    INK,
+    SINGLE_COLUMN,
+    STABLE,
+    STABLE_LINE,
+    UNSTABLE,
+    UNSTABLE_LINE,
+    new_figure,
+    panel_label,
+    style,
+    styled,
+)
 from .diagram import POINTS, draw_diagram
 from .energy_space import draw_space
 from .impact_approach import draw_history, draw_phase
@@ -27,10 +40,13 @@ from .unit_cell import draw_cell, draw_frames, label_deformed, label_heights, la
 __all__ = [
     "DOUBLE_COLUMN",
     "FAINT",
+    "INK",
     "POINTS",
     "SINGLE_COLUMN",
     "STABLE",
+    "STABLE_LINE",
     "UNSTABLE",
+    "UNSTABLE_LINE",
     "chart_legend",
     "data_is_tree",
     "draw_attractors",

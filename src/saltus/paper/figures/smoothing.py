@@ -1,0 +1,327 @@
+"""The smoothed sign of the paper beside the exact equation: its branches and special points, its error and its work over B."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from saltus.branch_lines import smooth_lines
+from saltus.flow import simulate, simulate_many
+from saltus.orbits import continue_orbit, find_orbit, switch_branch
+from saltus.paper.claims.claim import Measured, measured
+from saltus.paper.figure_data import TOLERANCE, dataset, tree
+from saltus.paper.figures.figure import paper_figure
+from saltus.paper.figures.harmonic_loads import BETA0, DAMPING, FREQUENCY, VERTICAL, under_force
+from saltus.plots import DOUBLE_COLUMN, FAINT, INK, STABLE, STABLE_LINE, UNSTABLE_LINE, new_figure, panel_label, styled
+from saltus.systems import System
+
+AMPLITUDE = 0.5  # Hhat
+BOUNDS = (0.2, 1.0)  # Omega
+SHARPNESS = (20.0, 50.0, 100.0, 200.0, 400.0, 1000.0, 2000.0)  # B of the branches
+SHOWN = (50.0, 200.0, 1000.0)  # B that are drawn
+WINDOW = (0.2655, 0.2875)  # Omega of the superharmonic resonance that is drawn, with its grazings
+REGULAR = 0.6  # Omega of an orbit without a special point nearby
+FEATURES = {  # kind and frequency near which a special point is looked for, and how far away it may be
+    "fold of the primary resonance (upper)": ("LP", 0.9088, 1e-3),
+    "fold of the primary resonance (lower)": ("LP", 0.8485, 1e-3),
+    "symmetry breaking": ("BPC", 0.284, 0.006),
+    "fold beside the upper grazing": ("LP", 0.28467, 1e-4),
+    "fold beside the lower grazing": ("LP", 0.268495, 2e-5),
+}
+KNOT = (0.8486, 0.8492)  # Omega between which the amplitude curve crosses itself
+CONFIRMED = 1e-3  # rad by which the amplitudes of a confirmed motion may differ
+WORK = {"periods": 20, "start": 0.3, "sharpness": (50.0, 200.0, 1000.0, 5000.0, 20000.0), "tolerances": (1e-4, 1e-6, 1e-8, 1e-10)}
+LONGEST_STEP = 1e-4  # the paper's Maximum Time Step
+ENOUGH = 400.0  # B from which all stable motions must be confirmed
+SHADES = {50.0: "#e08a1e", 200.0: "#8e5ea2", 1000.0: "#4f8f5b", 5000.0: "#7a7a7a", 20000.0: "#1a1a1a"}  # by B
+MARKERS = {"LP": "o", "BPC": "s", "GR": "D"}
+KIND_NAMES = {"LP": "fold", "BPC": "symmetry breaking", "GR": "grazing"}
+
+
+def compute(count: int = 161) -> Any:
+    """Branches, features, confirmation at `count` frequencies, and the work of an independent integrator (DOP853)."""
+    branches = {sharpness: _branch(sharpness) for sharpness in (None, *SHARPNESS)}
+    groups = {"exact" if b is None else f"B{b:g}": branch.to_xarray() for b, branch in branches.items()}
+    groups |= {"broken": _broken(branches[None]).to_xarray(), "features": _features(branches), "confirmed": _confirmed(branches, count), "work": _work()}
+    return tree(groups, what=f"the smoothed equation beside the exact one, load (i), Hhat = {AMPLITUDE}", tol=TOLERANCE)
+
+
+def _system(sharpness: float | None, frequency: float = REGULAR) -> System:
+    system = under_force(frequency=frequency, amplitude=AMPLITUDE)
+    return system if sharpness is None else system.with_({"model.smoothing": sharpness})
+
+
+def _branch(sharpness: float | None) -> Any:
+    return continue_orbit(find_orbit(_system(sharpness), theta=0.3), FREQUENCY, BOUNDS)
+
+
+def _broken(branch: Any) -> Any:
+    """The branch of unsymmetric orbits that leaves the exact one."""
+    (place,) = (p for p in branch.special if p.kind == "BPC")
+    return switch_branch(place, BOUNDS, both=False)[0]
+
+
+def _features(branches: dict[float | None, Any]) -> Any:
+    """Where each special point and the knot lie, and the amplitude at `REGULAR`, by B; inf for the exact equation."""
+    place = np.array([[_nearest(branch, *feature) for feature in FEATURES.values()] for branch in branches.values()])
+    return dataset(
+        {
+            "frequency": (("sharpness", "feature"), place, "1", "Omega of the special point, NaN if there is none"),
+            "knot": ("sharpness", [_knot(branch) for branch in branches.values()], "1", "Omega at which the curve crosses itself"),
+            "regular": ("sharpness", [branch.at(REGULAR)[0].amplitude for branch in branches.values()], "rad", "max abs(theta)"),
+            "special": ("sharpness", [sum(p.kind in ("LP", "BPC", "GR") for p in b.special) for b in branches.values()], "1", "number"),
+            "complete": ("sharpness", [_is_complete(branch) for branch in branches.values()], "1", "followed over all of the range"),
+        },
+        {"sharpness": ("sharpness", [math.inf if b is None else b for b in branches]), "feature": ("feature", list(FEATURES))},
+        what="special points of the exact and of the smoothed branches",
+    )
+
+
+def _is_complete(branch: Any) -> bool:
+    frequencies = [orbit.frequency for orbit in branch.orbits]
+    return bool(np.allclose((min(frequencies), max(frequencies)), BOUNDS, rtol=0.0, atol=1e-9))
+
+
+def _nearest(branch: Any, kind: str, place: float, within: float) -> float:
+    found = [p.parameter for p in branch.special if p.kind == kind and abs(p.parameter - place) <= within]
+    return min(found, key=lambda value: abs(value - place)) if found else math.nan
+
+
+def _knot(branch: Any) -> float:
+    """Where two stable orbits of the branch have one amplitude."""
+    from scipy.optimize import brentq
+
+    def difference(frequency: float) -> float:
+        one, two = sorted((orbit for orbit in branch.at(frequency) if orbit.stable), key=lambda orbit: orbit.state[1])
+        return float(one.amplitude - two.amplitude)
+
+    return float(brentq(difference, *KNOT, xtol=1e-12))
+
+
+def _confirmed(branches: dict[float | None, Any], count: int) -> Any:
+    """Each smoothed branch's stable orbits at `count` frequencies, and on what the exact motions from their states settle."""
+    frequencies = np.linspace(*BOUNDS, count)[1:-1]
+    rows = [
+        (b, w, orbit.amplitude, *map(float, orbit.state))
+        for b, branch in branches.items()
+        if b is not None
+        for w in frequencies
+        for orbit in branch.at(float(w))
+        if orbit.stable
+    ]
+    sharpness, frequency, amplitude, theta, velocity = np.array(rows, dtype=float).T
+    late = simulate_many(
+        _system(None), theta=theta, velocity=velocity, parameters={FREQUENCY: frequency}, periods=400, sample="extrema", last=12
+    )
+    exact = np.maximum(late["largest_theta"].values, -late["smallest_theta"].values).max(axis=-1)
+    return dataset(
+        {
+            "amplitude": ("motion", amplitude, "rad", "max abs(theta) of the smoothed orbit"),
+            "exact": ("motion", exact, "rad", "max abs(theta) of the exact motion from its state, after 388 periods"),
+            "sharpness": ("motion", sharpness, "1", "B"),
+            "frequency": ("motion", frequency, "1", "Omega"),
+        },
+        what="exact motions from the states of stable smoothed orbits",
+    )
+
+
+def _work() -> Any:
+    """Evaluations of the right-hand side and errors of the state after `WORK` periods by DOP853: smoothed, and with events."""
+    system = _system(None)
+    exact = simulate(system, theta=WORK["start"], velocity=0.0, periods=WORK["periods"], tol=1e-14)
+    runs = {sharpness: [_integrated(sharpness, rtol) for rtol in WORK["tolerances"]] for sharpness in (*WORK["sharpness"], math.inf)}
+    evaluations = np.array([[count for count, _, _ in row] for row in runs.values()])
+    error = np.array([[math.hypot(x - exact.theta, v - exact.velocity) for _, x, v in row] for row in runs.values()])
+    return dataset(
+        {
+            "evaluations": (("sharpness", "rtol"), evaluations, "1", "evaluations of the right-hand side"),
+            "error": (("sharpness", "rtol"), error, "1", "distance of the last state from that of the exact motion"),
+        },
+        {"sharpness": ("sharpness", list(runs)), "rtol": ("rtol", list(WORK["tolerances"]))},
+        what="work and error of DOP853",
+        duration=float(exact.time),
+    )
+
+
+def _integrated(sharpness: float, rtol: float) -> tuple[int, float, float]:
+    """Evaluations, and the last state: on one piece with the smoothed sign, or from impact to impact where B is inf."""
+    from scipy.integrate import solve_ivp
+
+    end, beta0 = WORK["periods"] * 2 * math.pi / REGULAR, math.radians(BETA0)
+    state, time, count = [WORK["start"], 0.0], 0.0, 0
+
+    def rate(t: float, y: np.ndarray, side: float) -> list[float]:
+        sign = side if math.isinf(sharpness) else math.tanh(sharpness * y[0] / 2)
+        size = beta0 + sign * y[0]
+        push = math.sin(size) * AMPLITUDE * math.sin(REGULAR * t) + sign * math.cos(size) * VERTICAL
+        return [y[1], push - DAMPING * y[1] - y[0]]
+
+    def crossing(t: float, y: np.ndarray, side: float) -> float:
+        return y[0] * side + (1e-9 if t - time < 1e-6 else 0.0)  # the start of a piece is no crossing
+
+    crossing.terminal, crossing.direction = True, -1  # type: ignore[attr-defined]
+    side = 1.0
+    while time < end:
+        events = crossing if math.isinf(sharpness) else None
+        piece = solve_ivp(rate, (time, end), state, method="DOP853", rtol=rtol, atol=rtol, events=events, args=(side,))
+        count, time = count + int(piece.nfev), float(piece.t[-1])
+        state, side = [0.0 if piece.status == 1 else float(piece.y[0, -1]), float(piece.y[1, -1])], -side
+    return count, state[0], state[1]
+
+
+@styled
+def draw(data: Any) -> Any:
+    """(a) the spectrum, (b) its superharmonic resonance, (c) errors over B, (d) errors over the work."""
+    figure = new_figure(DOUBLE_COLUMN, 150.0)
+    axes = figure.subplots(2, 2)
+    _draw_branches(axes[0, 0], data, SHOWN[:1])
+    _draw_branches(axes[0, 1], data, SHOWN)
+    _draw_settled(axes[0, 1], data["confirmed"])
+    _draw_errors(axes[1, 0], data["features"])
+    _draw_work(axes[1, 1], data["work"])
+    axes[0, 0].set_xlim(*BOUNDS)
+    axes[0, 0].set_ylim(bottom=0.0)
+    axes[0, 1].set_xlim(*WINDOW)
+    axes[0, 1].set_ylim(0.985, 1.085)
+    axes[0, 1].set_xticks([0.27, 0.275, 0.28, 0.285])
+    for ax, label in zip(axes.flat, "abcd", strict=True):
+        panel_label(ax, label)
+    return figure
+
+
+def _draw_branches(ax: Any, data: Any, shown: tuple[float, ...]) -> None:
+    """The exact branch in the conventions of all spectra, and smoothed ones in shades, dashed where they are unstable."""
+    for name in ("exact", "broken"):
+        _draw_branch(ax, data[name].to_dataset(), {"linewidth": 1.6, "zorder": 3}, "exact" if name == "exact" else None)
+    for b in shown:
+        look = {"color": SHADES[b], "linewidth": 0.9, "zorder": 4}
+        _draw_branch(ax, data[f"B{b:g}"].to_dataset(), look, rf"$\mathcal{{B}}={b:g}$")
+    exact = data["exact"].to_dataset()
+    for kind, marker in MARKERS.items():
+        here = exact["kind"].values == kind
+        ax.plot(
+            exact["special_parameter"].values[here], exact["special_amplitude"].values[here],
+            linestyle="none", marker=marker, markersize=4.0, markerfacecolor="white", color=INK, zorder=5, label=KIND_NAMES[kind],
+        )  # fmt: skip
+    ax.set_xlabel(r"frequency $\Omega$")
+    ax.set_ylabel(r"$\max|\theta|$ (rad)")
+    ax.legend(loc="upper left")
+
+
+def _draw_branch(ax: Any, branch: Any, look: dict[str, Any], label: str | None) -> None:
+    for i, part in enumerate(smooth_lines(branch)):
+        kind = STABLE_LINE if part.stable else UNSTABLE_LINE
+        ax.plot(*part.places.T, **kind | look, label=None if i else label)
+
+
+def _draw_settled(ax: Any, confirmed: Any) -> None:
+    """On what exact motions from the states of smoothed orbits settle, as dots."""
+    here = confirmed["sharpness"].values == SHOWN[0]
+    ax.plot(
+        confirmed["frequency"].values[here], confirmed["exact"].values[here],
+        linestyle="none", marker="o", markersize=2.6, color=STABLE, zorder=4, label=r"exact motion from there",
+    )  # fmt: skip
+    ax.legend(loc="upper left", ncols=2, columnspacing=1.0)
+
+
+def _draw_errors(ax: Any, features: Any) -> None:
+    """How far each special point, the knot and an ordinary amplitude are from the exact ones."""
+    sharpness, looks = features["sharpness"].values[1:], iter(("o-", "s-", "^-", "v-", "D-", "x--", "+--"))
+    rows = {str(name): features["frequency"].values[:, i] for i, name in enumerate(features["feature"].values)}
+    rows |= {"knot of the primary resonance": features["knot"].values, rf"$\max|\theta|$ at $\Omega={REGULAR:g}$": features["regular"].values}
+    for name, values in rows.items():
+        ax.loglog(sharpness, abs(values[1:] - values[0]), next(looks), markersize=3.0, linewidth=0.8, markerfacecolor="white", label=name)
+    guide = np.array([40.0, 1000.0])
+    ax.loglog(guide, 3e-4 / guide**2, color=FAINT, linewidth=0.8, zorder=1)
+    ax.annotate(r"$\mathcal{B}^{-2}$", (guide[0], 3e-4 / guide[0] ** 2), textcoords="offset points", xytext=(-14, -2), color=INK)
+    ax.set_xlabel(r"$\mathcal{B}$")
+    ax.set_ylabel("distance from the exact value")
+    ax.set_ylim(1e-15, 0.1)
+    ax.legend(loc="lower left", fontsize=7.0)
+
+
+def _draw_work(ax: Any, work: Any) -> None:
+    """Errors over evaluations: one line for each B, and the exact equation from impact to impact."""
+    for sharpness, evaluations, error in zip(work["sharpness"].values, work["evaluations"].values, work["error"].values, strict=True):
+        exact = math.isinf(sharpness)
+        label = "exact, impact by impact" if exact else rf"$\mathcal{{B}}={sharpness:g}$"
+        colour = STABLE if exact else SHADES[sharpness]
+        ax.loglog(evaluations, error, "o-", color=colour, markersize=3.0, linewidth=1.4 if exact else 0.9, label=label)
+    ax.set_xlabel("evaluations of the right-hand side in 20 periods")
+    ax.set_ylabel("error of the last state")
+    ax.set_ylim(top=0.5)
+    ax.legend(loc="upper right", ncols=2, columnspacing=1.0)
+
+
+def measure(data: Any) -> dict[str, Measured]:
+    """What the paper says of the smoothing, and what it changes."""
+    return {**_accuracy(data["features"], data["confirmed"]), **_kinds(data), **_cost(data["work"])}
+
+
+def _accuracy(features: Any, confirmed: Any) -> dict[str, Measured]:
+    """Whether a B that is large enough gives the limit cycles, and stable motions that the exact equation confirms."""
+    sharpness = features["sharpness"].values
+    away = abs(confirmed["amplitude"].values - confirmed["exact"].values)
+    rows = []
+    for b in sharpness[1:]:
+        here = confirmed["sharpness"].values == b
+        wrong = here & (away > CONFIRMED)
+        low, high = confirmed["frequency"].values[wrong].min(initial=9.0), confirmed["frequency"].values[wrong].max(initial=0.0)
+        places = [{"low": float(low), "high": float(high)}] if wrong.any() else []
+        rows.append({"b": float(b), "orbits": int(here.sum()), "wrong": int(wrong.sum()), "places": places})
+    large = [row for row in rows if row["b"] >= ENOUGH]
+    error = abs(features["regular"].values[1:] - features["regular"].values[0])
+    order = -float(np.polyfit(np.log(sharpness[-3:]), np.log(error[-3:]), 1)[0])
+    return {
+        "smoothing-limit-cycle": measured(
+            bool(error[-1] < 1e-6 and features["complete"].values.all()),
+            errors=[{"b": float(b), "error": float(e)} for b, e in zip(sharpness[1:], error, strict=True)], regular=REGULAR,
+        ),
+        "smoothing-confirmed": measured(sum(row["wrong"] for row in large) == 0 and len(large) > 1, panels=rows, within=CONFIRMED, enough=ENOUGH),
+        "smoothing-order": measured(abs(order - 2) < 0.1, order=order),
+    }  # fmt: skip
+
+
+def _kinds(data: Any) -> dict[str, Measured]:
+    """Where the smoothed branches have other special points than the exact one."""
+    features = data["features"]
+    exact, *smoothed = features["special"].values.tolist()
+    lost = np.isnan(features["frequency"].values)
+    knot = abs(features["knot"].values[1:] - features["knot"].values[0])
+    folds = abs(features["frequency"].values[1:, :2] - features["frequency"].values[0, :2]).max(axis=1)
+    rows = [
+        {"b": float(b), "special": int(n), "lost": int(row.sum())}
+        for b, n, row in zip(features["sharpness"].values[1:], smoothed, lost[1:], strict=True)
+    ]
+    few = np.isin(features["sharpness"].values[1:], (50.0, 100.0))
+    return {
+        "smoothing-grazings": measured(
+            not lost[0].any() and all(n != exact for n in smoothed) and bool((lost[1:3].sum(axis=1) == 3).all()), exact=exact, panels=rows
+        ),
+        "smoothing-primary": measured(
+            bool(folds[few].max() < 1e-5 and knot[few].max() < 1e-5), knot=float(knot[few].max()), folds=float(folds[few].max())
+        ),
+    }
+
+
+def _cost(work: Any) -> dict[str, Measured]:
+    """The evaluations that each way needs for an error of 1e-8 and what the paper's longest step would take."""
+    exact, smoothed = (_needed(work, b, 1e-7) for b in (math.inf, 5000.0))
+    steps = float(work.attrs["duration"]) / LONGEST_STEP
+    return {
+        "smoothing-work": measured(
+            exact < smoothed < 6 * steps, exact=exact, smoothed=smoothed, ratio=smoothed / exact, paper=6 * steps, step=LONGEST_STEP,
+        )
+    }  # fmt: skip
+
+
+def _needed(work: Any, sharpness: float, error: float) -> float:
+    """The fewest evaluations that keep the error."""
+    row = work.sel(sharpness=sharpness)
+    kept = row["error"].values <= error
+    return float(row["evaluations"].values[kept].astype(float).min(initial=math.inf))
+
+
+FIGURE = paper_figure("smoothing", compute=compute, draw=draw, measure=measure)
