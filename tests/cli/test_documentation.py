@@ -57,7 +57,9 @@ def test_the_impact_laws_are_all_named():
 # --- Python ------------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/attractors.md", "docs/ensembles.md", "docs/models.md", "docs/orbits.md", "docs/smoothing.md"])
+@pytest.mark.parametrize(
+    "name", ["README.md", "docs/attractors.md", "docs/ensembles.md", "docs/models.md", "docs/orbits.md", "docs/smoothing.md"]
+)
 def test_every_snippet_runs(name, monkeypatch):
     text = (ROOT / name).read_text(encoding="utf-8")
     code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)).replace(", 200)", ", 12)")  # coarser grids

@@ -32,7 +32,9 @@ def settled(frequency, sharpness, state, periods=60):
         return math.tanh(sharpness * theta / 2)
 
     period = 2 * math.pi / frequency
-    run = solve_ivp(rate, (0, periods * period), state, args=(frequency, sign), method="DOP853", rtol=1e-9, atol=1e-11, max_step=0.1)
+    run = solve_ivp(
+        rate, (0, periods * period), state, args=(frequency, sign), method="DOP853", rtol=1e-9, atol=1e-11, max_step=0.1
+    )
     late = run.t > (periods - 3) * period
     return float(abs(run.y[0][late]).max())
 

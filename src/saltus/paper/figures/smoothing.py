@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from saltus.branch_lines import smooth_lines
 from saltus.flow import simulate, simulate_many
 from saltus.orbits import continue_orbit, find_orbit, switch_branch
 from saltus.paper.claims.claim import Measured, measured
-from saltus.paper.figure_data import TOLERANCE, dataset, tree
+from saltus.paper.figure_data import dataset, joined
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.harmonic_loads import BETA0, DAMPING, FREQUENCY, VERTICAL, under_force
 from saltus.plots import DOUBLE_COLUMN, FAINT, INK, STABLE, STABLE_LINE, UNSTABLE_LINE, new_figure, panel_label, styled
@@ -32,7 +34,6 @@ FEATURES = {  # kind and frequency near which a special point is looked for, and
 }
 KNOT = (0.8486, 0.8492)  # Omega between which the amplitude curve crosses itself
 CONFIRMED = 1e-3  # rad by which the amplitudes of a confirmed motion may differ
-WORK = {"periods": 20, "start": 0.3, "sharpness": (50.0, 200.0, 1000.0, 5000.0, 20000.0), "tolerances": (1e-4, 1e-6, 1e-8, 1e-10)}
 LONGEST_STEP = 1e-4  # the paper's Maximum Time Step
 ENOUGH = 400.0  # B from which all stable motions must be confirmed
 SHADES = {50.0: "#e08a1e", 200.0: "#8e5ea2", 1000.0: "#4f8f5b", 5000.0: "#7a7a7a", 20000.0: "#1a1a1a"}  # by B
@@ -40,12 +41,37 @@ MARKERS = {"LP": "o", "BPC": "s", "GR": "D"}
 KIND_NAMES = {"LP": "fold", "BPC": "symmetry breaking", "GR": "grazing"}
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkSettings:
+    """The motion on which the work of an integrator is counted, and how."""
+
+    periods: int = 20  # The number of forcing periods: enough impacts for their number not to matter.
+    start: float = 0.3  # The angle in rad from which the motion starts at rest.
+    sharpness: tuple[float, ...] = (
+        50.0,
+        200.0,
+        1000.0,
+        5000.0,
+        20000.0,
+    )  # The values of B, to where 1/B is below the errors shown.
+    tolerances: tuple[float, ...] = (1e-4, 1e-6, 1e-8, 1e-10)  # The tolerances of the integrator, from rough to near its best.
+
+
+WORK = WorkSettings()
+
+
 def compute(count: int = 161) -> Any:
     """Branches, features, confirmation at `count` frequencies, and the work of an independent integrator (DOP853)."""
     branches = {sharpness: _branch(sharpness) for sharpness in (None, *SHARPNESS)}
     groups = {"exact" if b is None else f"B{b:g}": branch.to_xarray() for b, branch in branches.items()}
-    groups |= {"broken": _broken(branches[None]).to_xarray(), "features": _features(branches), "confirmed": _confirmed(branches, count), "work": _work()}
-    return tree(groups, what=f"the smoothed equation beside the exact one, load (i), Hhat = {AMPLITUDE}", tol=TOLERANCE)
+    groups |= {
+        "broken": _broken(branches[None]).to_xarray(),
+        "features": _features(branches),
+        "confirmed": _confirmed(branches, count),
+        "work": _work(),
+    }
+    parts = {name: xr.DataTree(group) for name, group in groups.items()}
+    return joined(parts, what=f"the smoothed equation beside the exact one, load (i), Hhat = {AMPLITUDE}")
 
 
 def _system(sharpness: float | None, frequency: float = REGULAR) -> System:
@@ -69,10 +95,25 @@ def _features(branches: dict[float | None, Any]) -> Any:
     return dataset(
         {
             "frequency": (("sharpness", "feature"), place, "1", "Omega of the special point, NaN if there is none"),
-            "knot": ("sharpness", [_knot(branch) for branch in branches.values()], "1", "Omega at which the curve crosses itself"),
+            "knot": (
+                "sharpness",
+                [_knot(branch) for branch in branches.values()],
+                "1",
+                "Omega at which the curve crosses itself",
+            ),
             "regular": ("sharpness", [branch.at(REGULAR)[0].amplitude for branch in branches.values()], "rad", "max abs(theta)"),
-            "special": ("sharpness", [sum(p.kind in ("LP", "BPC", "GR") for p in b.special) for b in branches.values()], "1", "number"),
-            "complete": ("sharpness", [_is_complete(branch) for branch in branches.values()], "1", "followed over all of the range"),
+            "special": (
+                "sharpness",
+                [sum(p.kind in ("LP", "BPC", "GR") for p in b.special) for b in branches.values()],
+                "1",
+                "number",
+            ),
+            "complete": (
+                "sharpness",
+                [_is_complete(branch) for branch in branches.values()],
+                "1",
+                "followed over all of the range",
+            ),
         },
         {"sharpness": ("sharpness", [math.inf if b is None else b for b in branches]), "feature": ("feature", list(FEATURES))},
         what="special points of the exact and of the smoothed branches",
@@ -130,8 +171,8 @@ def _confirmed(branches: dict[float | None, Any], count: int) -> Any:
 def _work() -> Any:
     """Evaluations of the right-hand side and errors of the state after `WORK` periods by DOP853: smoothed, and with events."""
     system = _system(None)
-    exact = simulate(system, theta=WORK["start"], velocity=0.0, periods=WORK["periods"], tol=1e-14)
-    runs = {sharpness: [_integrated(sharpness, rtol) for rtol in WORK["tolerances"]] for sharpness in (*WORK["sharpness"], math.inf)}
+    exact = simulate(system, theta=WORK.start, velocity=0.0, periods=WORK.periods, tol=1e-14)
+    runs = {sharpness: [_integrated(sharpness, rtol) for rtol in WORK.tolerances] for sharpness in (*WORK.sharpness, math.inf)}
     evaluations = np.array([[count for count, _, _ in row] for row in runs.values()])
     error = np.array([[math.hypot(x - exact.theta, v - exact.velocity) for _, x, v in row] for row in runs.values()])
     return dataset(
@@ -139,7 +180,7 @@ def _work() -> Any:
             "evaluations": (("sharpness", "rtol"), evaluations, "1", "evaluations of the right-hand side"),
             "error": (("sharpness", "rtol"), error, "1", "distance of the last state from that of the exact motion"),
         },
-        {"sharpness": ("sharpness", list(runs)), "rtol": ("rtol", list(WORK["tolerances"]))},
+        {"sharpness": ("sharpness", list(runs)), "rtol": ("rtol", list(WORK.tolerances))},
         what="work and error of DOP853",
         duration=float(exact.time),
     )
@@ -149,8 +190,8 @@ def _integrated(sharpness: float, rtol: float) -> tuple[int, float, float]:
     """Evaluations, and the last state: on one piece with the smoothed sign, or from impact to impact where B is inf."""
     from scipy.integrate import solve_ivp
 
-    end, beta0 = WORK["periods"] * 2 * math.pi / REGULAR, math.radians(BETA0)
-    state, time, count = [WORK["start"], 0.0], 0.0, 0
+    end, beta0 = WORK.periods * 2 * math.pi / REGULAR, math.radians(BETA0)
+    state, time, count = [WORK.start, 0.0], 0.0, 0
 
     def rate(t: float, y: np.ndarray, side: float) -> list[float]:
         sign = side if math.isinf(sharpness) else math.tanh(sharpness * y[0] / 2)
@@ -230,9 +271,20 @@ def _draw_errors(ax: Any, features: Any) -> None:
     """How far each special point, the knot and an ordinary amplitude are from the exact ones."""
     sharpness, looks = features["sharpness"].values[1:], iter(("o-", "s-", "^-", "v-", "D-", "x--", "+--"))
     rows = {str(name): features["frequency"].values[:, i] for i, name in enumerate(features["feature"].values)}
-    rows |= {"knot of the primary resonance": features["knot"].values, rf"$\max|\theta|$ at $\Omega={REGULAR:g}$": features["regular"].values}
+    rows |= {
+        "knot of the primary resonance": features["knot"].values,
+        rf"$\max|\theta|$ at $\Omega={REGULAR:g}$": features["regular"].values,
+    }
     for name, values in rows.items():
-        ax.loglog(sharpness, abs(values[1:] - values[0]), next(looks), markersize=3.0, linewidth=0.8, markerfacecolor="white", label=name)
+        ax.loglog(
+            sharpness,
+            abs(values[1:] - values[0]),
+            next(looks),
+            markersize=3.0,
+            linewidth=0.8,
+            markerfacecolor="white",
+            label=name,
+        )
     guide = np.array([40.0, 1000.0])
     ax.loglog(guide, 3e-4 / guide**2, color=FAINT, linewidth=0.8, zorder=1)
     ax.annotate(r"$\mathcal{B}^{-2}$", (guide[0], 3e-4 / guide[0] ** 2), textcoords="offset points", xytext=(-14, -2), color=INK)
@@ -244,7 +296,9 @@ def _draw_errors(ax: Any, features: Any) -> None:
 
 def _draw_work(ax: Any, work: Any) -> None:
     """Errors over evaluations: one line for each B, and the exact equation from impact to impact."""
-    for sharpness, evaluations, error in zip(work["sharpness"].values, work["evaluations"].values, work["error"].values, strict=True):
+    for sharpness, evaluations, error in zip(
+        work["sharpness"].values, work["evaluations"].values, work["error"].values, strict=True
+    ):
         exact = math.isinf(sharpness)
         label = "exact, impact by impact" if exact else rf"$\mathcal{{B}}={sharpness:g}$"
         colour = STABLE if exact else SHADES[sharpness]
@@ -264,7 +318,7 @@ def _accuracy(features: Any, confirmed: Any) -> dict[str, Measured]:
     """Whether a B that is large enough gives the limit cycles, and stable motions that the exact equation confirms."""
     sharpness = features["sharpness"].values
     away = abs(confirmed["amplitude"].values - confirmed["exact"].values)
-    rows = []
+    rows: list[dict[str, Any]] = []
     for b in sharpness[1:]:
         here = confirmed["sharpness"].values == b
         wrong = here & (away > CONFIRMED)
@@ -274,14 +328,15 @@ def _accuracy(features: Any, confirmed: Any) -> dict[str, Measured]:
     large = [row for row in rows if row["b"] >= ENOUGH]
     error = abs(features["regular"].values[1:] - features["regular"].values[0])
     order = -float(np.polyfit(np.log(sharpness[-3:]), np.log(error[-3:]), 1)[0])
+    errors = [{"b": float(b), "error": float(e)} for b, e in zip(sharpness[1:], error, strict=True)]
+    confirmed_all = len(large) > 1 and not any(row["wrong"] for row in large)
     return {
         "smoothing-limit-cycle": measured(
-            bool(error[-1] < 1e-6 and features["complete"].values.all()),
-            errors=[{"b": float(b), "error": float(e)} for b, e in zip(sharpness[1:], error, strict=True)], regular=REGULAR,
+            bool(error[-1] < 1e-6 and features["complete"].values.all()), errors=errors, regular=REGULAR
         ),
-        "smoothing-confirmed": measured(sum(row["wrong"] for row in large) == 0 and len(large) > 1, panels=rows, within=CONFIRMED, enough=ENOUGH),
+        "smoothing-confirmed": measured(confirmed_all, panels=rows, within=CONFIRMED, enough=ENOUGH),
         "smoothing-order": measured(abs(order - 2) < 0.1, order=order),
-    }  # fmt: skip
+    }
 
 
 def _kinds(data: Any) -> dict[str, Measured]:
@@ -298,7 +353,9 @@ def _kinds(data: Any) -> dict[str, Measured]:
     few = np.isin(features["sharpness"].values[1:], (50.0, 100.0))
     return {
         "smoothing-grazings": measured(
-            not lost[0].any() and all(n != exact for n in smoothed) and bool((lost[1:3].sum(axis=1) == 3).all()), exact=exact, panels=rows
+            not lost[0].any() and all(n != exact for n in smoothed) and bool((lost[1:3].sum(axis=1) == 3).all()),
+            exact=exact,
+            panels=rows,
         ),
         "smoothing-primary": measured(
             bool(folds[few].max() < 1e-5 and knot[few].max() < 1e-5), knot=float(knot[few].max()), folds=float(folds[few].max())
@@ -310,11 +367,8 @@ def _cost(work: Any) -> dict[str, Measured]:
     """The evaluations that each way needs for an error of 1e-8 and what the paper's longest step would take."""
     exact, smoothed = (_needed(work, b, 1e-7) for b in (math.inf, 5000.0))
     steps = float(work.attrs["duration"]) / LONGEST_STEP
-    return {
-        "smoothing-work": measured(
-            exact < smoothed < 6 * steps, exact=exact, smoothed=smoothed, ratio=smoothed / exact, paper=6 * steps, step=LONGEST_STEP,
-        )
-    }  # fmt: skip
+    numbers = {"exact": exact, "smoothed": smoothed, "ratio": smoothed / exact, "paper": 6 * steps, "step": LONGEST_STEP}
+    return {"smoothing-work": measured(exact < smoothed < 6 * steps, **numbers)}
 
 
 def _needed(work: Any, sharpness: float, error: float) -> float:
