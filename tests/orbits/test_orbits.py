@@ -7,7 +7,8 @@ import pytest
 from orbit_cases import FORCED, orbit_of
 from shared_systems import forced, walled
 
-from saltus import find_orbit, sensitivities, simulate
+from saltus import Harmonic, Load, Metainterface, System, find_orbit, sensitivities, simulate
+from saltus.orbits import is_symmetric
 
 IMPACTS = {"six impacts": 6, "ten impacts": 10, "around a deformed equilibrium": 0, "wall, free": 0, "wall, one impact": 1,
            "wall, one impact in two periods": 1, "a user's smooth model": 0, "smoothed": 0}  # fmt: skip
@@ -180,3 +181,14 @@ def test_walls_at_other_places_only_shift_what_moves():
     assert np.abs(first.impact_times - second.impact_times).max() < 1e-12
     assert first.highest + 1.2 == pytest.approx(second.highest, abs=1e-12)
     assert first.lowest + 1.2 == pytest.approx(second.lowest, abs=1e-12)
+
+
+def test_symmetry_half_a_period_later_is_that_of_every_harmonic():
+    """A harmonic of order 20 is 0 at all twentieths of a period; only odd orders change their sign in half a period."""
+    for order in range(1, 41):
+        load = Load(frequency=1.0, horizontal=Harmonic(0.3) + Harmonic(0.1, order=order), vertical=Harmonic(-0.5, order=2))
+        assert is_symmetric(System(model=Metainterface(beta0=1.4), load=load)) == (order % 2 == 1)
+    shifted = Load(frequency=1.0, horizontal=Harmonic(0.3, mean=1e-9), vertical=-0.5)
+    assert not is_symmetric(System(model=Metainterface(beta0=1.4), load=shifted))
+    shaken = Load(frequency=1.0, ground_horizontal=Harmonic(0.3, mean=2.0), vertical=-0.5)  # a constant shift moves nothing
+    assert is_symmetric(System(model=Metainterface(beta0=1.4), load=shaken))

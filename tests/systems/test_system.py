@@ -28,6 +28,7 @@ from saltus.systems import (
     WallOscillator,
     register,
 )
+from saltus.systems.signals import scaled
 
 finite = st.floats(-1e6, 1e6)
 positive = st.floats(1e-6, 1e6)
@@ -297,3 +298,19 @@ def test_a_model_says_what_it_means_to_pass_each_of_its_margins(model):
     assert set(model.margin_kinds) == set(margins)
     assert model.margin_kind("one that a user wrote") is MarginKind.ASSUMPTION
     assert set(model.stops) <= {name for name in margins if model.margin_kind(name) is MarginKind.LIMIT}
+
+
+class Lopsided(Metainterface):
+    """A model that states a mirror symmetry whatever its layers are."""
+
+    def mirror(self, load):
+        reversed_ = {n: scaled(s, -1.0) if n.endswith("horizontal") else s for n, s in load.channels.items()}
+        return Load(frequency=load.frequency, **reversed_)
+
+
+@pytest.mark.parametrize("numbers", [{"stiffness_ratio": 2.0}, {"mass_ratio": 0.1}, {"damping": 0.1, "dissipation_ratio": 3.0}])
+def test_a_mirror_that_is_no_symmetry_is_refused(numbers):
+    load = Load(frequency=1.0, horizontal=Harmonic(0.3), vertical=-0.5)
+    assert System(model=Lopsided(beta0=1.4), load=load).mirrored() is not None
+    with pytest.raises(ParameterError, match="mirror is no symmetry"):
+        System(model=Lopsided(beta0=1.4, **numbers), load=load).mirrored()

@@ -104,6 +104,9 @@ class Model:
     def mirror(self, load: Any) -> Any:
         """The load under which -theta(t) is a motion wherever theta(t) is one under `load`, or None without such a symmetry.
 
+        a(t, -theta, -theta', -side, mirrored load) = -a(t, theta, theta', side, load), and the reset alike; a state at which that
+        does not hold is refused.
+
         The mirror turns the signs of all coordinates, velocities and sides; it does not shift the time.
         """
         return None
