@@ -155,7 +155,7 @@ def test_the_options_of_a_diagram_are_all_there():
 def test_the_nodes_and_variables_of_a_diagram_are_all_there():
     from saltus.studies import response_spectrum
 
-    tree = response_spectrum(forced(), bounds=(0.8, 1.0), max_period=1, values=[0.9], starts=8, bands=2)
+    tree = response_spectrum(forced(), bounds=(0.8, 1.0), max_period=1, values=[0.9], starts=8)
     _, rest = orbits_section("Spectra and diagrams").split("| node | |")
     nodes, variables = rest.split("| variable of a branch |")
     assert "branch_000" in tree

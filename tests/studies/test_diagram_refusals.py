@@ -15,7 +15,7 @@ from study_cases import AMPLITUDE, FREQUENCY
 
 from saltus.errors import ParameterError
 from saltus.studies import bifurcation_diagram, response_spectrum
-from saltus.studies.diagram import diagram as spectrum
+from saltus.studies.diagram.diagram_search import DiagramSearch
 from saltus.systems import Load, Metainterface, System
 
 UNFORCED = System(model=Metainterface(beta0=1.4), load=Load(vertical=-0.5))
@@ -41,7 +41,11 @@ GOOD = {"path": FREQUENCY, "bounds": (0.5, 1.5)}
         ({"max_period": 2.5}, "max_period must be a whole number"),
         ({"max_period": "six"}, "max_period must be a number"),
         ({"starts": 0}, "starts must lie in"),
-        ({"starts": None}, "starts must be a number"),
+        ({"starts": "many"}, "starts must be a number"),
+        ({"effort": "standart"}, "did you mean 'standard'"),
+        ({"effort": 3}, "effort knows no"),
+        ({"bands": 121}, "bands must be"),
+        ({"switch": "yes"}, "switch must be"),
         ({"seed": -1}, "seed must lie in"),
         ({"repelling": -1}, "repelling must lie in"),
         ({"step": 0.0}, "step must lie in"),
@@ -59,7 +63,7 @@ GOOD = {"path": FREQUENCY, "bounds": (0.5, 1.5)}
     ],
 )
 def test_a_diagram_without_meaning_is_refused_in_a_sentence(changes, sentence, monkeypatch):
-    monkeypatch.setattr(spectrum, "search_orbits", lambda *args, **options: pytest.fail("it began to compute"))
+    monkeypatch.setattr(DiagramSearch, "simulate", lambda *args, **options: pytest.fail("it began to compute"))
     with pytest.raises(ParameterError, match=sentence) as refusal:
         response_spectrum(forced(1.0), **{**GOOD, **changes})
     assert "\n" not in str(refusal.value)

@@ -133,6 +133,15 @@ def test_every_motion_of_the_search_is_accounted_for(spectrum):
     assert (ended < 16).all()
     assert spectrum.attrs["left"] >= 0
     assert spectrum["bands"].sizes["band"] == 0
+    assert spectrum["unplaced"].sizes["dot"] == 0
+    assert spectrum["attractors"]["placed"].values.all()
+
+
+def test_what_share_of_the_states_is_missed_is_estimated_by_a_sample(spectrum):
+    attrs = spectrum.attrs
+    assert attrs["missed_share"] == attrs["missed"] / attrs["sample"]
+    assert attrs["missed_low"] <= attrs["missed_share"] <= attrs["missed_high"]
+    assert 0.0 < attrs["missed_high"] - attrs["missed_low"] < 0.1
 
 
 # --- chance, and what is asked -------------------------------------------------------------------------------------------------

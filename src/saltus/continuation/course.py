@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from saltus.continuation.end import CurveEnd, End
+from saltus.continuation.step_length import STEPS
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,15 +32,29 @@ class Course:
         """Whether it is a loop."""
         return self.ends[0].reason is CurveEnd.CLOSED
 
+    def is_joined(self, before: int) -> bool:
+        """Whether the point of this number and the next are solutions of the same equations, in the same order of unknowns.
+
+        A loop's last point is its first one again, with the equations with which it was begun.
+        """
+        a, b = self.points[before], self.points[before + 1]
+        if a.curve.joins(b.curve):
+            return True
+        closing = self.closed and before == len(self.points) - 2 and a.place.size == b.place.size
+        return bool(closing and a.curve.norm(b.place - a.place) <= 2.0 * STEPS.longest)
+
     def solved_at(self, value: float, index: int = -1) -> list[Any]:
         """All its points at a value of one number of their places, solved there."""
-        found = []
-        for a, b in pairwise(self.points):
-            start, end = a.place[index], b.place[index]
-            if start == end or (start - value) * (end - value) > 0.0 or end == value or not a.curve.joins(b.curve):
-                continue
-            guess = a.place + (value - start) / (end - start) * (b.place - a.place)
-            guess[index] = value
-            point = a.curve.solve_at(guess, a.tangent, index)
-            found += [] if point is None else [point]
+        found = [point for i in range(len(self.points) - 1) for point in self.solved_between(i, value, index)]
         return found + [point for point in self.points[-1:] if point.place[index] == value]
+
+    def solved_between(self, before: int, value: float, index: int = -1) -> list[Any]:
+        """The point at a value of one number of the places, between the point of this number and the next, or none."""
+        a, b = self.points[before], self.points[before + 1]
+        start, end = a.place[index], b.place[index]
+        if start == end or (start - value) * (end - value) > 0.0 or end == value or not self.is_joined(before):
+            return []
+        guess = a.place + (value - start) / (end - start) * (b.place - a.place)
+        guess[index] = value
+        point = a.curve.solve_at(guess, a.tangent, index)
+        return [] if point is None else [point]

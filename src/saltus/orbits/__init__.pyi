@@ -2,18 +2,19 @@ from .branch import Branch
 from .branch_continuation import STEP, continue_orbit, follow_stable
 from .find import find_orbit, orbit_from
 from .from_dataset import orbits_of
+from .near_returns import orbits_near_returns, solved_near
 from .newton import solve
 from .orbit import PeriodicOrbit
 from .problem import Problem
 from .resting import RestingOrbit
-from .search import EVEN, Search, initial_states, same_orbit, search_orbits, within_window
+from .search import EVEN, Search, initial_states, search_orbits, within_window
 from .signature import Signature
 from .special_curve import SpecialCurve
 from .special_curve_continuation import continue_special
 from .special_point import OrbitEnd, SpecialKind, SpecialPoint
 from .switching import Cascade, doubling_cascade, switch_branch
-from .symmetry import is_symmetric
-from .verify import defects
+from .symmetry import is_symmetric, keeps_symmetry
+from .verify import defects, same_orbit
 
 __all__ = [
     "EVEN",
@@ -37,11 +38,14 @@ __all__ = [
     "follow_stable",
     "initial_states",
     "is_symmetric",
+    "keeps_symmetry",
     "orbit_from",
+    "orbits_near_returns",
     "orbits_of",
     "same_orbit",
     "search_orbits",
     "solve",
+    "solved_near",
     "switch_branch",
     "within_window",
 ]

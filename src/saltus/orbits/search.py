@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import Rectangle, Window, check_count, check_path, check_window
-from saltus.errors import MotionError, ParameterError
-from saltus.flow import RECURRENCE, Recurrence, find_recurrence
-from saltus.orbits.find import orbit_from
+from saltus.errors import ParameterError
+from saltus.flow import Recurrence, find_recurrence
+from saltus.orbits.near_returns import orbits_near_returns, solved_near
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.problem import Problem
-from saltus.orbits.signature import Signature
+from saltus.orbits.verify import same_orbit
 from saltus.progress import Progress, silent
 from saltus.systems import System, check_system
 
@@ -26,12 +25,8 @@ class SearchSettings:
     settling: int = 200  # Number of forcing periods that motions are given to settle.
     # Number of forcing periods at the beginning of each motion, and at its end, in which near returns are looked for.
     transient: int = 24
-    near: float = 0.15  # Newton's method is tried for an orbit that repels from returns nearer than this.
-    guesses: int = 12  # The largest number of such returns, for each period: the nearest ones.
-    apart: float = 0.05  # The least distance between two of these returns.
-    still: float = 1e-6  # A motion that stays this near to the contact is at rest, and an orbit no larger than this is rest.
+    still: float = 1e-6  # A motion that stays this near to the contact is at rest.
     same_state: float = 1e-5  # A settled motion whose state is this near to a known one is on the same orbit.
-    same_orbit: float = 1e-6  # Orbits are the same whose extrema and speeds of impact agree to this.
 
 
 SETTINGS = SearchSettings()
@@ -108,16 +103,23 @@ def search_orbits(
         raise ParameterError(f"values must be numbers of {path} at which to search, got {grid.tolist()}", "values")
     early, late = _follow(system, path, grid, initial_states(system, starts, area, seed), max_period)
     found: list[PeriodicOrbit] = []
+    known: list[np.ndarray] = []
+    returning = np.zeros((len(grid), starts), dtype=bool)
     unsettled, at_rest = np.zeros(len(grid), dtype=int), np.zeros(len(grid), dtype=int)
     settled: list[tuple[float, int, float, float]] = []
     for i, value in enumerate(grid):
-        base = Problem(system.with_({path: float(value)}), Signature((), 1), (path,))
         moving, at_rest[i] = _moving(system, late, np.arange(i * starts, (i + 1) * starts))
-        here, seen, unsettled[i] = _attracting(base, late.only(moving))
+        here, seen, attracting, unsettled[i] = _attracting(system.with_({path: float(value)}), path, late.only(moving))
         settled += [(float(value), *row) for row in seen]
-        states = np.concatenate([early.states[moving], late.states[moving]])
-        found += here + _repelling(base, states, max_period if repelling is None else repelling, here)
-        progress((i + 1) / len(grid), "searching")
+        found, known = found + here, [*known, attracting]
+        returning[i, moving - i * starts] = True
+        progress(0.5 * (i + 1) / len(grid), "searching")
+    shape = (len(grid), starts, -1, 2)
+    states = np.concatenate([early.states.reshape(shape), late.states.reshape(shape)], axis=1)
+    states[~np.tile(returning, (1, 2))] = np.nan
+    near = orbits_near_returns(system, path, grid, states, known, max_period if repelling is None else repelling)
+    found = sorted(found + near, key=lambda orbit: float(orbit.solution.values[0]))
+    progress(1.0, "searching")
     columns = np.array(settled, dtype=float).reshape(-1, 4).T
     dots = Settled(columns[0], columns[1].astype(int), columns[2], columns[3])
     return Search(path, tuple(found), grid, starts, max_period, area, seed, unsettled, at_rest, dots)
@@ -163,8 +165,11 @@ def _moving(system: System, late: Recurrence, rows: np.ndarray) -> tuple[np.ndar
     return moving, len(alive) - len(moving)
 
 
-def _attracting(base: Problem, late: Recurrence) -> tuple[list[PeriodicOrbit], list[tuple[int, float, float]], int]:
-    """The orbits on which settled motions are, what simulation shows of each, and how many motions have not settled."""
+def _attracting(
+    system: System, path: str, late: Recurrence
+) -> tuple[list[PeriodicOrbit], list[tuple[int, float, float]], np.ndarray, int]:
+    """The orbits on which settled motions are, what simulation shows of each, their states at phase 0, and how many motions
+    have not settled."""
     found: list[PeriodicOrbit] = []
     seen: list[tuple[int, float, float]] = []
     known = np.empty((0, 2))
@@ -177,58 +182,12 @@ def _attracting(base: Problem, late: Recurrence) -> tuple[list[PeriodicOrbit], l
             continue
         known = np.concatenate([known, states[-period:]])
         seen.append((period, float(highest), float(lowest)))
-        orbit = _newton(base, states[-1], period)
+        orbit = solved_near(system, path, states[-1], period)
         if orbit is not None:
             _add(found, orbit)
-    return found, seen, unsettled
-
-
-def _repelling(base: Problem, states: np.ndarray, max_period: int, known: list[PeriodicOrbit]) -> list[PeriodicOrbit]:
-    """Orbits near which motions with these states (n, kept, 2) return to where they were."""
-    found: list[PeriodicOrbit] = []
-    for period in range(1, min(max_period, states.shape[1] - 1 if len(states) else 0) + 1):
-        for guess in _guesses(states, period):
-            orbit = _newton(base, guess, period)
-            if orbit is not None and not any(same_orbit(orbit, other) for other in known):
-                _add(found, orbit)
-    return found
-
-
-def _guesses(states: np.ndarray, period: int) -> list[np.ndarray]:
-    """The states nearest to which motions come back after a period, but that do not repeat themselves."""
-    distance = np.abs(states[:, period:] - states[:, :-period]).max(axis=2).ravel()
-    begin = states[:, :-period].reshape(-1, 2)
-    distance = np.where(np.isfinite(distance), distance, np.inf)
-    chosen: list[np.ndarray] = []
-    for i in np.argsort(distance):
-        if distance[i] >= SETTINGS.near or len(chosen) >= SETTINGS.guesses:
-            break
-        again = any(np.abs(begin[i] - other).max() < SETTINGS.apart for other in chosen)
-        if distance[i] > RECURRENCE.near_return and not again:
-            chosen.append(begin[i])
-    return chosen
-
-
-def _newton(base: Problem, state: np.ndarray, period: int) -> PeriodicOrbit | None:
-    name = base.system.model.coordinates[0]
-    try:
-        orbit = orbit_from(base, {name: float(state[0]), "velocity": float(state[1])}, period)
-    except MotionError:
-        return None
-    return orbit if orbit is not None and orbit.admissible and orbit.amplitude > SETTINGS.still else None
+    return found, seen, known, unsettled
 
 
 def _add(found: list[PeriodicOrbit], orbit: PeriodicOrbit) -> None:
     if not any(same_orbit(orbit, other) for other in found):
         found.append(orbit)
-
-
-def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> bool:
-    """Whether two orbits of one system are the same, or mirror images; by their period, impacts, speeds and extrema."""
-    if (a.period, a.signature.impact_count) != (b.period, b.signature.impact_count):
-        return False
-    one, other = np.array([a.highest, a.lowest]), np.array([b.highest, b.lowest])
-    same = np.abs(one - other).max() < SETTINGS.same_orbit or (mirrored and np.abs(one + other[::-1]).max() < SETTINGS.same_orbit)
-    if not same or a.speeds.size == 0:
-        return bool(same)
-    return bool(np.abs(np.sort(a.speeds) - np.sort(b.speeds)).max() < SETTINGS.same_orbit)

@@ -13,6 +13,7 @@ class OrbitTolerances:
     pair: float = 1e-4  # Two impacts vanish together whose phases and speeds differ by less: these go as a square root.
     touching_state: float = 1e-7  # States a period apart where an orbit touches, which is known only to the square root.
     grazing_orbits: float = 1e-5  # The unknowns of two orbits that coincide where both graze.
+    same_orbit: float = 1e-6  # Extrema and speeds of impact of one orbit that was found twice.
     image: float = 1e-6  # Rounding alone makes an orbit differ from its own image by less than this.
     halves: float = 1e-7  # The halves of a symmetric orbit: solved to 1e-12, but near a grazing Newton's method leaves more.
     release: float = 1e-9  # Instants of a release, in forcing periods: releases are isolated, and known to rounding.

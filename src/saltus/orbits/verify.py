@@ -1,4 +1,4 @@
-"""Orbits checked by direct simulation: many at once, in lanes."""
+"""Orbits compared with one another, and checked by direct simulation: many at once, in lanes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,20 @@ import numpy as np
 
 from saltus.flow import simulate_many
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.tolerances import TOLERANCES
+
+
+def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> bool:
+    """Whether two orbits of one system are the same, or mirror images; by their period, impacts, speeds and extrema."""
+    if (a.period, a.signature.impact_count) != (b.period, b.signature.impact_count):
+        return False
+    one, other = np.array([a.highest, a.lowest]), np.array([b.highest, b.lowest])
+    same = np.abs(one - other).max() < TOLERANCES.same_orbit or (
+        mirrored and np.abs(one + other[::-1]).max() < TOLERANCES.same_orbit
+    )
+    if not same or a.speeds.size == 0:
+        return bool(same)
+    return bool(np.abs(np.sort(a.speeds) - np.sort(b.speeds)).max() < TOLERANCES.same_orbit)
 
 
 def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) -> np.ndarray:

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, continue_orbit, same_orbit, switch_branch
+from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, continue_orbit, switch_branch
 from saltus.progress import Progress
+from saltus.studies.diagram.placement import PlacedBranch
 
 BRANCHING = (SpecialKind.PD, SpecialKind.BPC)  # at which other families are born
 
@@ -19,7 +20,6 @@ class BranchSettings:
     # Along a frequency, families of longer periods are followed up to the range's upper end times this, as many of them close.
     beyond_frequency: float = 20.0
     beyond: float = 1.3  # Along any other parameter few of them close, and they are followed up to its upper end times this.
-    branches: int = 30  # With this number of branches, no more are followed that are born on others.
     narrow: float = 0.02  # Branches born on one that covers less than this share of the range are not followed.
     # Branches are not followed whose first orbit is smaller than this share of their parent's largest one: near rest a branch has
     # endless special points, each of a smaller orbit than the one before.
@@ -42,31 +42,39 @@ class BranchSet:
     max_period: int
     step: float
     switch: bool
-    branches: list[Branch] = field(default_factory=list)
+    most: int  # with this number of branches, no more are followed that are born on others
+    placed: list[PlacedBranch] = field(default_factory=list)
+    grown: set[int] = field(default_factory=set)  # the branches on which all that is born was followed
     left: int = 0  # special points at which a family is born that is not followed
 
-    def fill(self, orbits: list[PeriodicOrbit], progress: Progress) -> None:
-        """Follow all orbits that do not lie on one another's branches, then what is born on the widest branches first."""
-        waiting = list(orbits)
+    def follow(self, orbit: PeriodicOrbit) -> bool:
+        """Follow an orbit, then the parents on whose special points its branch ends, unless it lies on a known branch."""
+        waiting, known = [orbit], len(self.placed)
         while waiting:
             waiting += self._follow(waiting.pop(0))
-            known = len(self.branches)
-            progress(known / (known + len(waiting) + 1) if waiting else 1.0, f"following, {known} branches")
-        grown: set[int] = set()
+        return len(self.placed) > known
+
+    def grow(self, progress: Progress) -> None:
+        """Follow what is born on the branches, on the widest first."""
         while self.switch:
-            widest = max((b for b in self.branches if id(b) not in grown), key=self._width, default=None)
+            widest = max((b for b in self.branches if id(b) not in self.grown), key=self._width, default=None)
             if widest is None:
                 return
-            grown.add(id(widest))
+            self.grown.add(id(widest))
             self._grow(widest)
-            progress(1.0, f"following, {len(self.branches)} branches")
+            progress(1.0, f"following, {len(self.placed)} branches")
+
+    @property
+    def branches(self) -> list[Branch]:
+        """The branches, in the order in which they were followed."""
+        return [placed.branch for placed in self.placed]
 
     def _follow(self, orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
         """Follow an orbit unless it lies on a known branch; returns orbits of the branches on which its own ends."""
         if self.knows(orbit):
             return []
         branch = continue_orbit(orbit, self.path, self._range(orbit.period), step=self.step)
-        self.branches.append(branch)
+        self.placed.append(PlacedBranch(branch))
         specials = filter(self._is_branching, branch.special) if self.switch else ()
         return [beside for special in specials if _is_parent(special, branch) for beside in _beside(special)]
 
@@ -77,10 +85,10 @@ class BranchSet:
             if _is_parent(special, branch) or self._is_followed(special):
                 continue
             visible = special.amplitude >= SETTINGS.visible * branch.amplitudes.max()
-            if narrow or not visible or len(self.branches) >= SETTINGS.branches:
+            if narrow or not visible or len(self.placed) >= self.most:
                 self.left += 1
             else:
-                self.branches += self._born_at(special)
+                self.placed += map(PlacedBranch, self._born_at(special))
 
     def _width(self, branch: Branch) -> float:
         """The part of the range that a branch covers."""
@@ -90,12 +98,7 @@ class BranchSet:
     def knows(self, orbit: PeriodicOrbit) -> bool:
         """Whether an orbit, or its mirror image, lies on a branch."""
         value = float(orbit.solution.values[0])
-        return any(
-            same_orbit(orbit, other)
-            for branch in self.branches
-            if branch.parameters.min() <= value <= branch.parameters.max()
-            for other in branch.at(value)
-        )
+        return any(placed.holds(orbit, value) for placed in self.placed)
 
     def _is_branching(self, special: SpecialPoint) -> bool:
         """Whether orbits of at most the longest period are born at a special point within the bounds."""

@@ -1,35 +1,34 @@
-"""Response spectra and bifurcation diagrams: every periodic orbit that a search finds, followed along one parameter."""
+"""Response spectra and bifurcation diagrams: every periodic orbit that a simulation finds, followed along one parameter."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Rectangle, check_bounds, check_number, check_window, checked_by
+from saltus.checks import Rectangle, check_bounds, check_count, check_kind, check_number, check_window, checked_by
 from saltus.errors import ParameterError
-from saltus.orbits import STEP, search_orbits
+from saltus.orbits import STEP
 from saltus.progress import Progress, part_of, silent
 from saltus.studies.checks import check_diagram
 from saltus.studies.diagram.branch_set import BranchSet
-from saltus.studies.diagram.chaos_search import chaotic_bands
 from saltus.studies.diagram.diagram_dataset import diagram_tree
+from saltus.studies.diagram.diagram_search import DiagramSearch
+from saltus.studies.diagram.effort import EFFORTS, read_effort
 from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
-
-SEARCHED_VALUES = 25  # number of values of the parameter at which orbits are searched for, where none is given
 
 
 @dataclass(frozen=True)
 class WorkShares:
     """The share of the work that is done after each part."""
 
-    search: float = 0.3
-    branches: float = 0.7
+    search: float = 0.2
+    branches: float = 0.6
     bands: float = 0.9
 
 
@@ -37,11 +36,27 @@ SHARES = WorkShares()
 
 
 def _check(
-    system: System, path: str, bounds: Any, values: Any, window: Any, step: float, switch: bool, progress: object, **efforts: int
+    system: System,
+    path: str,
+    bounds: Any,
+    effort: Any,
+    values: Any,
+    starts: Any,
+    window: Any,
+    switch: bool,
+    step: float,
+    bands: bool,
+    progress: object,
+    **counts: int,
 ) -> None:
-    bounds = check_diagram(system, path, bounds, **efforts)
+    bounds = check_diagram(system, path, bounds, **counts)
+    read_effort(effort)
+    if starts is not None:
+        check_count("starts", starts, 1)
     check_number("step", step, above=0.0)
-    _values(bounds, values)
+    for name, answer in (("switch", switch), ("bands", bands)):
+        check_kind(name, answer, bool)
+    _values(bounds, values, 1)
     check_window(window, system)
     if not callable(progress):
         raise ParameterError(
@@ -55,59 +70,83 @@ def bifurcation_diagram(
     path: str = "load.horizontal.amplitude",
     bounds: tuple[float, float] = (0.0, 3.0),
     *,
+    effort: str = "standard",
     max_period: int = 6,
     values: Iterable[float] | None = None,
-    starts: int = 48,
+    starts: int | None = None,
     window: Rectangle | None = None,
     seed: int = 0,
     repelling: int = 1,
     switch: bool = True,
     step: float = STEP,
-    bands: int = 121,
+    bands: bool = True,
     progress: Progress = silent,
 ) -> xarray.DataTree:
-    """All branches of periodic orbits along a parameter that a search finds, and bands of chaos (the paper's Figs. 11 to 13).
+    """All branches of periodic orbits along a parameter that a simulation finds, and bands of chaos (Figs. 11 to 13).
 
-    At each of `values` motions from `starts` states settle; every orbit on which they do, and those of up to `repelling` forcing
-    periods that repel, is followed along the parameter unless a branch goes through it already. At every PD and BPC the new
-    branch is followed too. Families of more than one forcing period are followed beyond the bounds, to where they close or end.
-    Every orbit is confirmed by the event-driven flow over a period, the stable ones over 20.
+    One simulation is used for everything: motions from states spread over a window at many values of the parameter, other states
+    at each. What settles is followed along the parameter unless a branch goes through it already; what does not is judged to be
+    chaotic, or left undecided. Motions are begun at every value from those of its neighbours too, until nothing new is found.
+    Then random motions of another seed say what share of the states ends on something that the diagram does not have, with the
+    95 % interval of the estimate; what they show is followed as well. Orbits of up to `repelling` forcing periods that repel, and
+    what is born at every PD and BPC, are followed besides. Families of more than one forcing period are followed beyond the
+    bounds, to where they close or end. Every orbit is confirmed by the event-driven flow over a period, the stable ones over 20.
 
     Args:
         system: what moves.
         path, bounds: dotted path of the parameter, and its range.
-        max_period: the longest period, in forcing periods.
-        values, starts, window, seed: where is searched, see `search_orbits`; by default 25 values within the bounds.
+        effort: how much is tried, see `Effort`: "quick", "standard" or "thorough".
+        max_period: the longest period, in forcing periods, that is followed.
+        values: where is simulated, by default evenly from bound to bound, as many as the effort says. Where they are given, what
+            random motions show elsewhere is counted, but not followed.
+        starts, window, seed: how many initial states at each value, by default as the effort says, where, and their seed.
         repelling: up to which period repelling orbits are searched for.
         switch: whether branches are followed that are born at special points.
         step: the longest step along a branch.
-        bands: at how many values, from the first to the last, chaos is looked for (0: nowhere), see `chaotic_bands`.
+        bands: whether chaos is looked for.
         progress: called with the fraction done and what is being done.
 
     Returns:
-        A DataTree: `branch_000`, ..., `attractors` (what simulation settled on), `bands`, `exponents` and `stroboscopic` (see
-        `Bands`), and `search`; docs/orbits.md lists their variables. The attribute `left` counts the special points at which a
-        family is born that was not followed, see `BranchSettings`.
+        A DataTree: `branch_000`, ..., `attractors` (what simulation settled on), `unplaced` (what of it lies on no branch, with
+        the reason), `bands`, `exponents` and `stroboscopic` (see `Bands`), and `search`; docs/orbits.md lists their variables.
+        The attribute `left` counts the special points at which a family is born that was not followed, see `BranchSettings`;
+        `missed_share` is the estimate, between `missed_low` and `missed_high`.
 
     Raises:
         ParameterError: an argument without meaning.
     """
     low, high = check_bounds(bounds)
-    where: dict[str, Any] = {"window": window, "seed": seed}
-    effort: dict[str, Any] = {"max_period": max_period, "starts": starts, "repelling": repelling, **where}
+    tried = EFFORTS[read_effort(effort)]
+    tried = replace(tried, starts=tried.starts if starts is None else starts, samples=tried.samples if values is None else 1)
+    search = DiagramSearch(
+        system=system.with_({path: 0.5 * (low + high)}),
+        path=path,
+        bounds=(low, high),
+        grid=_values((low, high), values, tried.values),
+        window=check_window(window, system),
+        seed=seed,
+        effort=tried,
+        branches=BranchSet(path, (low, high), max_period, step, switch, tried.branches),
+    )
     progress(0.0, "searching")
-    searching = part_of(progress, 0.0, SHARES.search)
-    grid, middle = _values((low, high), values), system.with_({path: 0.5 * (low + high)})
-    found = search_orbits(middle, path, grid, **effort, progress=searching)
-    branches = BranchSet(path, (low, high), max_period, step, switch)
-    following = part_of(progress, SHARES.search, SHARES.branches)
-    branches.fill(sorted(found.orbits, key=lambda orbit: (orbit.period, not orbit.stable)), following)
-    looking = part_of(progress, SHARES.branches, SHARES.bands)
-    chaos = chaotic_bands(system, path, (low, high), count=bands, **where, progress=looking) if bands else None
+    search.simulate(part_of(progress, 0.0, SHARES.search, "searching"))
+    _follow(search, repelling, part_of(progress, SHARES.search, SHARES.branches))
+    looking = part_of(progress, SHARES.branches, SHARES.bands, "looking for chaos")
+    if bands:
+        search.look_for_chaos(looking)
+    search.estimate(follow=values is None)
     progress(SHARES.bands, "confirming")
-    tree = diagram_tree(system, branches.branches, found, (low, high), chaos, max_period=max_period, left=branches.left)
+    tree = diagram_tree(search, effort=str(read_effort(effort)), max_period=max_period)
     progress(1.0, "done")
     return tree
+
+
+def _follow(search: DiagramSearch, repelling: int, progress: Progress) -> None:
+    """Follow what the simulation shows, what repels, what is born on these, and what motions from neighbouring values add."""
+    search.follow(progress)
+    search.repel(repelling)
+    search.branches.grow(progress)
+    search.carry_on(progress)
 
 
 @checked_by(bifurcation_diagram.check)
@@ -118,10 +157,10 @@ def response_spectrum(
     return bifurcation_diagram(system, path, bounds, **options)
 
 
-def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.ndarray:
-    """The values at which orbits are searched for: those given, all within the bounds, or 25 spread evenly between them."""
+def _values(bounds: tuple[float, float], values: Iterable[float] | None, count: int) -> np.ndarray:
+    """The values at which motions are simulated, in order: those given, all within the bounds, or so many from bound to bound."""
     if values is None:
-        return np.linspace(*bounds, SEARCHED_VALUES + 2)[1:-1]
+        return np.linspace(*bounds, count)
     try:
         grid = np.array([float(value) for value in values])
     except (TypeError, ValueError):
@@ -133,4 +172,4 @@ def _values(bounds: tuple[float, float], values: Iterable[float] | None) -> np.n
         raise ParameterError(
             f"values must lie within the bounds {bounds}, got {outside[0]:g}; widen the bounds or leave it out", "values"
         )
-    return grid
+    return np.unique(grid)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.orbits import Branch, PeriodicOrbit, RestingOrbit, Search, defects
+from saltus.orbits import Branch, PeriodicOrbit, RestingOrbit, defects
 from saltus.provenance import provenance
-from saltus.studies.diagram.bands import Bands, band_dataset
+from saltus.studies.diagram.attractors_found import Place
+from saltus.studies.diagram.bands import band_dataset
+from saltus.studies.diagram.diagram_search import DiagramSearch
 from saltus.systems import System
 from saltus.theory import amplitude_limits
 
@@ -29,28 +31,37 @@ class ConfirmationSettings:
 CONFIRMATION = ConfirmationSettings()
 
 
-def diagram_tree(
-    system: System, branches: list[Branch], found: Search, bounds: tuple[float, float], chaos: Bands | None, **facts: Any
-) -> xarray.DataTree:
+def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
     """The DataTree that `bifurcation_diagram` returns; `facts` are further attributes."""
     import xarray
 
+    system, path, bounds, branches = search.system, search.path, search.bounds, search.branches.branches
+    low, high = search.missed.interval
     attributes = provenance(
         system,
-        seed=found.seed,
-        path=found.path,
+        seed=search.seed,
+        path=path,
         coordinate=system.model.coordinates[0],
         bounds=list(bounds),
-        limits=_limits(system, found.path, bounds),
-        starts=found.starts,
-        window=np.ravel(found.window).tolist(),
+        limits=_limits(system, path, bounds),
+        window=np.ravel(search.window).tolist(),
+        left=search.branches.left,
         **facts,
+        **asdict(search.effort) | {"values": len(search.grid), "motions": len(search.found.motions)},
+        missed_share=search.missed.share,
+        missed_low=low,
+        missed_high=high,
+        missed=search.missed.missed,
+        samples_tried=search.missed.samples,
     )
     nodes = {"/": xarray.Dataset(attrs=attributes)}
-    by_length = sorted(branches, key=lambda b: (b.points[0].orbit.period, -len(b.points)))
-    nodes |= {f"branch_{i:03d}": confirmed(branch) for i, branch in enumerate(by_length)}
+    order = sorted(range(len(branches)), key=lambda i: (branches[i].points[0].orbit.period, -len(branches[i].points)))
+    datasets = confirmed([branches[i] for i in order])
+    nodes |= {f"branch_{i:03d}": data for i, data in enumerate(datasets)}
+    chaos = search.chaos
     bands = {"bands": band_dataset()} if chaos is None else chaos.marked(turning_points(branches)).to_datasets()
-    return xarray.DataTree.from_dict({**nodes, "attractors": _attractors(found), **bands, "search": _search(found)})
+    found = {"attractors": _attractors(search), "unplaced": _unplaced(search)}
+    return xarray.DataTree.from_dict({**nodes, **found, **bands, "search": _searched(search)})
 
 
 def _limits(system: System, path: str, bounds: tuple[float, float]) -> list[float]:
@@ -72,28 +83,36 @@ def turning_points(branches: list[Branch]) -> list[tuple[str, float]]:
     return found
 
 
-def confirmed(branch: Branch) -> xarray.Dataset:
-    """A branch's dataset with its orbits' distances from themselves by direct simulation (`kept`: 20 periods, if stable).
+def confirmed(branches: list[Branch]) -> list[xarray.Dataset]:
+    """The datasets of branches with their orbits' distances from themselves by direct simulation (`kept`: 20 periods, if stable).
 
     An orbit that its multipliers call stable, but that does not stay where it is, is not called so; `unconfirmed` counts these.
     """
-    data, orbits = branch.to_xarray(), branch.orbits
-    stable = np.flatnonzero(data["stable"].values)
-    kept = np.full(len(orbits), np.nan)
-    if stable.size:
-        kept[stable] = _distances([orbits[i] for i in stable], CONFIRMATION.rounds)
-    lost = ~(kept[stable] < CONFIRMATION.distance)
-    data["stable"][stable[lost]] = 0
-    data.attrs["unconfirmed"] = int(lost.sum())
-    data["defect"] = ("point", _distances(orbits, 1), {"long_name": "distance after one period, by the event-driven flow"})
-    data["kept"] = ("point", kept, {"long_name": f"distance after {CONFIRMATION.rounds} periods, where stable"})
-    return data
+    found = [branch.to_xarray() for branch in branches]
+    ends = np.cumsum([0, *(len(branch.orbits) for branch in branches)])
+    orbits = [orbit for branch in branches for orbit in branch.orbits]
+    stable = np.flatnonzero(np.concatenate([np.zeros(0), *(data["stable"].values for data in found)]))
+    defect, kept = _distances(orbits, 1), np.full(len(orbits), np.nan)
+    kept[stable] = _distances([orbits[i] for i in stable], CONFIRMATION.rounds)
+    for data, first, last in zip(found, ends, ends[1:], strict=False):
+        here = kept[first:last]
+        lost = np.isfinite(here) & ~(here < CONFIRMATION.distance)
+        lost |= (data["stable"].values > 0) & ~np.isfinite(here)
+        data["stable"][lost] = 0
+        data.attrs["unconfirmed"] = int(lost.sum())
+        data["defect"] = ("point", defect[first:last], {"long_name": "distance after one period, by the event-driven flow"})
+        data["kept"] = ("point", here, {"long_name": f"distance after {CONFIRMATION.rounds} periods, where stable"})
+    return found
 
 
 def _distances(orbits: list[PeriodicOrbit], rounds: int) -> np.ndarray:
-    """The distance of each orbit from itself after `rounds` of its periods, by the event-driven flow."""
-    resting = [orbit for orbit in orbits if isinstance(orbit, RestingOrbit)]
-    return np.array([_moved(orbit, rounds) for orbit in resting]) if resting else defects(orbits, rounds)
+    """The distance of each orbit from itself after `rounds` of its periods, by the event-driven flow: all at once in lanes."""
+    result = np.empty(len(orbits))
+    rests = np.array([isinstance(orbit, RestingOrbit) for orbit in orbits], dtype=bool)
+    result[rests] = [_moved(orbit, rounds) for orbit in orbits if isinstance(orbit, RestingOrbit)]
+    if not rests.all():
+        result[~rests] = defects([orbit for orbit, rest in zip(orbits, rests, strict=True) if not rest], rounds)
+    return result
 
 
 def _moved(orbit: RestingOrbit, rounds: int) -> float:
@@ -104,25 +123,53 @@ def _moved(orbit: RestingOrbit, rounds: int) -> float:
     return float(np.abs(np.asarray(now) - np.asarray(later)).max())
 
 
-def _attractors(found: Search) -> xarray.Dataset:
-    """What motions settled on, a dot for each at each value."""
+def _attractors(search: DiagramSearch) -> xarray.Dataset:
+    """What motions settled on, a dot for each attractor at each value."""
+    found = search.found
+    data = _dots(search, found.rows)
+    data["starts"] = ("dot", found.starts, {"long_name": "motions of the simulation that have settled on it"})
+    data["placed"] = ("dot", (found.place[found.rows] == Place.ON_BRANCH).astype(np.int8))
+    data["placed"].attrs["long_name"] = "whether it lies on a stable part of a branch"
+    return data
+
+
+def _unplaced(search: DiagramSearch) -> xarray.Dataset:
+    """The attractors that lie on no branch, with the reason."""
+    rows = search.found.unplaced
+    data, places = _dots(search, rows), search.found.place[rows]
+    data["reason"] = ("dot", np.array([Place(place).name.lower() for place in places], dtype="U16"))
+    data["reason"].attrs = {place.name.lower(): str(place) for place in Place}
+    return data
+
+
+def _dots(search: DiagramSearch, rows: np.ndarray) -> xarray.Dataset:
+    """Simulated motions that repeat themselves."""
     import xarray
 
-    texts = {"parameter": found.path, "period": "forcing periods after which it repeats"}
-    dots = {name: getattr(found.settled, name) for name in ("amplitude", "highest", "lowest", "period")}
-    columns = {"parameter": found.settled.value} | dots
-    return xarray.Dataset(
-        {name: ("dot", values, {"long_name": texts[name]} if name in texts else {}) for name, values in columns.items()}
-    )
-
-
-def _search(found: Search) -> xarray.Dataset:
-    """The values at which orbits were searched for, and how many of the motions led to no orbit."""
-    import xarray
-
-    unsettled = {"long_name": "motions that did not settle: slow, of a longer period, or chaotic"}
-    columns = {
-        "unsettled": ("searched", found.unsettled, unsettled),
-        "at_rest": ("searched", found.at_rest, {"long_name": "motions that came to rest"}),
+    motions, model = search.found.motions.only(rows), search.system.model
+    coordinate = model.coordinates[0]
+    angle = {"units": model.unit_of(coordinate)}
+    columns: dict[str, tuple[np.ndarray, dict[str, str]]] = {
+        "parameter": (motions.value, {"long_name": search.path}),
+        "amplitude": (motions.amplitude, angle),
+        "highest": (motions.highest, angle),
+        "lowest": (motions.lowest, angle),
+        "period": (motions.period, {"long_name": "forcing periods after which it repeats"}),
+        "impact_count": (motions.impact_count, {"long_name": "impacts in them"}),
+        coordinate: (motions.last[:, 0], angle | {"long_name": f"{coordinate} at phase 0"}),
+        "velocity": (motions.last[:, 1], angle | {"long_name": f"d {coordinate} / d tau at phase 0"}),
     }
-    return xarray.Dataset(columns, coords={"searched": ("searched", found.values, {"long_name": found.path})})
+    return xarray.Dataset({name: ("dot", *column) for name, column in columns.items()})
+
+
+def _searched(search: DiagramSearch) -> xarray.Dataset:
+    """The values at which motions were simulated, and how many of those from the starts there led to no orbit."""
+    import xarray
+
+    first = search.found.motions.only(slice(0, len(search.grid) * search.effort.starts))
+    unsettled, at_rest = (which.reshape(len(search.grid), -1).sum(axis=1) for which in (first.unsettled, first.at_rest))
+    columns = {
+        "unsettled": ("searched", unsettled, {"long_name": "motions that did not settle: slow, of a long period, or chaotic"}),
+        "at_rest": ("searched", at_rest, {"long_name": "motions that came to rest"}),
+    }
+    return xarray.Dataset(columns, coords={"searched": ("searched", search.grid, {"long_name": search.path})})

@@ -1,0 +1,114 @@
+"""Orbits, mostly repelling ones, from near returns: motions on their way or in chaos come back near to where they were.
+
+The states nearest to which they do are improved by Newton's method on the stroboscopic section, all of them at once in lanes;
+what converges is then solved for as an orbit with its impacts, each once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.errors import MotionError
+from saltus.flow import RECURRENCE, last_states, motions_from
+from saltus.orbits.find import orbit_from
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.problem import Problem
+from saltus.orbits.signature import Signature
+from saltus.orbits.verify import same_orbit
+from saltus.systems import System
+
+
+@dataclass(frozen=True)
+class NearReturnSettings:
+    """Which states may lead to orbits, and how they are improved."""
+
+    near: float = 0.15  # Newton's method is tried from returns nearer than this.
+    guesses: int = 12  # The largest number of such returns, for each period at each value: the nearest ones.
+    apart: float = 0.05  # The least distance between two of these returns.
+    iterations: int = 8  # Steps of Newton's method on the section.
+    longest: float = 0.3  # The longest of these steps: beyond it the map is far from linear.
+    converged: float = 1e-7  # Distance of a state from its image, at which it is on an orbit but for rounding.
+    same_state: float = 1e-5  # States at one value are on the same orbit if they are this near.
+    still: float = 1e-6  # An orbit no larger than this is rest.
+    tol: float = 1e-11  # The error of a step.
+
+
+SETTINGS = NearReturnSettings()
+
+
+def orbits_near_returns(
+    system: System, path: str, values: np.ndarray, states: np.ndarray, known: list[np.ndarray], max_period: int
+) -> list[PeriodicOrbit]:
+    """Orbits of up to `max_period` forcing periods near which motions return to where they were.
+
+    Args:
+        system, path: what moves, and the parameter that is varied.
+        values: (n,) of it.
+        states: (n, motions, kept, 2): successive stroboscopic states of motions at each of them; nan where there are fewer.
+        known: for each value the states (k, 2) at phase 0 of orbits that are known there, which are not given again.
+    """
+    found: list[tuple[int, PeriodicOrbit]] = []
+    known = [other.reshape(-1, 2) for other in known]
+    for period in range(1, min(max_period, states.shape[2] - 1) + 1):
+        guesses = [_guesses(at_value, period) for at_value in states]
+        rows = np.repeat(np.arange(len(values)), [len(at_value) for at_value in guesses])
+        improved, good = _improved(system, path, values[rows], np.concatenate(guesses), period)
+        for row, state in zip(rows[good].tolist(), improved[good], strict=True):
+            if len(known[row]) and np.abs(known[row] - state).max(axis=1).min() < SETTINGS.same_state:
+                continue
+            known[row] = np.concatenate([known[row], state[None]])
+            orbit = solved_near(system.with_({path: float(values[row])}), path, state, period)
+            if orbit is not None and not any(same_orbit(orbit, other) for place, other in found if place == row):
+                found.append((row, orbit))
+    return [orbit for _, orbit in found]
+
+
+def solved_near(system: System, path: str, state: np.ndarray, period: int) -> PeriodicOrbit | None:
+    """The orbit of a system near a state at phase 0 that nearly repeats itself, to be followed along a parameter; or None."""
+    name, base = system.model.coordinates[0], Problem(system, Signature((), 1), (path,))
+    try:
+        orbit = orbit_from(base, {name: float(state[0]), "velocity": float(state[1])}, period)
+    except MotionError:
+        return None
+    return orbit if orbit is not None and orbit.admissible and orbit.amplitude > SETTINGS.still else None
+
+
+def _guesses(states: np.ndarray, period: int) -> np.ndarray:
+    """The states (k, 2) nearest to which motions (n, kept, 2) come back after a period, but that do not repeat themselves."""
+    distance = np.abs(states[:, period:] - states[:, :-period]).max(axis=2).ravel()
+    begin = states[:, :-period].reshape(-1, 2)
+    chosen = np.empty((0, 2))
+    for i in np.flatnonzero(distance < SETTINGS.near)[np.argsort(distance[distance < SETTINGS.near])]:
+        if len(chosen) >= SETTINGS.guesses:
+            break
+        again = len(chosen) and np.abs(begin[i] - chosen).max(axis=1).min() < SETTINGS.apart
+        if distance[i] > RECURRENCE.near_return and not again:
+            chosen = np.concatenate([chosen, begin[i : i + 1]])
+    return chosen
+
+
+def _improved(system: System, path: str, values: np.ndarray, states: np.ndarray, period: int) -> tuple[np.ndarray, np.ndarray]:
+    """The states (n, 2) after Newton's method for x = Phi(x), and the numbers of those that have converged."""
+    states, active, good = states.copy(), np.arange(len(states)), np.zeros(len(states), dtype=bool)
+    for _ in range(SETTINGS.iterations):
+        if not active.size:
+            break
+        options = {
+            "parameters": {path: values[active]},
+            "periods": period,
+            "sensitivities": (),
+            "sample": (),
+            "tol": SETTINGS.tol,
+        }
+        result = motions_from(system, states[active], **options)
+        apart, slope = last_states(system, result) - states[active], result["derivative"].values
+        sound = np.isfinite(slope).all(axis=(1, 2)) & np.isfinite(apart).all(axis=1)
+        good[active] = sound & (np.abs(apart).max(axis=1) < SETTINGS.converged)
+        going = sound & ~good[active]
+        active, apart, slope = active[going], apart[going], slope[going]
+        steps = [np.linalg.lstsq(np.eye(2) - d, a, rcond=None)[0] for d, a in zip(slope, apart, strict=True)]
+        step = np.array(steps).reshape(-1, 2)
+        states[active] += step / np.maximum(1.0, np.abs(step).max(axis=1, initial=0.0) / SETTINGS.longest)[:, None]
+    return states, np.flatnonzero(good)

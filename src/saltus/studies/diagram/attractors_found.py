@@ -1,0 +1,119 @@
+"""The attractors that the simulation of a diagram has found: each once at each value, and where it stands with the branches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+
+from saltus.studies.chart.cells import seeds
+from saltus.studies.chart.motions import ALIKE, MOTION, by_cell, is_alike, is_same
+from saltus.studies.diagram.simulated import SimulatedMotions
+
+
+class Place(IntEnum):
+    """Where a simulated motion that repeats itself stands with the branches; its `str` is the sentence."""
+
+    OPEN = 0
+    ON_BRANCH = 1
+    LONGER = 2
+    NO_ORBIT = 3
+    UNSTABLE = 4
+    ELSEWHERE = 5
+
+    def __str__(self) -> str:
+        return SENTENCES[self]
+
+
+SENTENCES = {
+    Place.OPEN: "it has not been looked at",
+    Place.ON_BRANCH: "it lies on a stable part of a branch",
+    Place.LONGER: "its period is longer than the longest that is followed",
+    Place.NO_ORBIT: "Newton's method finds no orbit near it",
+    Place.UNSTABLE: "the orbit near it is not called stable: it grazes, or is about to lose its stability",
+    Place.ELSEWHERE: "the branch of the orbit near it does not come back to it",
+}
+
+
+@dataclass
+class AttractorsFound:
+    """All motions that were simulated, and the different attractors among them: each once at each value."""
+
+    motions: SimulatedMotions
+    max_period: int  # the longest one that is followed
+    place: np.ndarray = field(init=False)  # (n,): a `Place` for each motion, kept up for `rows` alone
+    looked: np.ndarray = field(init=False)  # (n,): on how many branches, the first ones, a motion was looked for
+    rows: np.ndarray = field(init=False)  # the first motion that was found on each attractor, by value
+    starts: np.ndarray = field(init=False)  # how many motions were found on each of these
+    attractor: np.ndarray = field(init=False)  # (n,): the row of the attractor of each motion; its own where it has not settled
+
+    def __post_init__(self) -> None:
+        self.place, self.looked = np.zeros(len(self.motions), dtype=np.int8), np.zeros(len(self.motions), dtype=int)
+        self._tell_apart()
+
+    def add(self, more: SimulatedMotions) -> int:
+        """Add motions; returns how many attractors are new."""
+        before = len(self.rows)
+        self.motions = self.motions.joined(more)
+        self.place = np.append(self.place, np.zeros(len(more), dtype=np.int8))
+        self.looked = np.append(self.looked, np.zeros(len(more), dtype=int))
+        self._tell_apart()
+        return len(self.rows) - before
+
+    def _tell_apart(self) -> None:
+        """Find the attractors: motions at one value of one period and with the same extrema, or those of the mirror image."""
+        rows = np.flatnonzero(self.motions.periodic)
+        table = as_chart_motions(self.motions.only(rows))
+        order = np.lexsort((rows, table["other"], table["amplitude"], table["period"], self.motions.value[rows]))
+        rows, table = rows[order], table[order]
+        fresh = np.ones(len(rows), dtype=bool)
+        fresh[1:] = (self.motions.value[rows[1:]] != self.motions.value[rows[:-1]]) | ~is_same(table[1:], table[:-1])
+        begin = np.flatnonzero(fresh)
+        self.rows = np.minimum.reduceat(rows, begin) if len(rows) else rows
+        self.starts = np.diff(np.append(begin, len(rows)))
+        self.attractor = np.arange(len(self.motions))
+        self.attractor[rows] = np.repeat(self.rows, self.starts)
+        self.place[self.rows[self.motions.period[self.rows] > self.max_period]] = Place.LONGER
+
+    @property
+    def open(self) -> np.ndarray:
+        """The rows of attractors of which it is not known yet where they stand."""
+        return np.asarray(self.rows[self.place[self.rows] == Place.OPEN])
+
+    @property
+    def unplaced(self) -> np.ndarray:
+        """The rows of attractors that lie on no branch."""
+        return np.asarray(self.rows[self.place[self.rows] != Place.ON_BRANCH])
+
+    def families(self, rows: np.ndarray) -> list[np.ndarray]:
+        """The attractors of these rows in runs along the parameter, each of one kind; long runs first."""
+        motions = self.motions.only(rows)
+        table = as_chart_motions(motions)
+        order = np.lexsort((motions.value, table["impact_count"], table["period"]))
+        alike = is_alike(table[order][1:], table[order][:-1], ALIKE.family)
+        runs = np.split(rows[order], 1 + np.flatnonzero(~alike)) if len(rows) else []
+        return sorted(runs, key=lambda run: -len(run))
+
+    def seeds(self, grid: np.ndarray, known: np.ndarray, since: int) -> tuple[np.ndarray, np.ndarray]:
+        """Further starts, values (n,) and states (n, 2): attractors, at neighbours of their value that have none alike.
+
+        Args:
+            grid: the values whose neighbours are meant.
+            known: attractors that need no simulation, as records of a chart whose cells are the values of the grid.
+            since: only attractors that were first found by the motion of this row, or later.
+        """
+        rows = self.rows[np.isin(self.motions.value[self.rows], grid)]
+        mine = as_chart_motions(self.motions.only(rows))
+        mine["cell"] = np.searchsorted(grid, self.motions.value[rows])
+        cell, states = seeds(by_cell(mine[rows >= since]), by_cell(np.concatenate([mine, known])), (1, len(grid)))
+        return grid[cell], states
+
+
+def as_chart_motions(motions: SimulatedMotions) -> np.ndarray:
+    """The motions as records of a chart, whose comparisons they share; all in the cell 0."""
+    table = np.zeros(len(motions), MOTION)
+    for name in ("period", "impact_count", "amplitude"):
+        table[name] = getattr(motions, name)
+    table["other"], table["state"] = np.minimum(motions.highest, -motions.lowest), motions.last
+    return table

@@ -1,0 +1,218 @@
+"""The search of a diagram: simulate, follow what is found, compare, and again, until every simulated motion is accounted for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from saltus.checks import Window
+from saltus.flow import motions_from, stroboscopic
+from saltus.orbits import keeps_symmetry, orbits_near_returns, solved_near, within_window
+from saltus.progress import Progress, silent
+from saltus.studies.diagram.attractors_found import AttractorsFound, Place
+from saltus.studies.diagram.bands import Bands
+from saltus.studies.diagram.branch_set import BranchSet
+from saltus.studies.diagram.chaos_search import chaotic_bands
+from saltus.studies.diagram.effort import EffortSettings
+from saltus.studies.diagram.placement import PlacedBranch, placed, stable_motions
+from saltus.studies.diagram.simulated import SimulatedMotions, simulate_from, starts_at
+from saltus.systems import System
+
+
+@dataclass(frozen=True)
+class DiagramSearchSettings:
+    """How the search of a diagram goes on from what it has found."""
+
+    rounds: int = 100  # Rounds of starts from neighbours: each adds what the one before has found a value further.
+    transient: int = 24  # Forcing periods at the beginning of motions in which near returns are looked for.
+    # Where a stable part of a branch ends, motions are started from its last orbit, these shares of the range further on both
+    # sides: what they fall to is there where no start of the grid may lead.
+    beyond: tuple[float, ...] = (1e-4, 1e-3)
+    deviations: float = 1.96  # Standard deviations to each side of a 95 % interval.
+
+
+SETTINGS = DiagramSearchSettings()
+
+
+@dataclass(frozen=True)
+class MissedShare:
+    """The share of states that end on something which is not in the diagram, estimated by a sample of them."""
+
+    missed: int = 0  # motions of the sample that do
+    sample: int = 0
+    samples: int = 0  # how many samples were tried; this is the last one
+
+    @property
+    def share(self) -> float:
+        """The estimate; nan without a sample."""
+        return self.missed / self.sample if self.sample else np.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval of a binomial share (Wilson's)."""
+        if not self.sample:
+            return (np.nan, np.nan)
+        spread = SETTINGS.deviations**2 / self.sample
+        middle = (self.share + 0.5 * spread) / (1.0 + spread)
+        half = math.sqrt(spread * (self.share * (1.0 - self.share) + 0.25 * spread)) / (1.0 + spread)
+        return (max(0.0, middle - half), min(1.0, middle + half))
+
+
+@dataclass
+class DiagramSearch:
+    """One search: what was simulated and followed so far."""
+
+    system: System  # with the parameter in the middle of its range
+    path: str
+    bounds: tuple[float, float]
+    grid: np.ndarray  # values of the parameter
+    window: Window
+    seed: int
+    effort: EffortSettings
+    branches: BranchSet
+    found: AttractorsFound = field(init=False)
+    chaos: Bands | None = None
+    missed: MissedShare = field(default_factory=MissedShare)
+
+    def simulate(self, progress: Progress = silent) -> None:
+        """The simulation of the diagram: motions from the starts at every value of the grid."""
+        states = starts_at(self.system, self.grid, self.effort.starts, self.window, self.seed)
+        motions = self.simulated(np.repeat(self.grid, self.effort.starts), states.reshape(-1, 2), progress)
+        self.found = AttractorsFound(motions, self.branches.max_period)
+
+    def simulated(self, values: np.ndarray, states: np.ndarray, progress: Progress = silent) -> SimulatedMotions:
+        """Motions from states (n, 2) at values (n,), as long as the effort says."""
+        return simulate_from(self.system, self.path, values, states, self.effort.periods, progress)
+
+    @cached_property
+    def mirrored(self) -> bool:
+        """Whether mirror images are motions too."""
+        return keeps_symmetry(self.system, self.path)
+
+    def follow(self, progress: Progress) -> None:
+        """Follow what was simulated and lies on no branch, again and again until nothing of it is left to try."""
+        while True:
+            self._place()
+            rows = self.found.open
+            if not rows.size:
+                return
+            for run in self.found.families(rows):
+                row = int(run[len(run) // 2])
+                if not self._is_placed(row, self.branches.placed[self.found.looked[row] :]):
+                    self.found.place[row] = self._follow(row)
+                known = len(self.branches.placed)
+                progress(known / (known + len(rows)), f"following, {known} branches")
+
+    def _place(self) -> None:
+        """Look for all attractors that lie on no branch on the branches on which they were not looked for yet."""
+        rows, count = self.found.unplaced, len(self.branches.placed)
+        rows = rows[(self.found.place[rows] != Place.LONGER) & (self.found.looked[rows] < count)]
+        for first in np.unique(self.found.looked[rows]).tolist():
+            some = rows[self.found.looked[rows] == first]
+            there = placed(self.found.motions.only(some), self.branches.placed[first:], self.mirrored)
+            self.found.place[some[there]] = Place.ON_BRANCH
+        self.found.looked[rows] = count
+
+    def _is_placed(self, row: int, branches: list[PlacedBranch]) -> bool:
+        return bool(placed(self.found.motions.only([row]), branches, self.mirrored)[0])
+
+    def _follow(self, row: int) -> Place:
+        """Follow a simulated motion; returns where it then stands."""
+        motions = self.found.motions
+        system = self.system.with_({self.path: float(motions.value[row])})
+        orbit = solved_near(system, self.path, motions.last[row], int(motions.period[row]))
+        if orbit is None:
+            return Place.NO_ORBIT
+        known = len(self.branches.placed)
+        self.branches.follow(orbit)
+        if self._is_placed(row, self.branches.placed[known:]):
+            return Place.ON_BRANCH
+        return Place.ELSEWHERE if orbit.stable else Place.UNSTABLE
+
+    def repel(self, max_period: int) -> None:
+        """Follow repelling orbits near which motions return, at some values of the grid."""
+        grid = self.grid[np.unique(np.linspace(0, len(self.grid) - 1, self.effort.repelling_values).astype(int))]
+        begin = starts_at(self.system, grid, self.effort.starts, self.window, self.seed)
+        columns = {self.path: np.repeat(grid, self.effort.starts)}
+        options = {"periods": SETTINGS.transient, "last": "all", "tol": 1e-10}
+        early = stroboscopic(self.system, motions_from(self.system, begin.reshape(-1, 2), parameters=columns, **options))
+        motions, shape = self.found.motions, (len(grid), self.effort.starts, -1, 2)
+        late = [motions.only((motions.value == value) & motions.unsettled).states for value in grid]
+        states = np.concatenate([early.reshape(shape), _filled(late, self.effort.starts, SETTINGS.transient)], axis=1)
+        known = [motions.only((motions.value == value) & motions.periodic).states.reshape(-1, 2) for value in grid]
+        known = [states[np.isfinite(states).all(axis=1)] for states in known]
+        orbits = orbits_near_returns(self.system, self.path, grid, states, known, max_period)
+        for orbit in sorted(orbits, key=lambda orbit: orbit.period):
+            self.branches.follow(orbit)
+
+    def carry_on(self, progress: Progress) -> None:
+        """Start motions from those of neighbouring values and from the ends of stable parts of branches until nothing is new."""
+        since, ended = 0, 0
+        for number in range(SETTINGS.rounds):
+            known = stable_motions(self.branches.placed, self.grid)
+            values, states = self.found.seeds(self.grid, known, since)
+            more_values, more_states = self._beyond_ends(self.branches.placed[ended:] if number < self.effort.jumps else [])
+            since, ended = len(self.found.motions), len(self.branches.placed)
+            values, states = np.concatenate([values, more_values]), np.concatenate([states, more_states])
+            if not len(values) or not self.found.add(self.simulated(values, states)):
+                return
+            self.follow(progress)
+
+    def _beyond_ends(self, branches: list[PlacedBranch]) -> tuple[np.ndarray, np.ndarray]:
+        """Values and states of starts beyond the ends of stable parts of branches."""
+        found: list[tuple[float, tuple[float, float]]] = []
+        low, high = self.bounds
+        for branch in branches:
+            stable = branch.columns[3] > 0
+            for last in np.flatnonzero(stable & ~(np.append(stable[1:], True) & np.append(True, stable[:-1]))):
+                value, orbit = float(branch.columns[0, last]), branch.branch.points[last].orbit
+                steps = [side * share * (high - low) for share in SETTINGS.beyond for side in (-1.0, 1.0)]
+                found += [(value + step, orbit.state) for step in steps if low <= value + step <= high]
+        values = np.array([value for value, _ in found], dtype=float)
+        return values, np.array([state for _, state in found], dtype=float).reshape(-1, 2)
+
+    def look_for_chaos(self, progress: Progress) -> None:
+        """Find the bands of chaos, and follow what settles in windows within them."""
+        self.chaos = chaotic_bands(self.system, self.path, self.bounds, window=self.window, seed=self.seed, progress=progress)
+        self.follow(silent)
+
+    def estimate(self, follow: bool) -> None:
+        """Estimate which share of the states ends on something that the diagram does not have, by random motions.
+
+        With `follow` these motions are followed too, after they have been counted, and new ones are counted then.
+        """
+        for number in range(self.effort.samples):
+            motions = self._random_motions(number)
+            first = len(self.found.motions)
+            self.found.add(motions)
+            self._place()
+            unknown = self.found.place[self.found.attractor[first:]] != Place.ON_BRANCH
+            missed = (motions.periodic & unknown) | (motions.unsettled & ~self._in_bands(motions.value))
+            self.missed = MissedShare(int(missed.sum()), len(motions), number + 1)
+            if not follow or not missed.any():
+                return
+            self.follow(silent)
+
+    def _random_motions(self, number: int) -> SimulatedMotions:
+        """Motions from random states of the window at random values, from a seed of their own."""
+        rng = np.random.default_rng([self.seed, number, self.effort.sample])
+        values = rng.uniform(*self.bounds, self.effort.sample)
+        points = rng.uniform(-1.0, 1.0, (self.effort.sample, 2))
+        return self.simulated(values, within_window(self.system, points, self.window))
+
+    def _in_bands(self, values: np.ndarray) -> np.ndarray:
+        """Which values lie in a band of chaos, (n,)."""
+        bands = () if self.chaos is None else self.chaos.bands
+        return np.array([any(band.low <= value <= band.high for band in bands) for value in values.tolist()], dtype=bool)
+
+
+def _filled(groups: list[np.ndarray], count: int, kept: int) -> np.ndarray:
+    """The last states (k, kept, 2) of up to `count` motions of each group, filled up with nan, (groups, count, kept, 2)."""
+    result = np.full((len(groups), count, kept, 2), np.nan)
+    for row, states in enumerate(groups):
+        chosen = states[:count, -kept:]
+        result[row, : len(chosen)] = chosen
+    return result

@@ -1,0 +1,57 @@
+"""How much is tried for a diagram: one record of numbers for each level of effort."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from saltus.errors import ParameterError, near
+
+
+class Effort(StrEnum):
+    """How much is tried for a diagram."""
+
+    QUICK = "quick"  # a first picture
+    STANDARD = "standard"  # the paper's figures
+    THOROUGH = "thorough"  # motions that attract one state in a thousand
+
+
+@dataclass(frozen=True)
+class EffortSettings:
+    """What is simulated and followed for a diagram."""
+
+    values: int  # Values of the parameter, evenly from bound to bound: the least width of what is surely met.
+    starts: int  # Initial states at each of them: what attracts less than 1 of these many states may be missed there.
+    periods: int  # Forcing periods that a motion is given to settle; slow ones have 8 times as many.
+    repelling_values: int  # Values at which repelling orbits are searched for: they are followed from one to the others.
+    branches: int  # With this number of branches, no more are followed that no simulated motion leads to.
+    jumps: int  # Rounds in which motions are started beyond the ends of stable parts of branches, to see where they fall to.
+    sample: int  # Motions of the sample that tells what share of the states ends on something that the diagram has not.
+    # Samples at most: what one shows to be missing is followed, and the next one begins anew, until one shows nothing missing.
+    samples: int
+
+
+EFFORTS = {
+    Effort.QUICK: EffortSettings(
+        values=61, starts=8, periods=200, repelling_values=13, branches=20, jumps=0, sample=300, samples=1
+    ),
+    Effort.STANDARD: EffortSettings(
+        values=201, starts=24, periods=400, repelling_values=25, branches=30, jumps=0, sample=1000, samples=3
+    ),
+    Effort.THOROUGH: EffortSettings(
+        values=801, starts=64, periods=1000, repelling_values=49, branches=60, jumps=2, sample=5000, samples=5
+    ),
+}
+
+
+def read_effort(effort: Any) -> Effort:
+    """The effort of this name.
+
+    Raises:
+        ParameterError: there is none.
+    """
+    try:
+        return Effort(effort)
+    except ValueError:
+        raise ParameterError(f"effort knows no {effort!r}; {near(str(effort), list(Effort))}", "effort") from None
