@@ -84,33 +84,27 @@ def bifurcation_diagram(
 ) -> xarray.DataTree:
     """All branches of periodic orbits along a parameter that a simulation finds, and bands of chaos (Figs. 11 to 13).
 
-    One simulation is used for everything: motions from states spread over a window at many values of the parameter, other states
-    at each. What settles is followed along the parameter unless a branch goes through it already; what does not is judged to be
-    chaotic, or left undecided. Motions are begun at every value from those of its neighbours too, until nothing new is found.
-    Then random motions of another seed say what share of the states ends on something that the diagram does not have, with the
-    95 % interval of the estimate; what they show is followed as well. Orbits of up to `repelling` forcing periods that repel, and
-    what is born at every PD and BPC, are followed besides. Families of more than one forcing period are followed beyond the
-    bounds, to where they close or end. Every orbit is confirmed by the event-driven flow over a period, the stable ones over 20.
+    One simulation is used for everything, from states spread over a window at many values of the parameter, and from the motions
+    of neighbouring values until nothing new is found. What settles is followed unless a branch goes through it; what does not is
+    judged to be chaotic, or left undecided. Then random motions say what share of the states ends on something that the diagram
+    does not have; what they show is followed as well. Orbits of up to `repelling` forcing periods that repel, and what is born at
+    every PD and BPC, are followed besides, those of more than one forcing period beyond the bounds, to where they close or end.
+    Every orbit is confirmed by the event-driven flow over a period, the stable ones over 20.
 
     Args:
         system: what moves.
         path, bounds: dotted path of the parameter, and its range.
         effort: how much is tried, see `Effort`: "quick", "standard" or "thorough".
         max_period: the longest period, in forcing periods, that is followed.
-        values: where is simulated, by default evenly from bound to bound, as many as the effort says. Where they are given, what
-            random motions show elsewhere is counted, but not followed.
+        values: where is simulated, by default evenly, as many as the effort says. If given, what is random is not followed.
         starts, window, seed: how many initial states at each value, by default as the effort says, where, and their seed.
-        repelling: up to which period repelling orbits are searched for.
-        switch: whether branches are followed that are born at special points.
-        step: the longest step along a branch.
-        bands: whether chaos is looked for.
+        repelling, switch: up to which period repelling orbits are searched for; whether what is born at special points is followed.
+        step, bands: the longest step along a branch; whether chaos is looked for.
         progress: called with the fraction done and what is being done.
 
     Returns:
-        A DataTree: `branch_000`, ..., `attractors` (what simulation settled on), `unplaced` (what of it lies on no branch, with
-        the reason), `bands`, `exponents` and `stroboscopic` (see `Bands`), and `search`; docs/orbits.md lists their variables.
-        The attribute `left` counts the special points at which a family is born that was not followed, see `BranchSettings`;
-        `missed_share` is the estimate, between `missed_low` and `missed_high`.
+        A DataTree: `branch_000`, ..., `attractors` (what simulation settled on), `unplaced` (what of it lies on no branch), and
+        `bands`, `exponents`, `stroboscopic` (see `Bands`), and `search`; docs/orbits.md lists their variables and attributes.
 
     Raises:
         ParameterError: an argument without meaning.
@@ -118,22 +112,14 @@ def bifurcation_diagram(
     low, high = check_bounds(bounds)
     tried = EFFORTS[read_effort(effort)]
     tried = replace(tried, starts=tried.starts if starts is None else starts, samples=tried.samples if values is None else 1)
-    search = DiagramSearch(
-        system=system.with_({path: 0.5 * (low + high)}),
-        path=path,
-        bounds=(low, high),
-        grid=_values((low, high), values, tried.values),
-        window=check_window(window, system),
-        seed=seed,
-        effort=tried,
-        branches=BranchSet(path, (low, high), max_period, step, switch, tried.branches),
-    )
+    grid, area = _values((low, high), values, tried.values), check_window(window, system)
+    branches = BranchSet(path, (low, high), max_period, step, switch, tried.branches)
+    search = DiagramSearch(system.with_({path: 0.5 * (low + high)}), path, (low, high), grid, area, seed, tried, branches)
     progress(0.0, "searching")
     search.simulate(part_of(progress, 0.0, SHARES.search, "searching"))
     _follow(search, repelling, part_of(progress, SHARES.search, SHARES.branches))
-    looking = part_of(progress, SHARES.branches, SHARES.bands, "looking for chaos")
     if bands:
-        search.look_for_chaos(looking)
+        search.look_for_chaos(part_of(progress, SHARES.branches, SHARES.bands, "looking for chaos"))
     search.estimate(follow=values is None)
     progress(SHARES.bands, "confirming")
     tree = diagram_tree(search, effort=str(read_effort(effort)), max_period=max_period)
