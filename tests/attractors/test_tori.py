@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shared_systems import forced, under, walled
+from soft_stops import soft_stop
 from verdict_cases import spread
 
 import saltus
@@ -135,3 +136,15 @@ def test_under_constant_loads_there_is_no_room():
 
 def test_two_coordinates_are_not_spoken_of():
     assert excludes_tori(saltus.System(model=saltus.TwoLayer(beta0=1.4, damping=0.1), load=saltus.Load(vertical=-0.5))) is None
+
+
+def test_a_soft_stop_tears_nothing_apart_and_its_damping_excludes_tori():
+    for numbers in ({}, {"damper": 0.3}, {"stop": -0.5}):
+        assert "neither the velocity nor the acceleration changes" in excludes_tori(soft_stop(**numbers))
+    assert excludes_tori(soft_stop(damping=0.0)) is None
+    assert excludes_tori(soft_stop(damping=0.1, damper=-0.2)) is None
+
+
+def test_a_slow_motion_between_soft_stops_is_not_called_quasi_periodic():
+    """At 0.53 it creeps towards an orbit whose largest multiplier is near -1."""
+    assert saltus.classify(soft_stop(frequency=0.53), x=0.1).kind in ("undecided", "periodic")

@@ -5,12 +5,14 @@ import math
 import numpy as np
 import pytest
 from orbit_cases import CASES, random_guess, slope
+from scipy.integrate import solve_ivp
 from shared_systems import hinged, paired, walled
 
 from saltus import simulate
 from saltus.flow import segments as at
-from saltus.orbits.problem import Problem
+from saltus.orbits.problem import Problem, Segments
 from saltus.orbits.signature import Signature
+from saltus.systems import Harmonic, Load, Model, System, VelocityReduction
 
 STARTS = {"forced": (0.6, 0.1), "shaken": (0.5, 0.2), "walled": (0.2, 0.9), "rocking": (0.01, 0.02), "hinged": (1.2, 0.3)}
 
@@ -145,6 +147,34 @@ def test_derivatives_of_shooting_without_impacts(name, periods):
             assert np.abs(found.parameters[:, j] - expected).max() < 1e-8 * max(1.0, np.abs(expected).max()), path
         else:
             assert (found.parameters[:, j] == 0.0).all()
+
+
+class SteepBelow(Model):
+    """x'' = force - 0.1 x' - x - push: 0.3 above the contact; below it the push turns round within 0.01 of x = -0.8."""
+
+    coordinates = ("x",)
+    channels = ("force",)
+
+    def acceleration(self, t, x, velocity, side, load):
+        below = (1 - side) / 2
+        push = below * 2.0 * np.tanh((x + 0.8) * 400.0) + (1 - below) * 0.3
+        return load.force(t) - 0.1 * velocity - x - push
+
+
+@pytest.mark.parametrize(("side", "start"), [(-1, (-0.2, -1.5)), (1, (0.4, 1.0))])
+def test_steps_of_a_segment_are_checked_with_the_equation_of_its_own_side(side, start):
+    """Of a force that bends too sharply for a series from afar, against DOP853 with short steps."""
+    load = Load(frequency=1.0, force=Harmonic(0.2))
+    problem = Problem(System(model=SteepBelow(), load=load, impact=VelocityReduction(0.9)), Signature((), 1))
+    spans, sides = np.array([[0.0, 1.5, 0.0]]), np.array([[0, side]])
+    flown = problem.fly(Segments(spans, sides, np.array([start])), problem.values)
+    model = problem.system.model
+
+    def rate(t, y):
+        return [y[1], model.acceleration(t, y[0], y[1], side, load)]
+
+    expected = solve_ivp(rate, (0.0, 1.5), start, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-3).y[:, -1]
+    assert flown.ends[0, at.KINDS : at.KINDS + 2] == pytest.approx(expected, abs=1e-9)
 
 
 def test_lowest_gap_inside_a_segment_and_its_instant():

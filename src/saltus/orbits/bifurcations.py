@@ -11,6 +11,7 @@ import numpy as np
 
 from saltus.bounds import area_contraction
 from saltus.continuation import TestFunction
+from saltus.flow import segments as at
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import SpecialKind, UserFunction
@@ -62,15 +63,11 @@ def grazing(point: OrbitPoint) -> float:
     return math.inf if point.orbit.problem.passes_contact else min(point.orbit.slowest, point.orbit.clearance)
 
 
-def touches(point: OrbitPoint) -> Test:
-    """The grazings of a contact that is no singularity, where the number of passages changes from that of a point."""
-    count = point.orbit.crossings
-
-    def depth(other: OrbitPoint) -> float:
-        least = min(NEAREST, other.orbit.clearance, other.orbit.shallowest)
-        return least if other.orbit.crossings == count else -least
-
-    return Test(SpecialKind.GR, depth)
+def touching(point: OrbitPoint) -> float:
+    """How far an orbit is from touching a contact that is no singularity; its sign turns with each pair of passages more."""
+    orbit, looks = point.orbit, point.equations.looks
+    pairs = int(looks[:, at.CROSSINGS].sum()) // 2
+    return (-1) ** pairs * min(NEAREST, orbit.clearance, orbit.shallowest)
 
 
 NEAREST = 1.0  # upper limit of the distance of an orbit from a grazing, which would be infinite for one that never turns
@@ -78,6 +75,7 @@ NEAREST = 1.0  # upper limit of the distance of an orbit from a grazing, which w
 
 FLIP = {symmetric: Test(SpecialKind.BPC if symmetric else SpecialKind.PD, flip) for symmetric in (True, False)}
 FOLD, CROSSING, TORUS = Test(SpecialKind.LP, fold), Test(SpecialKind.BPC, crossing), Test(SpecialKind.NS, torus)
+TOUCHING = Test(SpecialKind.GR, touching)
 GRAZING = Test(SpecialKind.GR, grazing, 1e-15)  # narrower than others: beside a grazing motions part by the square root
 
 
@@ -85,7 +83,7 @@ def branch_tests(point: OrbitPoint, functions: dict[str, UserFunction]) -> Itera
     """The test functions of a branch at a point that are zero at a special point, but for grazings."""
     yield from (FOLD, FLIP[point.orbit.symmetric], CROSSING, TORUS)
     if point.orbit.problem.passes_contact:
-        yield touches(point)
+        yield TOUCHING
     yield from orbit_tests(point.orbit, functions)
 
 

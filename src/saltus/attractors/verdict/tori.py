@@ -8,6 +8,7 @@ import numpy as np
 
 from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.bounds import area_contraction, enclose, leaves_over_a_period, on_side
+from saltus.flow import ContactRegularity, contact_regularity
 from saltus.systems import System, check_system
 from saltus.taylor import trace
 
@@ -20,7 +21,8 @@ def excludes_tori(system: System) -> str | None:
 
     * P is continuous on the plane of states, in which the states before and after an impact are one point. It is, unless the
       contact pushes away on both sides at one instant, where motions beside the state of rest are torn apart: for equal layers,
-      where V cos(beta0) > 0. Bounces from one wall tear nothing apart, and a system without contact has no corner;
+      where V cos(beta0) > 0. Bounces from one wall tear nothing apart, nor does a contact that changes neither the velocity nor
+      the acceleration, and a system without contact has no corner;
     * and P shrinks areas: da/dv < 0 on every side, and no impact raises the speed.
 
     For then P maps the curve onto itself and, being continuous, the area within onto at least itself; and it has less to give.
@@ -55,6 +57,8 @@ def _continuous(system: System) -> str | None:
         return "the motion has no contact"
     if traced.sides == 1:
         return "a bounce from one wall joins its states before and after without a gap"
+    if contact_regularity(traced, tuple(system.parameters.values())) is ContactRegularity.CONTINUOUS:
+        return "neither the velocity nor the acceleration changes at the contact"
     assert traced.contact_acceleration is not None
     pushes = enclose([on_side(s, traced.contact_acceleration) for s in (1, -1)], leaves_over_a_period(system))
     if not np.all(np.minimum(*(push.hi for push in pushes)) < 0.0):
