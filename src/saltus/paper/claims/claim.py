@@ -122,6 +122,8 @@ def judge_claim(id: str, entry: ClaimEntry, measured: Measured) -> Claim:
         reason = entry.filled(entry.undecided, measured.fields)
         return _row(id, entry, ("as stated", "", ClaimVerdict.UNDECIDED), f"{reason}; {evidence}" if evidence else reason)
     paper, value, verdict = (_compared if entry.printed is not None else _checked)(entry, measured)
+    if entry.proof and verdict is ClaimVerdict.CORRECTED:
+        evidence += f"; independently: {entry.proof}"
     if entry.second and verdict is ClaimVerdict.CORRECTED:
         evidence += f"; independently: {entry.filled(entry.second, measured.fields)}"
         if measured.second is None or not _holds(measured.second, entry.tolerance):

@@ -13,10 +13,11 @@ from saltus.paper.figures.phase_portraits import BETA0, VERTICAL, circled, close
 from saltus.plots import DOUBLE_COLUMN, draw_portrait, new_figure, panel_label, styled
 
 BOUND = 2.55  # rad, a little outside the axes
-INNER = [(0.2, 0.0), (0.4, 0.0), (-0.2, 0.0), (-0.4, 0.0)]
-LOOPS = [(s * theta, 0.0) for theta in (0.68, 0.95, 1.2) for s in (1, -1)]
+# Inside the separatrices, and far enough from them for both to be seen.
+INNER = [(0.16, 0.0), (0.32, 0.0)]
+LOOPS = [(s * theta, 0.0) for theta in (0.8, 1.0, 1.22) for s in (1, -1)]
 STARTS: dict[str, list[tuple[float, float]]] = {
-    "a": [*INNER[:2], *LOOPS, (2.0, 0.0), (2.2, 0.0)],
+    "a": [*INNER, *LOOPS, (2.0, 0.0), (2.2, 0.0)],
     "b": [*LOOPS, (0.42, 0.0), (-0.42, 0.0), (2.25, 0.0), (-2.25, 0.0)],
     "c": [(2.3, 0.0), (-2.3, 0.0), (2.0, 0.0), (-2.0, 0.0), (0.45, 0.0), (-0.45, 0.0), (0.62, 0.0), (-0.62, 0.0)],
 }

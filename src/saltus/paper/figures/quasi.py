@@ -83,7 +83,6 @@ def _resolved(panel: Any) -> Measured:
     periodic = int((~chaotic & ~undecided).any(axis=1).sum())
     largest = float(np.max(bands["exponent"].values, initial=-np.inf))
     return measured(
-        not reason,
         bool(reason) and largest > 0.0 and periodic > 0,
         reason=reason,
         bands=[{"low": low, "high": high} for low, high in zip(bands["low"].values, bands["high"].values, strict=True)],
