@@ -31,12 +31,14 @@ from .orbits import (
 )
 from .studies import bifurcation_diagram, chaotic_bands, phase_portrait, response_spectrum, stability_chart
 from .systems import (
+    Contact,
     EnergyRestitution,
     Harmonic,
     InelasticImpact,
     Load,
     Metainterface,
     Model,
+    NewtonImpact,
     PhysicalCell,
     Record,
     RockingBlock,
@@ -50,6 +52,7 @@ from .systems import (
 
 __all__ = [
     "Branch",
+    "Contact",
     "EnergyRestitution",
     "EventKind",
     "Exponents",
@@ -60,6 +63,7 @@ __all__ = [
     "Model",
     "Motion",
     "MotionError",
+    "NewtonImpact",
     "ParameterError",
     "PeriodicOrbit",
     "PhysicalCell",

@@ -184,7 +184,7 @@ def test_the_threshold_is_within_a_factor_of_where_motions_do_leave(H, V, e, fac
         forced(H=0.0, C=0.0),  # nothing takes energy
         forced(C=0.0, H=0.02),
         forced(mean=0.05, H=0.04, e=0.3),
-        System(model=TwoLayer(beta0=1.3), load=Load(vertical=-0.5)),  # no contact of its own
+        System(model=TwoLayer(beta0=1.3), load=Load(vertical=-0.5)),  # two contacts
         System(
             model=Metainterface(beta0=1.3),
             load=Load(frequency=1.0, vertical=-0.5, ground_horizontal=Harmonic(0.01)),

@@ -58,7 +58,8 @@ def test_the_impact_laws_are_all_named():
 
 
 @pytest.mark.parametrize(
-    "name", ["README.md", "docs/attractors.md", "docs/ensembles.md", "docs/models.md", "docs/orbits.md", "docs/smoothing.md"]
+    "name",
+    ["README.md", *(f"docs/{page}.md" for page in ("attractors", "contacts", "ensembles", "models", "orbits", "smoothing"))],
 )
 def test_every_snippet_runs(name, monkeypatch):
     text = (ROOT / name).read_text(encoding="utf-8")

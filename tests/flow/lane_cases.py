@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from shared_systems import paired
 
 import saltus
 from saltus.errors import MotionError, ParameterError
@@ -19,7 +20,6 @@ from saltus.systems import (
     Record,
     RockingBlock,
     System,
-    TwoLayer,
     VelocityReduction,
     WallOscillator,
 )
@@ -354,19 +354,17 @@ def wall(rng, n):
     return Cases(system, columns, {"x": place - behind}, start_speeds(rng, n), start_times(rng, n), periods(rng))
 
 
-def two_layers(rng, n):
-    """Both layers open, until one closes."""
-    load = Load(frequency=1.0, horizontal=Harmonic(0.0), vertical=-0.2, ground_horizontal=Harmonic(0.0), lower_vertical=0.1)
-    system = System(model=TwoLayer(beta0=1.2, mass_ratio=0.5), load=load)
-    columns = layers(rng, n) | {
-        "model.beta0": rng.uniform(0.6, 1.4, n),
-        "model.mass_ratio": rng.uniform(0.2, 3.0, n),
+def pair(rng, n):
+    """Two coordinates without a contact."""
+    system = paired()
+    columns = {
+        "model.coupling": rng.uniform(0.0, 1.0, n),
+        "model.cubic": rng.uniform(0.0, 1.0, n),
+        "model.damping": rng.uniform(0.0, 0.3, n),
         "load.frequency": frequencies(rng, n),
-        "load.horizontal.amplitude": rng.uniform(0, 1, n),
-        "load.ground_horizontal.amplitude": rng.uniform(0, 0.3, n),
-        "load.vertical": rng.uniform(-0.5, 0.5, n),
+        "load.force.amplitude": rng.uniform(0, 1, n),
     }
-    state = {"theta_1": rng.uniform(0.0, 1.0, n), "theta_2": -rng.uniform(0.0, 1.0, n)}
+    state = {"x": rng.normal(size=n), "y": rng.normal(size=n)}
     return Cases(system, columns, state, (rng.normal(size=n), rng.normal(size=n)), start_times(rng, n), periods(rng))
 
 
@@ -408,7 +406,7 @@ FAMILIES: dict[str, Callable[[Any, int], Cases]] = {
         rocking,
         rocking_inelastic,
         wall,
-        two_layers,
+        pair,
         duffing,
         curved,
     )

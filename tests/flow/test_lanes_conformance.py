@@ -7,10 +7,11 @@ import re
 import numpy as np
 import pytest
 from lane_cases import Curved, Duffing, end_state, motion_state
+from shared_systems import Pair
 
 import saltus
 from saltus.flow import stop_names
-from saltus.systems import Harmonic, Load, System
+from saltus.systems import Harmonic, Load, Model, System
 from saltus.systems.registry import IMPACTS, MODELS
 
 GUESSES = (0.4, 0.3, 0.9, 1.1)  # for a number without a default that a model may want
@@ -61,12 +62,7 @@ def states_of(system, n=24):
 
 
 def some_paths(system):
-    """One number of the model, one of a channel, the frequency, and one of the impact law; of several coordinates the frequency.
-
-    Each adds as many columns as there are coordinates, and the compile of TwoLayer's takes a minute with three.
-    """
-    if len(system.model.coordinates) > 1:
-        return ("load.frequency",)
+    """One number of the model, one of a channel, the frequency, and one of the impact law."""
     numbers = [path for path in system.parameters if not path.endswith(".order")]
     chosen = [next(p for p in numbers if p.startswith("model.")), next(p for p in numbers if p.endswith(".amplitude"))]
     return tuple(
@@ -74,7 +70,8 @@ def some_paths(system):
     )
 
 
-CASES = {**MODELS, "Duffing": Duffing, "Curved": Curved}
+ONE_CONTACT = {name: model for name, model in MODELS.items() if model.contacts is Model.contacts}
+CASES = {**ONE_CONTACT, "Duffing": Duffing, "Curved": Curved, "Pair": Pair}
 
 
 @pytest.fixture(scope="module", params=list(CASES))

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from generated_functions import Generated
+from shared_systems import paired
 
 from saltus.flow.event_derivatives import saltation
 from saltus.systems import (
@@ -15,7 +16,6 @@ from saltus.systems import (
     Record,
     RockingBlock,
     System,
-    TwoLayer,
     VelocityReduction,
     WallOscillator,
 )
@@ -141,9 +141,8 @@ def test_the_determinant_of_the_saltation_is_that_of_the_law(name):
 
 
 def test_the_series_of_the_columns_are_those_of_the_differences():
-    """Of both layers: the Taylor coefficients of u are the derivatives of the coordinates' coefficients."""
-    load = Load(frequency=0.9, horizontal=Harmonic(0.3), vertical=-0.5)
-    system = System(model=TwoLayer(beta0=1.4, damping=0.1, mass_ratio=0.4), load=load)
+    """Of two coordinates: the Taylor coefficients of u are the derivatives of the coordinates' coefficients."""
+    system = paired(0.3, 0.9)
     position, velocity, order = np.array([0.3, -0.5]), np.array([0.7, 0.2]), 8
     own = Generated(system)
     extended = Generated(system, sensitivities=())

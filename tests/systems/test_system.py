@@ -129,7 +129,7 @@ def test_what_is_no_system_in_json_is_refused_in_a_sentence(text):
 def test_an_impact_law_without_impacts_is_refused():
     with pytest.raises(ParameterError, match="has no impacts"):
         System(model=Metainterface(beta0=1.4, smoothing=50.0), impact=VelocityReduction(0.5))
-    with pytest.raises(ParameterError, match="has no impacts"):
+    with pytest.raises(ParameterError, match="EnergyRestitution is no law for the contacts of a TwoLayer; give NewtonImpact"):
         System(model=TwoLayer(beta0=1.4), impact=EnergyRestitution(0.5))
 
 

@@ -78,7 +78,7 @@ def test_every_entry_of_the_matrices_follows_from_the_lagrangian(lagrange, is_ze
     model, theta, rate, second = lagrange.model, lagrange.theta, lagrange.rate, lagrange.second
     mass, drag = model.mass_matrix(theta), model.damping_matrix()
     turning, stiffness = model.velocity_matrix(theta), model.stiffness_matrix()
-    force = model.force(lagrange.t, theta, lagrange.load)
+    force = model.load_vector(lagrange.t, theta, lagrange.load)
     zero = dict.fromkeys((*rate, *second), 0)
     for i, residual in enumerate(lagrange.residuals):
         assert is_zero(sp.diff(residual, rate[0], rate[1]))  # no product of velocities: D is all there is
@@ -95,7 +95,7 @@ def test_linearisation_is_the_first_order_of_the_series(lagrange, is_zero):
     small = sp.Symbol("epsilon")
     shrink = {x: small * x for x in (*lagrange.theta, *lagrange.rate, *lagrange.second)}
     mass, stiffness = model.mass_matrix(model.contact), model.linear_stiffness_matrix(t, load)
-    force, drag = model.force(t, model.contact, load), model.damping_matrix()
+    force, drag = model.load_vector(t, model.contact, load), model.damping_matrix()
     for i, residual in enumerate(lagrange.residuals):
         grown = residual.subs(shrink, simultaneous=True)
         first = sp.diff(grown, small).subs(small, 0)
@@ -113,7 +113,7 @@ def test_acceleration_solves_the_matrix_equation_for_numbers_and_arrays():
     batch = np.array(EXAMPLE.acceleration(times, theta, velocity, 0, LOAD))
     for n in range(50):
         q, v, t = tuple(theta[:, n]), tuple(velocity[:, n]), times[n]
-        right = np.array(EXAMPLE.force(t, q, LOAD)) - EXAMPLE.damping_matrix() @ v
+        right = np.array(EXAMPLE.load_vector(t, q, LOAD)) - EXAMPLE.damping_matrix() @ v
         right = right - EXAMPLE.velocity_matrix(q) @ np.square(v) - EXAMPLE.stiffness_matrix() @ q
         expected = np.linalg.solve(EXAMPLE.mass_matrix(q), right)
         assert EXAMPLE.acceleration(t, q, v, 0, LOAD) == pytest.approx(expected, rel=1e-12)
@@ -180,14 +180,16 @@ def test_free_undamped_motion_conserves_energy_to_first_order():
         assert (energy(step) - energy(-step)) / (2 * step) == pytest.approx(power, abs=1e-7)
 
 
-def test_its_contract_is_a_model_without_contact_that_stops_at_first_contact():
+def test_its_contract_is_a_model_with_a_contact_of_each_layer_that_stops_at_the_kinematic_limits():
     assert EXAMPLE.sides == ()
+    assert [(contact.name, contact.coordinate, contact.sign) for contact in EXAMPLE.contacts] == [
+        ("lower", "theta_1", 1),
+        ("upper", "theta_2", -1),
+    ]
     assert EXAMPLE.coordinates == ("theta_1", "theta_2")
     assert EXAMPLE.channels == Metainterface.channels
     margins = EXAMPLE.margins(0.0, (0.2, -0.3), (0.0, 0.0), (0.0, 0.0), 0, LOAD)
     assert set(EXAMPLE.stops) <= set(margins)
-    assert margins["lower_contact"] == 0.2
-    assert margins["upper_contact"] == 0.3
     limit = math.pi - EXAMPLE.beta0
     past = EXAMPLE.margins(0.0, (limit + 0.1, -2 * limit - 0.1), (0.0, 0.0), (0.0, 0.0), 0, LOAD)
     assert past["lower_line_limit"] < 0 < past["lower_kinematic_limit"]

@@ -68,7 +68,7 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
         ParameterError: what is no system; a path that is not a number of it; values that are none or that it refuses; shapes
             that do not fit.
     """
-    check_system(system, "capture_speed")
+    check_system(system, "capture_speed", several_contacts=True)
     arrays = {path: finite_array(path, given) for path, given in parameter_table(system, parameters).items()}
     dims, shape, coords, columns = broadcast_arrays(arrays)
     check_parameters(system, columns)

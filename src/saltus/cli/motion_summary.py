@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -39,10 +40,14 @@ def _state(motion: Motion) -> list[tuple[str, str]]:
 
 
 def _events(motion: Motion) -> list[tuple[str, str]]:
-    if not motion.system.model.sides:  # nothing to hit
+    if not (motion.system.model.sides or motion.system.model.contacts):  # nothing to hit
         return []
     impacts = motion.impacts
-    last = f", the last at {impacts.time[-1]:.12g} with speed {abs(impacts.velocity_before[-1]):.6g}" if len(impacts) else ""
+    last = (
+        f", the last at {impacts.time[-1]:.12g} with speed {np.abs(impacts.velocity_before[-1]).max():.6g}"
+        if len(impacts)
+        else ""
+    )
     rows = [("impacts", f"{len(impacts)}{last}")]
     kinds = Counter(event.kind for event in motion.events if event.kind is not EventKind.IMPACT)
     if kinds:

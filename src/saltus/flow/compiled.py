@@ -23,6 +23,7 @@ from saltus.flow import (
     segments,
     steps,
 )
+from saltus.flow.contacts import complementarity, contact_impacts, contact_layout, contacts_kernel
 from saltus.flow.memory_layout import State
 from saltus.taylor import (
     Case,
@@ -62,12 +63,18 @@ class Structure:
     """The compiled functions of a traced structure, and its sizes."""
 
     module: ModuleType
-    functions: tuple[Any, ...]  # series, contact_series, reset, contact_damping, tangent: what the kernel calls
+    functions: tuple[
+        Any, ...
+    ]  # series, contact_series, reset, contact_damping, tangent: what the kernel calls; or series, matrices
+    signs: tuple[int, ...] = ()  # of the contacts, of a model with several
 
     def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """The arguments `env` and `model` of the kernel for given numbers (see `kernel.py`)."""
         constants, geometry = np.zeros(self.module.CONSTANT_COUNT), np.zeros(3)
         self.module.constants(parameters, constants)
+        if self.signs:
+            env = (np.append(parameters, np.ones(self.module.OWN)), constants, *records)
+            return env, (*self.functions, np.array(self.signs, dtype=float))
         env = (parameters, constants, *records)
         self.module.geometry(env, geometry)
         return env, (*self.functions[:4], geometry, self.functions[4])
@@ -90,6 +97,13 @@ def kernel_module() -> ModuleType:
 
 
 @cache
+def load_contacts_kernel() -> Callable[..., int]:
+    """The kernel for models with several contacts, `advance_contacts` of `contacts/contacts_kernel.py`."""
+    parts = (contact_layout, complementarity, contact_impacts, contacts_kernel)
+    return entry_point(load_module("contacts", _text(kernel_layout, roots, steps, *parts)).advance_contacts)
+
+
+@cache
 def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
     """What periodic orbits are solved with: `fly_segments` and `impact_equations` of `segments.py`."""
     module = load_module("segments", _text(kernel_layout, roots, steps, contact, contact_side, chatter, segments))
@@ -104,8 +118,9 @@ def _text(*modules: ModuleType) -> str:
 def load_structure(trace: Trace) -> Structure:
     """The functions of a trace's structure."""
     module = load_module("structure", generated_header(_SIGNATURES) + structure_text(trace))
-    names = ("series", "contact_series", "reset", "contact_damping", "tangent")
-    return Structure(module, tuple(pointer(getattr(module, name)) for name in names))
+    several = ("series", "matrices")
+    names = several if trace.signs else ("series", "contact_series", "reset", "contact_damping", "tangent")
+    return Structure(module, tuple(pointer(getattr(module, name)) for name in names), trace.signs)
 
 
 # --- the functions of a structure ------------------------------------------------------------------------------------------
@@ -118,7 +133,7 @@ def structure_text(trace: Trace) -> str:
         "DOF": len(trace.acceleration),
         "OWN": trace.dof,
         "COLUMNS": trace.columns,
-        "STOPS": len(trace.margins),
+        "STOPS": len(trace.reactions) + len(trace.margins),
         "ROWS": 1,
         "SIDES": trace.sides,
         "STEEP": int(is_steep(trace.acceleration)),
@@ -127,21 +142,26 @@ def structure_text(trace: Trace) -> str:
     impact = [x for x in (trace.next_side, trace.velocity_after) if x is not None] or [number(0.0)] * 2
     damping = [number(0.0) if trace.contact_damping is None else trace.contact_damping]
     instant = ("side", "env", "piece")
-    functions = [
-        _series(trace, known),
+    functions = [_series(trace, known), _table("constants", Places(("parameters", "constants"), ENV), list(known), {})]
+    if trace.signs:
+        return _source(sizes, [*functions, _matrices(trace, known)])
+    functions += [
         _contact_series(trace, known),
         _at_impact("reset", ("t", "origin", "v0", *instant), impact, known),
         _at_impact("contact_damping", ("t", "origin", *instant), damping, known),
         _tangent(trace, known),
         _table("geometry", Places(("env", "out"), ENV), _geometry(trace), known),
-        _table("constants", Places(("parameters", "constants"), ENV), list(known), {}),
     ]
+    return _source(sizes, functions)
+
+
+def _source(sizes: dict[str, int], functions: list[str]) -> str:
     return "\n".join([*(f"{name} = {value!r}" for name, value in sizes.items()), "", *functions])
 
 
 def constants(trace: Trace) -> dict[Expr, int]:
     """Where the table of constants has the parts of a structure's expressions that depend on parameters alone."""
-    roots = [*trace.acceleration, *motion_roots(trace), *_geometry(trace)]
+    roots = [*trace.acceleration, *motion_roots(trace), *_geometry(trace), *trace.mass, *trace.restitution, *trace.positions]
     roots += [
         x for x in (trace.contact_acceleration, trace.next_side, trace.velocity_after, trace.contact_damping) if x is not None
     ]
@@ -151,11 +171,11 @@ def constants(trace: Trace) -> dict[Expr, int]:
 
 
 def motion_roots(trace: Trace) -> list[Expr]:
-    """The gap and the margins of a trace, without accelerations as leaves: their series are made along with the motion's."""
+    """Gap, reactions and margins of a trace, without accelerations as leaves: their series are made with the motion's."""
     accelerations = {Expr("acceleration", (), i): a for i, a in enumerate(trace.acceleration[: trace.dof])}
     return [
         *([] if trace.gap is None else [trace.gap]),
-        *(substitute(margin, accelerations) for margin in trace.margins.values()),
+        *(substitute(root, accelerations) for root in (*trace.reactions, *trace.margins.values())),
     ]
 
 
@@ -170,8 +190,9 @@ def _series(trace: Trace, known: dict[Expr, int]) -> str:
     """The Taylor coefficients of the coordinates, velocities, accelerations, the gap and the margins from one state."""
     rows = range(len(trace.acceleration))
     gap = [] if trace.gap is None else [("g", 0)]
-    targets = [*(("a", i) for i in rows), *gap, *(("m", j) for j in range(len(trace.margins)))]
-    places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), LEAVES)
+    targets = [*(("a", i) for i in rows), *gap, *(("m", j) for j in range(len(trace.reactions) + len(trace.margins)))]
+    leaves = LEAVES | {"free": ("parameters", len(trace.parameters))}
+    places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves)
     layout = Rows([("q", i) for i in rows], [("v", i) for i in rows], targets, MOST_COEFFICIENTS, any_order=True)
     motion = tape([*trace.acceleration, *motion_roots(trace)], known, series=True)
     return function_text("series", places, "SCALAR", [layout, motion])
@@ -184,6 +205,13 @@ def _contact_series(trace: Trace, known: dict[Expr, int]) -> str:
         return function_text("contact_series", places, "SCALAR", [])
     layout = Rows([], [], [("b", 0)], MOST_COEFFICIENTS, any_order=True)
     return function_text("contact_series", places, "SCALAR", [layout, tape([trace.contact_acceleration], known, series=True)])
+
+
+def _matrices(trace: Trace, known: dict[Expr, int]) -> str:
+    """The mass matrix, E and the positions of the contacts at a state, one after the other."""
+    roots = [*trace.mass, *trace.restitution, *trace.positions]
+    places = Places(("env", "piece", "state", "out"), ENV | {"coordinate": ("state", State.COORDINATES.value)})
+    return function_text("matrices", places, "SCALAR", [Case(tape(roots, known), [("out", i) for i in range(len(roots))])])
 
 
 def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]) -> str:

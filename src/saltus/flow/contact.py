@@ -13,7 +13,6 @@ from saltus.flow.kernel_layout import (
     SLOW,
     SLOWLY,
     TINY,
-    ZERO,
     Geometry,
     GrazingDetail,
     Mode,
@@ -24,7 +23,8 @@ from saltus.flow.kernel_layout import (
     Work,
 )
 from saltus.flow.memory_layout import EventCode, ReleaseDetail, RestDetail, State
-from saltus.flow.steps import forget, record_event, record_shift, record_step
+from saltus.flow.roots import leading
+from saltus.flow.steps import forget, motion_end, record_event, record_shift, record_step
 from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -49,15 +49,6 @@ def hold(where, state, model, q):
     for k in range(q.shape[1]):
         q[0, k] = 0.0
     q[0, 0] = state[State.COORDINATES]
-
-
-@lean_jit
-def leading(coefficients, start, order):
-    """The index from `start` on of the first coefficient that is not zero to within ZERO; `order` if there is none."""
-    for k in range(start, order):
-        if abs(coefficients[k]) > ZERO:
-            return k
-    return order
 
 
 @lean_jit
@@ -163,14 +154,6 @@ def release_columns(where, state, env, model, events, t, origin):
         if math.isnan(state[State.COORDINATES + where[Where.OWN] + j]):
             state[State.COORDINATES + 2 * where[Where.DOF] + j] = math.nan
     record_shift(where, state, events)
-
-
-@lean_jit
-def motion_end(where, settings):
-    """The time at which the motion ends, as counted from the present forcing period."""
-    if where[Where.UNTIL_SMOOTH] > 0:
-        return settings[Setting.HORIZON]
-    return (where[Where.LAST_PERIOD] - where[Where.PERIOD]) * settings[Setting.LENGTH] + settings[Setting.END]
 
 
 @lean_jit

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.chatter import chatter_decay
-from saltus.flow.contact import contact_accelerations, decide, hold, impact, leading, rate_of
+from saltus.flow.contact import contact_accelerations, decide, hold, impact, rate_of
 from saltus.flow.function_types import ADVANCE
 from saltus.flow.kernel_layout import (
     BATCH,
@@ -36,8 +36,19 @@ from saltus.flow.kernel_layout import (
     Work,
 )
 from saltus.flow.memory_layout import EventCode, State
-from saltus.flow.roots import NEVER, SIMPLE, contact_root, first_root, horner, scale_gap
-from saltus.flow.steps import column_step, expand, leaps, move, record_event, record_shift, record_step, step_size, work_arrays
+from saltus.flow.roots import NEVER, SIMPLE, contact_root, first_root, horner, leading, margin_root, scale_gap
+from saltus.flow.steps import (
+    column_step,
+    expand,
+    leaps,
+    move,
+    next_target,
+    record_event,
+    record_shift,
+    record_step,
+    step_size,
+    work_arrays,
+)
 from saltus.taylor import lean_jit
 from saltus.taylor import not_here as cached_jit
 
@@ -63,13 +74,9 @@ def arc_step(where, settings, env, model, work, t, origin, target, size):
 def first_margin(where, m, order, h, poly, hit, first):
     """The margin that reaches zero first within the step, and when, if that is before `first`; else `hit` and `first`."""
     for j in range(where[Where.MARGINS]):
-        if m[j, 0] <= 0.0:
-            hit, first = j, 0.0
-        else:
-            scale_gap(m[j], 0, order, h, poly)
-            kind, u, _ = first_root(poly, order)
-            if kind == SIMPLE and u < first:
-                hit, first = j, u
+        u = margin_root(m[j], order, h, poly)
+        if u < first:
+            hit, first = j, u
     return hit, first
 
 
@@ -155,16 +162,6 @@ def held(where, state, settings, env, model, work, steps, origin, target):
     else:
         where[Where.MODE], where[Where.SKIP] = Mode.CONTACT, released
         state[State.TIME] = t + tau if t + tau > t or released == 0 else np.nextafter(t, np.inf)  # time must go on
-
-
-@lean_jit
-def next_target(where, state, breaks, origin, t_end):
-    """The time up to which the next step may go: the end of the forcing period, or a breakpoint of the records before."""
-    while where[Where.PIECE] < breaks.size and breaks[where[Where.PIECE]] - origin <= state[State.TIME]:
-        where[Where.PIECE] += 1
-    if where[Where.PIECE] < breaks.size:
-        return min(t_end, breaks[where[Where.PIECE]] - origin)
-    return t_end
 
 
 @cached_jit(ADVANCE)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 
 from saltus.errors import ParameterError
+from saltus.flow.compiled import load_kernel
 from saltus.flow.contact_side import side_of_state
 from saltus.flow.kernel_layout import STRUCTURE_SIZES, Mode, ModelPart, Setting, Where
 from saltus.flow.memory_layout import State
@@ -23,7 +25,7 @@ class KernelState:
     settings: np.ndarray
 
     @classmethod
-    def at_start(cls, request: MotionRequest, run: Program) -> KernelState:
+    def at_start(cls, request: MotionRequest, run: Program) -> Self:
         """The state in which a motion starts.
 
         Raises:
@@ -39,6 +41,10 @@ class KernelState:
         state = _first_state(run, request.position, request.speeds)
         state[State.TIME] = at.local
         return cls(where, state, np.array([at.length, at.end, request.tol]))
+
+    def advance(self, run: Program, steps: Any, events: Any) -> int:
+        """Call the kernel; returns why it comes back."""
+        return load_kernel()(self.where, self.state, self.settings, run.env, run.model, steps, events)
 
     @property
     def time(self) -> float:
@@ -80,6 +86,8 @@ def _mode_and_side(request: MotionRequest, run: Program) -> tuple[int, int]:
     if model.sides:
         check_contact(request.system)
     position, speed = float(request.position[0]), float(request.speeds[0])
+    if model.contacts:
+        return Mode.CONTACT, 0
     mode, side = side_of_state.py_func(len(model.sides), position, speed, run.model[ModelPart.GEOMETRY])
     if mode == Mode.BEYOND:
         name = model.coordinates[0]

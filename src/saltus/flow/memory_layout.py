@@ -17,7 +17,8 @@ class EventCode(IntEnum):
     RELEASE = 3
     CHATTERING = 4
     LIMIT = 5
-    RESET_SLOPES = 6  # no event: the derivatives of the reset alone, at a fixed instant of impact
+    HELD = 6
+    RESET_SLOPES = 7  # no event: the derivatives of the reset alone, at a fixed instant of impact
 
 
 class RestDetail(IntEnum):

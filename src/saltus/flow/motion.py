@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
 
@@ -18,8 +19,6 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-    from saltus.flow.recorder import MotionEvents
-
 
 class EventKind(StrEnum):
     """What happens at an instant of a motion, in the order of the kernel's numbers."""
@@ -30,6 +29,10 @@ class EventKind(StrEnum):
     RELEASE = "release"  # it leaves contact from rest
     CHATTER = "chatter"  # impacts without loss became too small to follow; the phase is lost from here on
     LIMIT = "limit"  # a margin reached zero
+    HELD = "held"  # of several contacts, some come to rest as the limit of impacts
+
+
+EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +59,50 @@ class Impacts:
         return self.time.size
 
 
+class MotionEvents(Sequence[Event]):
+    """The events of a motion in order of time, made one by one from the kernel's arrays."""
+
+    def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray) -> None:
+        self._times, self._labels, self._values = times, labels, values
+
+    def __len__(self) -> int:
+        return int(self._times.size)
+
+    @overload
+    def __getitem__(self, index: int) -> Event: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Event]: ...
+    def __getitem__(self, index: Any) -> Any:
+        return self._only(index) if isinstance(index, slice) else self._event(index)
+
+    def _only(self, chosen: Any) -> Self:
+        return type(self)(self._times[chosen], self._labels[chosen], self._values[chosen])
+
+    def _event(self, index: int) -> Any:
+        kind, side = self._labels[index, 1:3]
+        before, after = self._values[index, 1:].tolist()
+        return Event(float(self._times[index]), EVENT_KINDS[kind], int(side), before, after)
+
+    def __repr__(self) -> str:
+        counts = {kind.value: int(np.sum(self._labels[:, 1] == i)) for i, kind in enumerate(EVENT_KINDS)}
+        return f"MotionEvents({', '.join(f'{n} {kind}' for kind, n in counts.items() if n)})"
+
+    def of(self, kind: EventKind) -> Self:
+        """The events of one kind."""
+        return self._only(self._labels[:, 1] == EVENT_KINDS.index(kind))
+
+    @property
+    def details(self) -> np.ndarray:
+        """What the kernel noted with each event, see `memory_layout.py`; of a limit, which margin it is."""
+        return self._labels[:, 3]
+
+    def impacts(self) -> Impacts:
+        """The impacts, as arrays."""
+        impacts = self.of(EventKind.IMPACT)
+        labels, values = impacts._labels, impacts._values
+        return Impacts(impacts._times, labels[:, 2].astype(np.int8), values[:, 1], values[:, 2])
+
+
 @dataclass(frozen=True, eq=False)
 class Samples:
     """States at given times: `time` (n,), `position` and `velocity` (degrees of freedom, n), `side` (n,), 0 at rest."""
@@ -80,7 +127,7 @@ class Motion:
     time: float  # at the end
     position: Any
     velocity: Any
-    side: int  # +1 or -1, and 0 at rest
+    side: int  # +1 or -1, and 0 at rest; of a model with contacts 1 and the sum of 2^i over the closed ones
     stop: Stop
     limit: str | None  # the margin that stopped it
     chatter_speed: float | None  # of the gap just after impacts on `side`, if it ends in chatter; theta and theta' are then 0
@@ -102,6 +149,11 @@ class Motion:
         state = ", ".join(f"{n}={x:.12g}" for n, x in zip(names, np.atleast_1d(self.position), strict=True))
         where = f"{self.stop.value} ({self.limit})" if self.limit else self.stop.value
         return f"Motion(time={self.time:.12g}, {state}, velocity={self.velocity}, impacts={len(self.impacts)}, stop={where})"
+
+    @property
+    def closed(self) -> tuple[str, ...]:
+        """The contacts that are closed at the end, of a model with several."""
+        return tuple(contact.name for i, contact in enumerate(self.system.model.contacts) if (self.side - 1) >> i & 1)
 
     @property
     def rest_time(self) -> float | None:

@@ -30,14 +30,15 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
     dataset = xarray.Dataset(coords={"time": ("time", times, {"units": "1", "long_name": "dimensionless time tau"})})
     for i, name in enumerate(names):
         unit = motion.system.model.unit_of(name)
-        rate = "velocity" if len(names) == 1 else f"{name}_velocity"
         dataset[name] = ("time", position[i], {"units": unit})
-        dataset[rate] = ("time", velocity[i], {"units": unit, "long_name": f"d {name} / d tau"})
-    dataset["side"] = ("time", side.astype(np.int8), {"units": "1", "long_name": "side, 0 at rest"})
-    impacts = motion.impacts
-    for name in ("time", "velocity_before", "velocity_after"):
-        unit = "1" if name == "time" else motion.system.model.unit_of(names[0])
-        dataset[f"impact_{name}"] = ("impact", getattr(impacts, name), {"units": unit})
+        dataset[rate_name(name, names)] = ("time", velocity[i], {"units": unit, "long_name": f"d {name} / d tau"})
+    if motion.system.model.contacts:
+        _add_contacts(motion, dataset, side)
+    else:
+        dataset["side"] = ("time", side.astype(np.int8), {"units": "1", "long_name": "side, 0 at rest"})
+        for name in ("time", "velocity_before", "velocity_after"):
+            unit = "1" if name == "time" else motion.system.model.unit_of(names[0])
+            dataset[f"impact_{name}"] = ("impact", getattr(motion.impacts, name), {"units": unit})
     dataset.attrs = {"title": "motion computed by saltus", "kind": "motion"} | provenance(motion.system, tol=motion.tol)
     dataset.attrs |= {
         "stop": motion.stop.value + (f" ({motion.limit})" if motion.limit else ""),
@@ -49,6 +50,30 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
     if motion.rest_time is not None:
         dataset.attrs["rest_time"] = motion.rest_time
     return dataset
+
+
+def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> None:
+    """Which contacts are closed, and the impacts: times, contacts, positions, velocities and impulses."""
+    model, impacts = motion.system.model, motion.impacts
+    names, contacts = model.coordinates, [contact.name for contact in model.contacts]
+    masks = np.array([1 << i for i in range(len(contacts))], dtype=np.int8)
+    flags = {"units": "1", "flag_masks": masks, "flag_meanings": " ".join(contacts)}
+    dataset["closed_contacts"] = ("time", (side - 1).astype(np.int8), flags | {"long_name": "contacts that are closed"})
+    dataset["impact_time"] = ("impact", impacts.time, {"units": "1"})
+    dataset["impact_contacts"] = ("impact", impacts.side, flags | {"long_name": "contacts that were hit"})
+    position = np.full((len(names), len(impacts)), np.nan)
+    if motion.dense is not None and len(impacts):
+        position = motion._states(impacts.time)[0]
+    for i, name in enumerate(names):
+        unit = {"units": model.unit_of(name)}
+        dataset[f"impact_{name}"] = ("impact", position[i], unit)
+        for when, velocity in (("before", impacts.velocity_before), ("after", impacts.velocity_after)):
+            dataset[f"impact_{rate_name(name, names)}_{when}"] = ("impact", velocity[:, i], unit)
+
+
+def rate_name(name: str, names: tuple[str, ...]) -> str:
+    """The name of the velocity of a coordinate."""
+    return "velocity" if len(names) == 1 else f"{name}_velocity"
 
 
 def _default_times(motion: Motion, period: float | None) -> np.ndarray:

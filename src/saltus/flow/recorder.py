@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, overload
 
 import numpy as np
 
 from saltus.errors import MotionError
+from saltus.flow.contacts.contact_events import ContactEvents
 from saltus.flow.dense_output import DenseOutput
 from saltus.flow.kernel_layout import Where
-from saltus.flow.motion import Event, EventKind, Impacts, Samples
+from saltus.flow.motion import MotionEvents, Samples
 from saltus.flow.request import MotionRequest
 from saltus.flow.validity import Validity, ValidityCheck
-
-EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
 
 
 @dataclass(frozen=True)
@@ -31,47 +28,6 @@ class RecorderSettings:
 MOST = RecorderSettings()
 
 
-class MotionEvents(Sequence[Event]):
-    """The events of a motion in order of time, made one by one from the kernel's arrays."""
-
-    def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray) -> None:
-        self._times, self._labels, self._values = times, labels, values
-
-    def __len__(self) -> int:
-        return int(self._times.size)
-
-    @overload
-    def __getitem__(self, index: int) -> Event: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Event]: ...
-    def __getitem__(self, index: Any) -> Any:
-        if isinstance(index, slice):
-            return MotionEvents(self._times[index], self._labels[index], self._values[index])
-        kind, side = self._labels[index, 1:3]
-        before, after = self._values[index, 1:].tolist()
-        return Event(float(self._times[index]), EVENT_KINDS[kind], int(side), before, after)
-
-    def __repr__(self) -> str:
-        counts = {kind.value: int(np.sum(self._labels[:, 1] == i)) for i, kind in enumerate(EVENT_KINDS)}
-        return f"MotionEvents({', '.join(f'{n} {kind}' for kind, n in counts.items() if n)})"
-
-    def of(self, kind: EventKind) -> MotionEvents:
-        """The events of one kind."""
-        chosen = self._labels[:, 1] == EVENT_KINDS.index(kind)
-        return MotionEvents(self._times[chosen], self._labels[chosen], self._values[chosen])
-
-    @property
-    def details(self) -> np.ndarray:
-        """What the kernel noted with each event, see `memory_layout.py`; of a limit, which margin it is."""
-        return self._labels[:, 3]
-
-    def impacts(self) -> Impacts:
-        """The impacts, as arrays."""
-        impacts = self.of(EventKind.IMPACT)
-        labels, values = impacts._labels, impacts._values
-        return Impacts(impacts._times, labels[:, 2].astype(np.int8), values[:, 1], values[:, 2])
-
-
 class Recorder:
     """Takes the kernel's buffers whenever they are full.
 
@@ -83,7 +39,9 @@ class Recorder:
         kept = request.dense or request.sample_times is not None
         dof, size = len(request.system.model.coordinates), MOST.buffer if kept else 8
         self.steps = (np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
-        self.events = (np.empty((MOST.buffer, 4), dtype=np.int64), np.empty((MOST.buffer, 3 + columns)))
+        self._contacts = [contact.name for contact in request.system.model.contacts]
+        self._width = 1 + 2 * dof + len(self._contacts) if self._contacts else 3  # the numbers of an event before its shifts
+        self.events = (np.empty((MOST.buffer, 4), dtype=np.int64), np.empty((MOST.buffer, self._width + columns)))
         self.total = 0  # events so far
         self._kept = 0  # steps so far
         self._length, self._times = float(request.clock.length), request.sample_times
@@ -125,11 +83,12 @@ class Recorder:
     def all_events(self) -> MotionEvents:
         """Everything that happened."""
         labels, values = (np.concatenate([chunk[i] for chunk in self._events]) for i in (0, 1))
-        return MotionEvents(labels[:, 0] * self._length + values[:, 0], labels, values[:, :3])
+        times, values = labels[:, 0] * self._length + values[:, 0], values[:, : self._width]
+        return ContactEvents(times, labels, values, self._contacts) if self._contacts else MotionEvents(times, labels, values)
 
     def event_shifts(self) -> np.ndarray:
         """How the time of each event moves with each column of the tangent, (events, columns); nan where that is not known."""
-        return np.concatenate([values[:, 3:] for _, values in self._events])
+        return np.concatenate([values[:, self._width :] for _, values in self._events])
 
     def dense(self) -> DenseOutput | None:
         """The whole dense output, or None where it was not kept."""

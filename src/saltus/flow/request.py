@@ -45,7 +45,7 @@ class MotionRequest:
     sample_times: np.ndarray | None = field(init=False)
 
     def __post_init__(self) -> None:
-        check_system(self.system, "simulate")
+        check_system(self.system, "simulate", several_contacts=True)
         for name, value in self._read().items():
             object.__setattr__(self, name, value)
 
@@ -78,8 +78,19 @@ def _sample_times(samples: Any, start: float) -> np.ndarray:
     return times
 
 
+def _one_by_one(coordinates: Mapping[str, Any], names: tuple[str, ...]) -> Mapping[str, Any]:
+    """The coordinates by their names, where they are given together: theta=(0.2, 0.0) for theta_1 and theta_2."""
+    for together, values in coordinates.items():
+        if together not in names and names == tuple(f"{together}_{i + 1}" for i in range(len(names))):
+            if np.shape(values) != (len(names),):
+                raise ParameterError(f"{together} must have {len(names)} values, got {values!r}", together)
+            return {name: v for name, v in coordinates.items() if name != together} | dict(zip(names, values, strict=True))
+    return coordinates
+
+
 def _start_state(system: System, velocity: Any, coordinates: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
     names = system.model.coordinates
+    coordinates = _one_by_one(coordinates, names)
     for name in coordinates:
         if name not in names:
             raise ParameterError(

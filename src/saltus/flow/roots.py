@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.taylor import jit
+from saltus.flow.kernel_layout import ZERO
+from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -184,3 +185,22 @@ def contact_root(g, skip, order, h, poly):
         skip += 1
     scale_gap(g, skip, order, h, poly)
     return first_root(poly, order - skip)
+
+
+@lean_jit
+def margin_root(m, order, h, poly):
+    """When a margin reaches zero within the step, as a share of it; 0 if it has, NEVER if it does not."""
+    if m[0] <= 0.0:
+        return 0.0
+    scale_gap(m, 0, order, h, poly)
+    kind, u, _ = first_root(poly, order)
+    return u if kind == SIMPLE else NEVER
+
+
+@lean_jit
+def leading(coefficients, start, order):
+    """The index from `start` on of the first coefficient that is not zero to within ZERO; `order` if there is none."""
+    for k in range(start, order):
+        if abs(coefficients[k]) > ZERO:
+            return k
+    return order

@@ -17,7 +17,7 @@ from saltus.flow.request import MotionRequest
 from saltus.flow.simulation import Followed, follow
 from saltus.flow.stops import Stop
 from saltus.progress import Progress, silent
-from saltus.systems import System
+from saltus.systems import System, check_system
 from saltus.taylor import FREQUENCY
 
 
@@ -88,7 +88,7 @@ def sensitivities(
         ParameterError: a path to no number, with the near ones; an argument without meaning.
         MotionError: as for `simulate`.
     """
-    paths = _paths(parameters)
+    paths = _paths(system, parameters)
     request = MotionRequest(
         system=system,
         coordinates=coordinates,
@@ -116,7 +116,9 @@ def sensitivities(
     )
 
 
-def _paths(parameters: Iterable[str]) -> tuple[str, ...]:
+def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
+    """The parameters to differentiate to, of a system whose motion has derivatives here."""
+    check_system(system, "sensitivities")
     try:
         return (parameters,) if isinstance(parameters, str) else tuple(parameters)
     except TypeError:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow.compiled import load_kernel
+from saltus.flow.contacts.contact_state import ContactState
 from saltus.flow.kernel_layout import Mode, Setting, Status, Where
 from saltus.flow.kernel_state import KernelState
 from saltus.flow.memory_layout import State
@@ -86,7 +86,7 @@ class Followed:
 def follow(request: MotionRequest, progress: Progress) -> Followed:
     """`simulate`, and its tangent if the request asks for it."""
     run = program(request.system, request.limits, request.sensitivities)
-    now = KernelState.at_start(request, run)
+    now = (ContactState if request.system.model.contacts else KernelState).at_start(request, run)
     recorder = Recorder(request, int(now.where[Where.ORDER]), int(now.where[Where.COLUMNS]))
     status = _advance(request.system, run, now, recorder, progress)
     return Followed(_collect(request, now, status, recorder), now.columns, recorder.event_shifts())
@@ -94,11 +94,11 @@ def follow(request: MotionRequest, progress: Progress) -> Followed:
 
 def _advance(system: System, run: Program, now: KernelState, recorder: Recorder, progress: Progress) -> int:
     """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended."""
-    advance, begin, end = load_kernel(), now.time, now.end_time
+    begin, end = now.time, now.end_time
     checked_at, counted, unit = begin, 0, min(now.settings[Setting.LENGTH] or 1.0, 1.0)
     progress(0.0, WHAT)
     while True:
-        status = advance(now.where, now.state, now.settings, run.env, run.model, recorder.steps, recorder.events)
+        status = now.advance(run, recorder.steps, recorder.events)
         recorder.take(now.where)
         time = now.time
         if end > begin:
@@ -139,7 +139,7 @@ def _refuse(system: System, status: int, now: KernelState) -> None:
             f"the motion leaves the range of numbers {at}; its velocity was last "
             f"{velocity:.6g}; a power or root of the model may have no Taylor series there, such as abs(x)**1.5 at x = 0"
         )
-    if status == Status.STALLED:
+    if status == Status.STALLED and not system.model.singularity:
         raise MotionError(f"the steps shrink to nothing {at}: the acceleration is singular there")
 
 
@@ -150,6 +150,8 @@ def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Re
     stop, limit = (Stop.REST if mode == Mode.REST else Stop.HORIZON), None
     if status == Status.LIMITED:
         stop, limit = Stop.LIMIT, request.limits[events.details[-1]]
+    if status == Status.STALLED:
+        stop, limit = Stop.SINGULAR, request.system.model.singularity
     samples = recorder.samples(time, position, velocity, now.side)
     return Motion(
         system=request.system,

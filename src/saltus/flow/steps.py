@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.kernel_layout import DEFECT, GAP, SAFETY, SMALLEST, ModelPart, Where
+from saltus.flow.kernel_layout import DEFECT, GAP, SAFETY, SMALLEST, ModelPart, Setting, Where
 from saltus.flow.memory_layout import State
 from saltus.flow.roots import horner
 from saltus.taylor import jit, lean_jit
@@ -157,3 +157,21 @@ def record_step(where, steps, side, t, h, q):
         for k in range(where[Where.ORDER] + 2):
             coefficients[i, d, k] = q[d, k]
     where[Where.STEPS] = i + 1
+
+
+@lean_jit
+def next_target(where, state, breaks, origin, t_end):
+    """The time up to which the next step may go: the end of the forcing period, or a breakpoint of the records before."""
+    while where[Where.PIECE] < breaks.size and breaks[where[Where.PIECE]] - origin <= state[State.TIME]:
+        where[Where.PIECE] += 1
+    if where[Where.PIECE] < breaks.size:
+        return min(t_end, breaks[where[Where.PIECE]] - origin)
+    return t_end
+
+
+@lean_jit
+def motion_end(where, settings):
+    """The time at which the motion ends, as counted from the present forcing period."""
+    if where[Where.UNTIL_SMOOTH] > 0:
+        return settings[Setting.HORIZON]
+    return (where[Where.LAST_PERIOD] - where[Where.PERIOD]) * settings[Setting.LENGTH] + settings[Setting.END]

@@ -24,5 +24,6 @@ class Stop(StrEnum):
     NO_IMPACT = "no_impact", "the impact law has no velocity after the impact"
     NOT_FINITE = "not_finite", "the motion leaves the range of numbers"
     STALLED = "stalled", "the acceleration is singular"
+    SINGULAR = "singular", "the mass matrix has no inverse"
     OUTSIDE = "outside", "the state at the start lies beyond the contact"
     UNRESOLVED = "unresolved", "impacts accumulate too slowly to be followed: more than a million in a unit of time"

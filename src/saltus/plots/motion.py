@@ -58,14 +58,18 @@ def rate_of(dataset: xarray.Dataset, name: str) -> str:
 def arcs(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time, position and velocity with the impacts put in between the samples, parted by NaN where the velocity jumps."""
     time, position, velocity = (dataset[n].values for n in ("time", name, rate_of(dataset, name)))
-    if rate_of(dataset, name) != "velocity" or "impact_time" not in dataset:
+    rate = rate_of(dataset, name)
+    if f"impact_{rate}_before" not in dataset:
         return time, position, velocity
     at = dataset["impact_time"].values
-    before, after = (dataset[f"impact_velocity_{when}"].values for when in ("before", "after"))
+    before, after = (dataset[f"impact_{rate}_{when}"].values for when in ("before", "after"))
     # Samples at the very instant of an impact show the state after it, and so follow it.
     times = np.concatenate([at, at, at, time])
     order = np.argsort(times, kind="stable")
-    there = np.full(at.size, _contact(at, before, (time, position, velocity)))
+    if f"impact_{name}" in dataset:
+        there = dataset[f"impact_{name}"].values
+    else:
+        there = np.full(at.size, _contact(at, before, (time, position, velocity)))
     positions = np.concatenate([there, there, there, position])
     velocities = np.concatenate([before, np.full(at.size, np.nan), after, velocity])
     return times[order], positions[order], velocities[order]

@@ -1,8 +1,11 @@
 from .cell_layout import CellLayout
+from .constrained import constrained_acceleration, mass_and_force, reactions
+from .contact import Contact
 from .impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
 from .load import Channel, Load
 from .metainterface import Metainterface
 from .model import MarginKind, Model
+from .newton_impact import NewtonImpact, energy_gain
 from .parameter_tables import broadcast_arrays, check_parameters, finite_array, parameter_table
 from .parameters import children, is_number, numbers, substitute
 from .registry import IMPACTS, MODELS, register
@@ -22,6 +25,7 @@ __all__ = [
     "CellLayout",
     "Channel",
     "Constant",
+    "Contact",
     "EnergyRestitution",
     "Harmonic",
     "ImpactLaw",
@@ -32,6 +36,7 @@ __all__ = [
     "Metainterface",
     "Model",
     "NamedImpact",
+    "NewtonImpact",
     "PhysicalCell",
     "Record",
     "RockingBlock",
@@ -48,12 +53,16 @@ __all__ = [
     "check_parameters",
     "check_system",
     "children",
+    "constrained_acceleration",
+    "energy_gain",
     "finite_array",
     "is_number",
+    "mass_and_force",
     "name_impact",
     "numbers",
     "other_impulse",
     "parameter_table",
+    "reactions",
     "register",
     "reversed_system",
     "substitute",

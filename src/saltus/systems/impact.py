@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import settle_numbers
+from saltus.errors import ParameterError
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 
@@ -29,10 +30,25 @@ class ImpactLaw:
         """
         raise NotImplementedError
 
+    def restitution_matrix(self, model: Model) -> list[list[Any]]:
+        """E of the impacts of a model with contacts, 0 <= J _|_ v+ + E v- >= 0, rows and columns in the order of its contacts.
+
+        J are the impulses, and v the rates of the gaps, at all contacts whose gap is 0.
+
+        Raises:
+            ParameterError: a law that has no meaning for several contacts.
+        """
+        raise ParameterError(
+            f"{type(self).__name__} is no law for the contacts of a {type(model).__name__}; give NewtonImpact(e=...)", "impact"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class VelocityReduction(ImpactLaw):
-    """v+ = e v-, with a constant factor e in [0, 1] (paper, `vel_red`)."""
+    """v+ = e v-, with a constant factor e in [0, 1] (paper, `vel_red`).
+
+    In a model with contacts the other ones take the speed on if it says so (`transfers`), else each contact turns it back.
+    """
 
     e: float = 1.0
 
@@ -42,6 +58,11 @@ class VelocityReduction(ImpactLaw):
     def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
         """e v-."""
         return self.e * velocity
+
+    def restitution_matrix(self, model: Model) -> list[list[Any]]:
+        """e at the contact that is hit, or at the others."""
+        places = range(len(model.contacts))
+        return [[self.e if (i != j) == model.transfers else 0.0 for j in places] for i in places]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,3 +109,7 @@ class InelasticImpact(ImpactLaw):
     def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
         """The model's `inelastic_factor` times v-."""
         return model.inelastic_factor(side) * velocity
+
+    def restitution_matrix(self, model: Model) -> list[list[Any]]:
+        """All zeros: no contact turns anything back, and the balances of momentum say what the others do."""
+        return [[0.0] * len(model.contacts) for _ in model.contacts]

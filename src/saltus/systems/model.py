@@ -7,6 +7,8 @@ from enum import StrEnum
 from typing import Any, ClassVar
 
 from saltus.errors import ParameterError
+from saltus.systems.constrained import constrained_acceleration
+from saltus.systems.contact import Contact
 
 
 class MarginKind(StrEnum):
@@ -30,6 +32,9 @@ class Model:
     4. `gap`, positive inside a mode: its first zero, reached from above, ends the mode; and `contact`, the coordinate
        at which the gaps of all sides are zero. While the system rests there the accelerations at contact decide when it leaves;
     5. `reset`, the next side and the velocity after an impact, given the impact law; a model with one side must define it;
+       a model with several contacts, or with contacts that hold single coordinates, gives instead of 2 to 5 its `contacts`, a
+       tuple of `Contact`, the `force` r(t, q, v) of M(q) q'' = r, `mass_matrix`, M(q), where that is not the identity, and
+       maybe a `singularity`, a name for where M(q) has no inverse: a motion that gets there ends with this name as `limit`;
     6. optionally `mirror` (the symmetry that maps motions to motions), `kinetic_energy` (for impact laws that need
        it), `margins` (what must stay positive), `margin_kinds` (what it means to pass them; an assumption that fails where
        a margin has none), `stops` (the margins that end a motion unasked), `check_load`, and `damping`, the coefficient of
@@ -46,6 +51,8 @@ class Model:
     channels: ClassVar[tuple[str, ...]] = ()
     margin_kinds: ClassVar[Mapping[str, MarginKind]] = {}
     stops: ClassVar[tuple[str, ...]] = ()
+    singularity: ClassVar[str] = ""
+    transfers: ClassVar[bool] = False  # whether an impact that closes one contact may open the others, as a crossing does
     damping: float = 0.0  # small vibrations decay as exp(-damping tau / 2)
 
     def unit_of(self, coordinate: str) -> str:
@@ -67,8 +74,26 @@ class Model:
         return 0.0
 
     def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
-        """The acceleration on the given side."""
-        raise NotImplementedError(f"{type(self).__name__} must define acceleration(t, theta, velocity, side, load)")
+        """The acceleration on the given side; of a model that gives its `force`, while no contact acts."""
+        if type(self).force is Model.force:
+            raise NotImplementedError(f"{type(self).__name__} must define acceleration(t, theta, velocity, side, load)")
+        size = len(self.coordinates)
+        solved = constrained_acceleration(self, t, theta, velocity, load, [1.0] * size)
+        return solved[0] if size == 1 else tuple(solved)
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The contacts of a model that gives its `force`."""
+        return ()
+
+    def mass_matrix(self, theta: Any) -> Any:
+        """M(q): a number, or rows of numbers, symmetric and positive definite."""
+        size = len(self.coordinates)
+        return 1.0 if size == 1 else [[float(i == j) for j in range(size)] for i in range(size)]
+
+    def force(self, t: Any, theta: Any, velocity: Any, load: Any) -> Any:
+        """r(t, q, v) of M(q) q'' = r, while no contact acts."""
+        raise NotImplementedError(f"{type(self).__name__} has contacts, so it must define force(t, theta, velocity, load)")
 
     def gap(self, theta: Any, side: Any) -> Any:
         """What is positive inside the mode `side` and zero at contact."""

@@ -8,16 +8,17 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from saltus.errors import ParameterError, near
+from saltus.systems.factors import Factors
 from saltus.systems.load import Load
 from saltus.systems.signals import Constant, Sum, as_signal
 
 
 def children(node: Any) -> dict[str, Any]:
-    """The named parts of a system's node: fields of a dataclass, channels of a load, terms of a sum."""
+    """The named parts of a system's node: fields of a dataclass, channels of a load, terms of a sum, a law's factors."""
     if isinstance(node, Load):
         return {"frequency": node.frequency, **node.channels}
-    if isinstance(node, Sum):
-        return {str(i): term for i, term in enumerate(node.terms)}
+    if isinstance(node, (Sum, Factors)):
+        return {str(i): term for i, term in enumerate(node.terms if isinstance(node, Sum) else node)}
     if dataclasses.is_dataclass(node):
         return {f.name: getattr(node, f.name) for f in dataclasses.fields(node)}
     return {}
@@ -68,6 +69,8 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
         return Load(**parts)
     if isinstance(node, Sum):
         return Sum(tuple(as_signal(part, f"{where}{name}") for name, part in parts.items()))
+    if isinstance(node, Factors):
+        return Factors(parts.values())
     try:
         return dataclasses.replace(node, **parts)
     except ParameterError as error:
@@ -94,6 +97,8 @@ def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -
         twin = object.__new__(Sum)
         object.__setattr__(twin, "terms", tuple(parts.values()))
         return twin
+    if isinstance(node, Factors):
+        return Factors(parts.values())
     if not dataclasses.is_dataclass(node):
         return node
     twin = object.__new__(type(node))

@@ -8,6 +8,7 @@ from saltus.errors import ParameterError, near
 from saltus.systems.impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model, check_sides
+from saltus.systems.newton_impact import NewtonImpact
 from saltus.systems.rocking_block import RockingBlock
 from saltus.systems.two_layer import TwoLayer
 from saltus.systems.wall_oscillator import WallOscillator
@@ -22,6 +23,7 @@ IMPACTS: dict[str, type[ImpactLaw]] = {
     "VelocityReduction": VelocityReduction,
     "EnergyRestitution": EnergyRestitution,
     "InelasticImpact": InelasticImpact,
+    "NewtonImpact": NewtonImpact,
 }
 
 T = TypeVar("T", type[Model], type[ImpactLaw])

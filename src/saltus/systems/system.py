@@ -10,6 +10,7 @@ from typing import Any
 
 from saltus.checks import check_kind
 from saltus.errors import ParameterError, near
+from saltus.systems.contact import check_contacts
 from saltus.systems.impact import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
 from saltus.systems.model import Model, check_sides
@@ -43,7 +44,10 @@ class System:
                     f"{type(self.model).__name__} does not read load.{channel}; {near(channel, known)}", f"load.{channel}"
                 )
         self.model.check_load(self.load)
-        if not self.model.sides and self.impact != VelocityReduction():
+        if self.model.contacts:
+            check_contacts(self.model)
+            self.impact.restitution_matrix(self.model)
+        elif not self.model.sides and self.impact != VelocityReduction():
             raise ParameterError(
                 f"this {type(self.model).__name__} has no impacts, so {self.impact!r} cannot act; leave it out", "impact"
             )
@@ -177,8 +181,8 @@ def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:
         raise ParameterError(f"this is not the {language} of a system: {error}") from None
 
 
-def check_system(system: Any, asking: str, *, coordinates: int | None = None) -> None:
-    """Refuse what is no System, or one whose model has another number of coordinates than `asking` is for.
+def check_system(system: Any, asking: str, *, coordinates: int | None = None, several_contacts: bool = False) -> None:
+    """Refuse what is no System, or one whose model has more contacts or another number of coordinates than `asking` is for.
 
     Raises:
         ParameterError: with what `asking` takes.
@@ -189,3 +193,10 @@ def check_system(system: Any, asking: str, *, coordinates: int | None = None) ->
     if coordinates is not None and len(names) != coordinates:
         wanted = "one coordinate" if coordinates == 1 else f"{coordinates} coordinates"
         raise ParameterError(f"{asking} is for models with {wanted}, and this one has {', '.join(names)}", "system")
+    if system.model.contacts and not several_contacts:
+        contacts = ", ".join(contact.name for contact in system.model.contacts)
+        raise ParameterError(
+            f"{asking} is for models with one contact so far, and {type(system.model).__name__} gives the contacts {contacts}; "
+            "use simulate",
+            "system",
+        )

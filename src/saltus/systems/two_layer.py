@@ -1,4 +1,4 @@
-"""The metainterface with both layers free: two degrees of freedom (paper, `eomnl`)."""
+"""The metainterface with both of its layers: two coordinates, two contacts (paper, `eomnl`)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
+from saltus.systems.constrained import reactions
+from saltus.systems.contact import Contact
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import MarginKind, Model
@@ -23,9 +25,9 @@ class TwoLayer(Model):
         f_1 = [(1+h) H - (1+m) zeta''] sin(beta0 + theta_1) + [(1+v) V - (1+m) nu''] cos(beta0 + theta_1),
         f_2 = [H - zeta''] sin(beta0 - theta_2) - [V - nu''] cos(beta0 - theta_2).
 
-    Its motion is exact while both layers are open, and stops at the first contact of either: `lower_contact` (theta_1 = 0) and
-    `upper_contact` (theta_2 = 0). Impacts, and motion with a layer closed, come later; until then `constraint_reactions` tells
-    what a closed layer would need. With m = 0 the mass matrix is singular where sin S = 0, that is beta_1 + beta_2 = pi.
+    A layer that is closed stays at theta_j = 0 while its contact pushes. Impacts follow the system's law (`NewtonImpact`), and
+    what the contacts do is exact, whichever layers are open. With m = 0 the mass matrix is singular where sin S = 0, that is
+    beta_1 + beta_2 = pi: there a motion with both layers open ends, as the massless hinge between them has no motion of its own.
 
     Angles and velocities are pairs (lower, upper) of numbers or arrays; matrices have the shape (2, 2), or (2, 2, ...) for
     arrays. Energies are per K2. The load channels are those of `Metainterface`.
@@ -43,9 +45,10 @@ class TwoLayer(Model):
     margin_kinds: ClassVar[dict[str, MarginKind]] = {
         **dict.fromkeys(("lower_line_limit", "upper_line_limit"), MarginKind.LANDMARK),
         **dict.fromkeys(("lower_kinematic_limit", "upper_kinematic_limit"), MarginKind.LIMIT),
-        **dict.fromkeys(("lower_contact", "upper_contact"), MarginKind.LIMIT),
     }
-    stops: ClassVar[tuple[str, ...]] = ("lower_contact", "upper_contact")
+    stops: ClassVar[tuple[str, ...]] = ("lower_kinematic_limit", "upper_kinematic_limit")
+    singularity: ClassVar[str] = "massless_hinge"
+    transfers: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         settle_numbers(self, "beta0", above=0.0, below=math.pi)
@@ -54,8 +57,13 @@ class TwoLayer(Model):
 
     @property
     def sides(self) -> tuple[int, ...]:
-        """None: one smooth mode, in which both layers are open."""
+        """None: its contacts say which layers are open."""
         return ()
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The lower layer's, theta_1 >= 0, and the upper layer's, theta_2 <= 0."""
+        return (Contact(name="lower", coordinate="theta_1"), Contact(name="upper", coordinate="theta_2", sign=-1))
 
     @property
     def contact(self) -> Any:
@@ -80,7 +88,7 @@ class TwoLayer(Model):
         """K = diag(k, 1)."""
         return _matrix(self.stiffness_ratio, 0, 0, 1)
 
-    def force(self, t: Any, theta: Any, load: Load) -> tuple[Any, Any]:
+    def load_vector(self, t: Any, theta: Any, load: Load) -> tuple[Any, Any]:
         """f(theta, tau): the loads and the ground's accelerations."""
         zeta, nu = load.ground_horizontal.acceleration(t), load.ground_vertical.acceleration(t)
         return self._push(t, theta, load, zeta, nu)
@@ -90,7 +98,7 @@ class TwoLayer(Model):
 
         kappa_1 = k - cos(beta0) [(1+h) H - (1+m) zeta''] + sin(beta0) [(1+v) V - (1+m) nu''] and
         kappa_2 = 1 + cos(beta0) [H - zeta''] + sin(beta0) [V - nu''].
-        M0 and f0 are `mass_matrix` and `force` at `contact`; C is unchanged.
+        M0 and f0 are `mass_matrix` and `load_vector` at `contact`; C is unchanged.
         """
         zeta, nu = load.ground_horizontal.acceleration(t), load.ground_vertical.acceleration(t)
         (across_1, along_1), (across_2, along_2) = self._loads(t, load, zeta, nu)
@@ -99,18 +107,13 @@ class TwoLayer(Model):
         kappa_2 = 1 + across_2 * cosine + along_2 * sine
         return _matrix(kappa_1, 0 * kappa_1, 0 * kappa_2, kappa_2)
 
-    def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> tuple[Any, Any]:
-        """theta'' of `eomnl`, by Cramer's rule with det M = m + sin(S)^2."""
-        angle = self._sum(theta)
-        coupling, twist = -np.cos(angle), np.sin(angle)
-        force = self.force(t, theta, load)
+    def force(self, t: Any, theta: Any, velocity: Any, load: Load) -> tuple[Any, Any]:
+        """r = f - C theta' - D theta'^2 - K theta, what accelerates the layers."""
+        twist, push = np.sin(self._sum(theta)), self.load_vector(t, theta, load)
         viscous = self.damping * self.dissipation_ratio * velocity[0]
-        first = force[0] - viscous - self.stiffness_ratio * theta[0] + twist * (velocity[1] * velocity[1])
-        second = force[1] - self.damping * velocity[1] - theta[1] - twist * (velocity[0] * velocity[0])
-        determinant = self.mass_ratio + twist * twist
         return (
-            (first - coupling * second) / determinant,
-            ((1 + self.mass_ratio) * second - coupling * first) / determinant,
+            push[0] - viscous - self.stiffness_ratio * theta[0] + twist * (velocity[1] * velocity[1]),
+            push[1] - self.damping * velocity[1] - theta[1] - twist * (velocity[0] * velocity[0]),
         )
 
     def constraint_reactions(self, t: Any, theta: Any, velocity: Any, acceleration: Any, load: Load) -> tuple[Any, Any]:
@@ -118,16 +121,8 @@ class TwoLayer(Model):
 
         Both vanish in free motion. A closed layer (theta_j = theta_j' = theta_j'' = 0) stays closed while R_1 >= 0 or R_2 <= 0.
         """
-        angle = self._sum(theta)
-        coupling, twist = -np.cos(angle), np.sin(angle)
-        force = self.force(t, theta, load)
-        viscous = self.damping * self.dissipation_ratio * velocity[0]
-        inertia_1 = (1 + self.mass_ratio) * acceleration[0] + coupling * acceleration[1] - twist * (velocity[1] * velocity[1])
-        inertia_2 = coupling * acceleration[0] + acceleration[1] + twist * (velocity[0] * velocity[0])
-        return (
-            inertia_1 + viscous + self.stiffness_ratio * theta[0] - force[0],
-            inertia_2 + self.damping * velocity[1] + theta[1] - force[1],
-        )
+        first, second = reactions(self, t, theta, velocity, acceleration, load)
+        return first, -second
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
         """T / K2 of `kin_eng`, with the velocities of both masses in the inertial frame."""
@@ -150,11 +145,9 @@ class TwoLayer(Model):
         return self._push(t, theta, load, 0.0, 0.0)
 
     def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load) -> dict[str, Any]:
-        """Each layer's opening, and what it lacks to the straight line and to the kinematic limit (errata 19, 20)."""
+        """What each layer lacks to the straight line and to the kinematic limit (errata 19, 20)."""
         opening = math.pi - self.beta0
         return {
-            "lower_contact": theta[0],
-            "upper_contact": -theta[1],
             "lower_line_limit": opening - theta[0],
             "upper_line_limit": opening + theta[1],
             "lower_kinematic_limit": 2 * opening - theta[0],

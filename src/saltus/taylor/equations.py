@@ -16,8 +16,9 @@ def equations_of(system: System) -> dict[str, str]:
     """A digest of each part of a system's equations, its numbers left out: `System.to_json` has these.
 
     The parts are `acceleration` (with the load's channels in it), `gap`, `contact` (where it is), `reset` (with the impact law in
-    it), `margins`, `mirror` (the load of the mirror image) and `names` (of coordinates, units, channels, sides and stops). What a
-    model's Python reads from elsewhere, such as a constant of its module, stands in the expressions as a number.
+    it), `contacts` (of a model with several), `margins`, `mirror` (the load of the mirror image) and `names` (of coordinates,
+    units, channels, sides and stops). What a model's Python reads from elsewhere, such as a constant of its module, stands in the
+    expressions as a number.
 
     Raises:
         TraceError: a model that cannot be traced.
@@ -28,12 +29,13 @@ def equations_of(system: System) -> dict[str, str]:
         "gap": [traced.gap],
         "contact": [traced.contact],
         "reset": [traced.next_side, traced.velocity_after],
+        "contacts": [*traced.mass, *traced.reactions, *traced.restitution, *traced.positions],
     }
     mirrored = system.mirrored()
     texts = {name: _text(traced, [root for root in parts if root is not None]) for name, parts in roots.items()}
     texts["margins"] = _margins(system)
     texts["mirror"] = repr(mirrored and mirrored.to_dict()["load"])
-    texts["names"] = repr((model.coordinates, model.units, model.channels, model.sides, model.stops))
+    texts["names"] = repr((model.coordinates, model.units, model.channels, model.sides, model.stops, traced.signs, traced.held))
     return {name: digest(text) for name, text in texts.items()}
 
 

@@ -15,7 +15,7 @@ from saltus.taylor.rules import FUNCTIONS
 
 # What a reset, evaluated at one instant, may use besides the operations that have a Taylor recurrence.
 POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
-LEAVES = ("number", "parameter", "time", "origin", "side", "coordinate", "velocity", "acceleration", "record")
+LEAVES = ("number", "parameter", "time", "origin", "side", "free", "coordinate", "velocity", "acceleration", "record")
 RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
 
 ALLOWED = (

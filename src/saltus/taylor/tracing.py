@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, TraceError, near
-from saltus.systems import Record, System
+from saltus.systems import Record, System, constrained_acceleration, mass_and_force, reactions
 from saltus.systems import substitute as substitute_numbers
 from saltus.taylor import derivatives as tangent
 from saltus.taylor.exact_algebra import constant_value, normal_form, provably_equal
@@ -80,6 +80,9 @@ class Trace:
     `contact_acceleration`, the second derivative of the gap at rest at contact, a function of the time alone, and
     `contact_damping`, minus its derivative to the velocity; `next_side` and `velocity_after`, the reset; `margins` to stop at.
 
+    Of a model with contacts: `reactions`, one for each; `mass`, the rows of the mass matrix one after the other; `restitution`, E
+    likewise; `positions` of the contacts. Leaves are then also `free`, 1 for each coordinate that no contact holds, else 0.
+
     With `columns` of a tangent (`derivatives.py`) `acceleration` goes on after the model's own `dof` with those of the columns.
     """
 
@@ -98,6 +101,12 @@ class Trace:
     next_side: Expr | None = None
     velocity_after: Expr | None = None
     margins: dict[str, Expr] = field(default_factory=dict)
+    reactions: list[Expr] = field(default_factory=list)
+    mass: list[Expr] = field(default_factory=list)
+    restitution: list[Expr] = field(default_factory=list)
+    positions: list[Expr] = field(default_factory=list)
+    signs: tuple[int, ...] = ()  # of the contacts
+    held: tuple[int, ...] = ()  # the coordinate that each contact holds
 
     def symbol(self, path: str, value: float) -> Expr:
         """The symbol of the number at a dotted path."""
@@ -125,10 +134,12 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
     velocities = tuple(Expr("velocity", (), i) for i in range(dof))
     side = Expr("side") if model.sides else number(1.0)
     q, v = (coordinates[0], velocities[0]) if dof == 1 else (coordinates, velocities)
-    accelerations = ask(model, "acceleration", t, q, v, side, load)
+    several = bool(model.contacts)
+    accelerations = _trace_contacts(result, twin, t, q, v) if several else ask(model, "acceleration", t, q, v, side, load)
     if dof > 1 and len(accelerations if isinstance(accelerations, (tuple, list)) else [accelerations]) != dof:
         raise TraceError(f"{type(system.model).__name__}.acceleration must return {dof} values, got {accelerations!r}")
-    result.acceleration = [combine("add", a, 0.0) for a in ((accelerations,) if dof == 1 else accelerations)]
+    one_by_one = accelerations if several or dof > 1 else (accelerations,)
+    result.acceleration = [combine("add", a, 0.0) for a in one_by_one]
     if model.sides:
         _trace_contact(result, twin, t, coordinates, velocities, side)
     _trace_margins(result, twin, t, q, v, side, stop_at)
@@ -201,6 +212,21 @@ def _check_next_side(next_side: Expr, sides: tuple[int, ...], model: str) -> Non
             )
 
 
+def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> list[Any]:
+    """The accelerations of a model with contacts, any of which may be closed."""
+    model, load, count = twin.model, twin.load, len(twin.model.coordinates)
+    free = [Expr("free", (), i) for i in range(count)]
+    mass, _ = mass_and_force(model, t, q, v, load)
+    accelerations = [Expr("acceleration", (), i) for i in range(count)]
+    result.reactions = [combine("add", r, 0.0) for r in reactions(model, t, q, v, accelerations, load)]
+    result.mass = [combine("add", entry, 0.0) for row in mass for entry in row]
+    result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
+    result.positions = [combine("add", contact.position, 0.0) for contact in model.contacts]
+    result.signs = tuple(contact.sign for contact in model.contacts)
+    result.held = tuple(model.coordinates.index(contact.coordinate) for contact in model.contacts)
+    return constrained_acceleration(model, t, q, v, load, free)
+
+
 def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]) -> None:
     if not stop_at:
         return
@@ -215,7 +241,7 @@ def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: 
 
 def _check(result: Trace, model: str) -> None:
     """Refuse comparisons in what is expanded in series, and a gap that depends on more than the coordinate."""
-    expanded = [*result.acceleration, *result.margins.values()]
+    expanded = [*result.acceleration, *result.reactions, *result.margins.values()]
     if result.gap is not None:
         expanded += [result.gap]
     for node in ordered(expanded):

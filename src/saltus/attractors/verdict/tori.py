@@ -32,9 +32,9 @@ def excludes_tori(system: System) -> str | None:
     Raises:
         ParameterError: what is no system; a load by records.
     """
-    check_system(system, "excludes_tori")
+    check_system(system, "excludes_tori", several_contacts=True)
     check_periodic(system)
-    if len(system.model.coordinates) > 1:
+    if len(system.model.coordinates) > 1 or system.model.contacts:
         return None
     rate = area_contraction(system)
     continuous = None if rate is None or rate == 0.0 else _continuous(system)

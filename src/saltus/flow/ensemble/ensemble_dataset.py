@@ -9,6 +9,7 @@ import numpy as np
 from saltus.flow.ensemble.lane_layout import EndLabel, EndNumber, JobLabel, JobNumber
 from saltus.flow.ensemble.wanted import Sample, Until, Wanted
 from saltus.flow.kernel_layout import Mode, Status
+from saltus.flow.motion_dataset import rate_name
 from saltus.flow.stops import Stop
 from saltus.provenance import provenance
 from saltus.taylor import FREQUENCY
@@ -39,11 +40,6 @@ FIXED = (
     *("least_speed", "overall_least_speed", "period_impact_count", "start_time"),
 )
 DIMENSIONS = ("period", "state", "column")
-
-
-def rate_name(name: str, names: tuple[str, ...]) -> str:
-    """The name of a coordinate's velocity."""
-    return "velocity" if len(names) == 1 else f"{name}_velocity"
 
 
 def start_name(name: str) -> str:

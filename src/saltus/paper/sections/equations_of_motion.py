@@ -98,13 +98,13 @@ def _excitation() -> dict[str, float]:
         model, swings = TwoLayer(beta0=float(np.deg2rad(degrees)), mass_ratio=0.4), []
         for name in Metainterface.channels:
             load = Load(frequency=1.0, **{name: Harmonic(amplitude=0.3)})
-            force = np.array([model.force(t, (0.0, 0.0), load) for t in times])
+            force = np.array([model.load_vector(t, (0.0, 0.0), load) for t in times])
             stiffness = np.array([np.diag(model.linear_stiffness_matrix(t, load)) for t in times])
             swings.append([float(np.ptp(values, axis=0).max()) for values in (force, stiffness)])
         found |= {f"external_{degrees}": min(s[0] for s in swings), f"parametric_{degrees}": min(s[1] for s in swings)}
     still = Load(horizontal=0.3, vertical=-0.5)
     parts = [
-        np.array([model.force(t, (0.0, 0.0), still) for t in times]),
+        np.array([model.load_vector(t, (0.0, 0.0), still) for t in times]),
         np.array([model.linear_stiffness_matrix(t, still) for t in times]),
     ]
     return found | {"excitation_still": float(max(np.ptp(part, axis=0).max() for part in parts))}
@@ -138,7 +138,7 @@ def _linear_residual(model: Any, load: Any) -> float:
     stiffness, exact = np.asarray(model.linear_stiffness_matrix(t, load)), np.asarray(model.stiffness_matrix())
     for j in (0, 1):
         point = tuple(step if i == j else 0.0 for i in (0, 1))
-        slopes = exact[:, j] - np.imag(np.array(model.force(t, point, load))) / step.imag
+        slopes = exact[:, j] - np.imag(np.array(model.load_vector(t, point, load))) / step.imag
         worst = max(worst, float(abs(slopes - stiffness[:, j]).max()))
     return worst
 

@@ -98,7 +98,7 @@ def bifurcation_diagram(
         max_period: the longest period, in forcing periods, that is followed.
         values: where is simulated, by default evenly, as many as the effort says. If given, what is random is not followed.
         starts, window, seed: how many initial states at each value, by default as the effort says, where, and their seed.
-        repelling, switch: up to which period repelling orbits are searched for; whether what is born at special points is followed.
+        repelling, switch: up to which period repelling orbits are searched for; whether what is born at special points is.
         step, bands: the longest step along a branch; whether chaos is looked for.
         progress: called with the fraction done and what is being done.
 

@@ -1,0 +1,338 @@
+"""Impacts of several contacts, and accumulations of them.
+
+Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines `contacts`, `model`, `solver`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from saltus.flow.contacts.complementarity import acting, complementary, invert
+from saltus.flow.contacts.contact_layout import MOST_IMPACTS, VANISHED, ContactColumn, ContactPart, Solver
+from saltus.flow.kernel_layout import CHATTER_SPEED, SLOW, Status, Where
+from saltus.flow.memory_layout import EventCode, State
+from saltus.taylor import jit, lean_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@jit
+def solver_arrays(own, count):
+    """The arrays of `Solver`."""
+    most = max(2 * own, count + 1)
+    return (
+        np.zeros(own * own + count * count + count),
+        np.zeros((own, own)),
+        np.zeros((count, count)),
+        np.zeros((max(own, count), most)),
+        np.zeros((count, count)),
+        *(np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)),
+        *(np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)),
+    )
+
+
+@lean_jit
+def restitution(solver, own, count, i, j):
+    """E_ij."""
+    return solver[Solver.NUMBERS][own * own + count * i + j]
+
+
+@lean_jit
+def contact_position(solver, own, count, i):
+    """The position of a contact."""
+    return solver[Solver.NUMBERS][own * own + count * count + i]
+
+
+@lean_jit
+def couple(where, state, env, model, contacts, solver):
+    """Fill the numbers of the contacts at the present state, their coupling, and the gaps with their rates."""
+    own, count, signs = where[Where.OWN], contacts.shape[0], model[ContactPart.SIGNS]
+    model[ContactPart.MATRICES](env, where[Where.PIECE], state, solver[Solver.NUMBERS])
+    regular = invert(solver[Solver.NUMBERS], own, solver[Solver.BLOCK], solver[Solver.INVERSE])
+    for i in range(count):
+        a = contacts[i, ContactColumn.COORDINATE]
+        for j in range(count):
+            b = contacts[j, ContactColumn.COORDINATE]
+            solver[Solver.COUPLING][i, j] = signs[i] * signs[j] * solver[Solver.INVERSE][a, b]
+        solver[Solver.GAPS][i] = signs[i] * (state[State.COORDINATES + a] - contact_position(solver, own, count, i))
+        solver[Solver.RATES][i] = signs[i] * state[State.COORDINATES + where[Where.DOF] + a]
+    return regular
+
+
+@lean_jit
+def reduce_to(solver, chosen, count):
+    """Copy the coupling of the contacts in `chosen` to the first rows of the reduced one; returns how many they are."""
+    row = 0
+    for i in range(count):
+        if chosen >> i & 1:
+            column = 0
+            for j in range(count):
+                if chosen >> j & 1:
+                    solver[Solver.REDUCED][row, column] = solver[Solver.COUPLING][i, j]
+                    column += 1
+            row += 1
+    return row
+
+
+@lean_jit
+def impact_impulses(solver, own, count, chosen, rates):
+    """The impulses of the contacts in `chosen`, 0 <= J _|_ v+ + E v- >= 0 with v+ = v- + G J, and those of them that act.
+
+    `rates` holds v- of all contacts, and v+ afterwards: of a contact that acts -E v- itself, so that what is 0 is so exactly.
+    Returns the bits of those that act, or -1 if there are no impulses.
+    """
+    size, row, after = reduce_to(solver, chosen, count), 0, solver[Solver.TRIED]
+    for i in range(count):
+        if chosen >> i & 1:
+            solver[Solver.RIGHT][row] = rates[i]
+            for j in range(count):
+                if chosen >> j & 1:
+                    solver[Solver.RIGHT][row] += restitution(solver, own, count, i, j) * rates[j]
+            row += 1
+    bits = complementary(
+        solver[Solver.REDUCED], solver[Solver.RIGHT], size, solver[Solver.BLOCK], solver[Solver.TRIED], solver[Solver.IMPULSES]
+    )
+    if bits < 0:
+        return -1
+    acts, row = 0, 0
+    for i in range(count):
+        if chosen >> i & 1:
+            acts |= (bits >> row & 1) << i
+            row += 1
+    for i in range(count - 1, -1, -1):  # from the reduced order to all contacts, from behind
+        if chosen >> i & 1:
+            row -= 1
+            solver[Solver.IMPULSES][i] = solver[Solver.IMPULSES][row]
+        if not acts >> i & 1:
+            solver[Solver.IMPULSES][i] = 0.0
+    for i in range(count):
+        after[i] = rates[i]
+        if acts >> i & 1:
+            after[i] = 0.0
+            for j in range(count):
+                if chosen >> j & 1:
+                    after[i] -= restitution(solver, own, count, i, j) * rates[j]
+        else:
+            for j in range(count):
+                after[i] += solver[Solver.COUPLING][i, j] * solver[Solver.IMPULSES][j]
+            if chosen >> i & 1:
+                after[i] = max(after[i], 0.0)
+    for i in range(count):
+        rates[i] = after[i] + 0.0
+    return acts
+
+
+@lean_jit
+def push(where, state, model, contacts, solver):
+    """Add what the impulses give to the velocities."""
+    first = State.COORDINATES + where[Where.DOF]
+    for i in range(where[Where.OWN]):
+        for j in range(contacts.shape[0]):
+            gain = solver[Solver.INVERSE][i, contacts[j, ContactColumn.COORDINATE]] * model[ContactPart.SIGNS][j]
+            state[first + i] += gain * solver[Solver.IMPULSES][j]
+
+
+@lean_jit
+def record_contact_event(where, state, contacts, solver, events, kind, which, t):
+    """Append an event: (period, kind, bits of contacts, 0) and (local time, velocities before and after, impulses).
+
+    The velocities before are those of the state at this call; `fill_after` completes the event.
+    """
+    labels, values = events
+    i, own, first = where[Where.EVENTS], where[Where.OWN], State.COORDINATES + where[Where.DOF]
+    labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = where[Where.PERIOD], kind, which, 0
+    values[i, 0] = t
+    for k in range(own):
+        values[i, 1 + k] = values[i, 1 + own + k] = state[first + k]
+    for k in range(contacts.shape[0]):
+        values[i, 1 + 2 * own + k] = 0.0
+    where[Where.EVENTS] = i + 1
+
+
+@lean_jit
+def fill_after(where, state, contacts, solver, events):
+    """Note the velocities and the impulses of the last event."""
+    values, own, first = events[1], where[Where.OWN], State.COORDINATES + where[Where.DOF]
+    i = where[Where.EVENTS] - 1
+    for k in range(own):
+        values[i, 1 + own + k] = state[first + k]
+    for k in range(contacts.shape[0]):
+        values[i, 1 + 2 * own + k] = solver[Solver.IMPULSES][k]
+
+
+@lean_jit
+def settle_contact(where, state, env, model, contacts, solver, i, rate):
+    """Put a contact that was closed by an impact, or held, at its position with the rate after it."""
+    own, count, coordinate = where[Where.OWN], contacts.shape[0], contacts[i, ContactColumn.COORDINATE]
+    state[State.COORDINATES + coordinate] = contact_position(solver, own, count, i)
+    state[State.COORDINATES + where[Where.DOF] + coordinate] = model[ContactPart.SIGNS][i] * rate + 0.0
+    contacts[i, ContactColumn.CLOSED] = 1 if rate == 0.0 else 0
+    contacts[i, ContactColumn.SKIP], contacts[i, ContactColumn.RELEASED] = 1, 0
+
+
+@lean_jit
+def contact_impact(where, state, env, model, contacts, solver, events, t, hit):
+    """Apply the impact law to all contacts whose gap is 0, of which those in `hit` have just closed. PAUSED, or NO_IMPACT."""
+    own, count = where[Where.OWN], contacts.shape[0]
+    regular, chosen = couple(where, state, env, model, contacts, solver), hit
+    for i in range(count):
+        chosen |= contacts[i, ContactColumn.CLOSED] << i
+    record_contact_event(where, state, contacts, solver, events, EventCode.IMPACT, hit, t)
+    for i in range(count):  # a contact that is reached without a speed, to within the working precision
+        if hit >> i & 1:
+            solver[Solver.RATES][i] = min(solver[Solver.RATES][i], 0.0)
+    acts = impact_impulses(solver, own, count, chosen, solver[Solver.RATES]) if regular else -1
+    if acts < 0:
+        return Status.NO_IMPACT
+    push(where, state, model, contacts, solver)
+    for i in range(count):
+        if chosen >> i & 1:
+            settle_contact(where, state, env, model, contacts, solver, i, solver[Solver.RATES][i])
+    fill_after(where, state, contacts, solver, events)
+    return Status.PAUSED
+
+
+@lean_jit
+def closed_pulls(solver, own, count, near, b, x, u, pull):
+    """The second derivatives of the gaps in `near`, with those closed that are at 0, at rest there and pushed."""
+    still, row = 0, 0
+    for i in range(count):
+        if near >> i & 1 and x[i] == 0.0 and u[i] == 0.0:
+            still |= 1 << i
+    size = reduce_to(solver, still, count)
+    for i in range(count):
+        if still >> i & 1:
+            solver[Solver.RIGHT][row] = b[i]
+            row += 1
+    bits = complementary(
+        solver[Solver.REDUCED], solver[Solver.RIGHT], size, solver[Solver.BLOCK], solver[Solver.TRIED], solver[Solver.IMPULSES]
+    )
+    for i in range(count):
+        pull[i], row = b[i], 0
+        for j in range(count):
+            if still >> j & 1:
+                pull[i] += solver[Solver.COUPLING][i, j] * solver[Solver.IMPULSES][row] if bits >= 0 else 0.0
+                row += 1
+    row = 0
+    for i in range(count):
+        if still >> i & 1:
+            if bits >= 0 and bits >> row & 1:
+                pull[i] = 0.0
+            row += 1
+    return still
+
+
+@lean_jit
+def time_to_close(x, u, a):
+    """When x + u t + a t^2 / 2 falls to 0 from above, t > 0; infinite if it never does."""
+    if x == 0.0:
+        return -2.0 * u / a if a < 0.0 and u > 0.0 else np.inf
+    square = u * u - 2.0 * a * x
+    if square < 0.0 or (a >= 0.0 and u >= 0.0):
+        return np.inf
+    return 2.0 * x / (math.sqrt(square) - u)
+
+
+@lean_jit
+def frozen_accumulation(solver, own, count, near, limit):
+    """The time in which the contacts in `near` come to rest if their accelerations stay as they are; -1 if that takes longer.
+
+    Between its impacts each gap then moves on a parabola. No other contact may close meanwhile.
+    """
+    time, first, b, pull = 0.0, 0.0, solver[Solver.PULLS], solver[Solver.FALLING_PULLS]
+    x, u = solver[Solver.FALLING_GAPS], solver[Solver.FALLING_RATES]
+    for i in range(count):
+        x[i], u[i] = solver[Solver.GAPS][i], solver[Solver.RATES][i]
+        if not near >> i & 1:
+            limit = min(limit, 0.1 * time_to_close(x[i], u[i], b[i]))
+        first = max(first, abs(u[i]) if near >> i & 1 else 0.0)
+    for _ in range(MOST_IMPACTS):
+        still = closed_pulls(solver, own, count, near, b, x, u, pull)
+        flight = np.inf
+        for i in range(count):
+            if near >> i & 1 and not (still >> i & 1 and pull[i] <= 0.0):
+                flight = min(flight, time_to_close(x[i], u[i], pull[i]))
+        if flight == np.inf:
+            return time if still == near and max_rate(u, pull, near, still, count) == 0.0 else -1.0
+        time += flight
+        if not time <= limit:
+            return -1.0
+        height, hit = 0.0, still
+        for i in range(count):
+            if near >> i & 1:
+                height = max(height, abs(u[i]) * flight)
+        for i in range(count):
+            if near >> i & 1 and not (still >> i & 1 and pull[i] <= 0.0):
+                x[i], u[i] = x[i] + flight * (u[i] + 0.5 * flight * pull[i]), u[i] + flight * pull[i]
+                if x[i] <= 1e-12 * height and u[i] < 0.0:
+                    x[i], hit = 0.0, hit | 1 << i
+        if impact_impulses(solver, own, count, hit, u) < 0:
+            return -1.0
+        for i in range(count):
+            if x[i] == 0.0 and u[i] <= VANISHED * first:
+                u[i] = 0.0
+    return -1.0
+
+
+@lean_jit
+def max_rate(u, pull, near, still, count):
+    """The largest speed of the contacts in `near`, and of those that rest the largest pull away from them."""
+    largest = 0.0
+    for i in range(count):
+        if near >> i & 1:
+            largest = max(largest, abs(u[i]))
+            if still >> i & 1:
+                largest = max(largest, pull[i])
+    return largest
+
+
+@lean_jit
+def near_contacts(solver, count, slow):
+    """The contacts that impacts of at most that speed may reach, as bits; 0 if nothing bounces among them."""
+    near, bounces = 0, False
+    for i in range(count):
+        x, u, b = solver[Solver.GAPS][i], solver[Solver.RATES][i], solver[Solver.PULLS][i]
+        if abs(u) <= slow and x * max(abs(b), 1.0) <= slow * slow:
+            near |= 1 << i
+            bounces = bounces or u > 0.0
+    return near if bounces else 0
+
+
+@lean_jit
+def smaller_set(solver, contacts, near):
+    """Of the contacts in `near` those that have just impacted and those that are closed: a set of a smaller scale, or 0."""
+    smaller = 0
+    for i in range(contacts.shape[0]):
+        if near >> i & 1 and solver[Solver.GAPS][i] == 0.0:
+            smaller |= 1 << i
+    return smaller if smaller != near else 0
+
+
+@lean_jit
+def bring_to_rest(where, state, env, model, contacts, solver, near):
+    """Take the speeds of the contacts in `near`, by impulses on these alone, and close them."""
+    count, row = contacts.shape[0], 0
+    size = reduce_to(solver, near, count)
+    for i in range(count):
+        if near >> i & 1:
+            solver[Solver.RIGHT][row] = solver[Solver.RATES][i]
+            row += 1
+    acting(solver[Solver.REDUCED], solver[Solver.RIGHT], size, (1 << size) - 1, solver[Solver.BLOCK], solver[Solver.TRIED])
+    row = 0
+    for i in range(count):
+        solver[Solver.IMPULSES][i] = 0.0
+        if near >> i & 1:
+            solver[Solver.IMPULSES][i] = solver[Solver.TRIED][row]
+            row += 1
+    push(where, state, model, contacts, solver)
+    for i in range(count):
+        if near >> i & 1:
+            settle_contact(where, state, env, model, contacts, solver, i, 0.0)
+
+
+@lean_jit
+def slow_impacts(tol):
+    """The speed below which an impact may be the end of an accumulation, as with one contact."""
+    return max(SLOW * math.sqrt(tol), CHATTER_SPEED)

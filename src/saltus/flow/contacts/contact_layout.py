@@ -1,0 +1,53 @@
+"""What the kernel for several contacts and its callers agree on: places in its arrays, and its thresholds."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ContactColumn(IntEnum):
+    """Columns of the array `contacts` of whole numbers, with a row for each contact."""
+
+    COORDINATE = 0  # the coordinate that it holds
+    CLOSED = 1  # whether it does: its gap and the gap's rate are then exactly 0
+    SKIP = 2  # of its guard, how many of the first Taylor coefficients are known to be 0 at the start of a step
+    RELEASED = 3  # 1 where its reaction has just reached 0 from above, so that it is known to be 0
+    HELD = 4  # whether it was closed before the last decision
+
+
+class ContactPart(IntEnum):
+    """Places in the tuple `model`: what the kernel calls for a structure, and the signs of the contacts."""
+
+    SERIES = 0
+    MATRICES = 1
+    SIGNS = 2
+
+
+class Solver(IntEnum):
+    """Places in the tuple `solver` of arrays, in which impacts and closed contacts are solved for."""
+
+    NUMBERS = 0  # mass matrix by rows, E by rows, positions: what `MATRICES` fills
+    INVERSE = 1  # of the mass matrix
+    COUPLING = 2  # of the contacts, signs included: the rates that unit impulses give to gaps
+    BLOCK = 3  # the rows of a linear system, with its right-hand sides behind them
+    REDUCED = 4  # the coupling of some of the contacts
+    RIGHT = 5
+    IMPULSES = 6
+    TRIED = 7
+    RATES = 8  # of the gaps before an impact
+    GAPS = 9
+    PULLS = 10  # the second derivatives of the gaps with no contact closed
+    FALLING_GAPS = 11  # while an accumulation is followed
+    FALLING_RATES = 12
+    FALLING_PULLS = 13
+
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+NEAR = (
+    2.0**-44
+)  # Contacts close together if when one does the other's gap is no larger than this share of what it was in the step.
+ROUNDING = 2.0**-6  # of a gap, in NEAR times the contact's position
+VIOLATED = 1e-12  # The largest share of its right-hand side by which a complementarity problem may be violated by rounding.
+MOST_IMPACTS = 100_000  # that an accumulation is followed for: e = 0.9996 needs so many for 16 digits
+VANISHED = 1e-16  # Impacts that are slower than the first one of an accumulation by this factor end it.

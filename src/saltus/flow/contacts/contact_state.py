@@ -1,0 +1,58 @@
+"""The state of the kernel for several contacts: that of one motion, and what is known of each contact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.flow.compiled import load_contacts_kernel
+from saltus.flow.contacts.contact_layout import ContactColumn
+from saltus.flow.kernel_layout import Where
+from saltus.flow.kernel_state import KernelState
+from saltus.flow.memory_layout import State
+from saltus.flow.request import MotionRequest
+from saltus.flow.structures import Program
+
+
+@dataclass(frozen=True, eq=False)
+class ContactState(KernelState):
+    """The arrays that the kernel changes; `contacts` in the columns of `ContactColumn`."""
+
+    contacts: np.ndarray = field(default_factory=lambda: np.zeros((0, len(ContactColumn)), dtype=np.int64))
+
+    @classmethod
+    def at_start(cls, request: MotionRequest, run: Program) -> ContactState:
+        """The state in which a motion starts: contacts that are at rest at their positions are decided on first.
+
+        Raises:
+            ParameterError: a state beyond a contact, or one that moves into a contact.
+        """
+        start = super().at_start(request, run)
+        names, position, speeds = request.system.model.coordinates, request.position, request.speeds
+        contacts = np.zeros((len(run.trace.held), len(ContactColumn)), dtype=np.int64)
+        contacts[:, ContactColumn.COORDINATE] = run.trace.held
+        for row, contact in zip(contacts, request.system.model.contacts, strict=True):
+            place = names.index(contact.coordinate)
+            gap, rate = contact.gap(float(position[place])), contact.sign * float(speeds[place])
+            if gap < 0.0 or (gap == 0.0 and rate < 0.0):
+                where = f"{contact.coordinate} = {position[place]:g}"
+                what = f"lies beyond the contact {contact.name!r}" if gap < 0.0 else f"moves into the contact {contact.name!r}"
+                raise ParameterError(f"{where} {what} at {contact.coordinate} = {float(contact.position):g}", contact.coordinate)
+            row[ContactColumn.CLOSED] = int(gap == 0.0 and rate == 0.0)
+            row[ContactColumn.SKIP] = int(gap == 0.0)
+            if gap == 0.0:
+                start.state[State.COORDINATES + place] = float(contact.position)
+        start.where[Where.LEAVE_BY] = 1  # no release is recorded at the start
+        return cls(start.where, start.state, start.settings, contacts)
+
+    def advance(self, run: Program, steps: Any, events: Any) -> int:
+        """Call the kernel; returns why it comes back."""
+        return load_contacts_kernel()(self.where, self.state, self.settings, run.env, run.model, self.contacts, steps, events)
+
+    @property
+    def side(self) -> int:
+        """1 and the bits of the contacts that are closed."""
+        return 1 + sum(int(row[ContactColumn.CLOSED]) << i for i, row in enumerate(self.contacts))

@@ -1,0 +1,52 @@
+"""A contact of a model with several: the gap of one coordinate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from saltus.errors import ParameterError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """A contact that keeps a coordinate q on one side of a position p: its gap is sign (q - p) >= 0.
+
+    While it is closed, q stays at p, and its reaction, an impulse or a force along q times the sign, is not negative.
+    """
+
+    name: str  # such as "lower", in events and in the names of stops
+    coordinate: str  # the name of the model's coordinate
+    sign: int = 1  # +1 where the coordinate stays above the position, -1 where it stays below
+    position: Any = 0.0  # p, a number, maybe one of the model's parameters
+    restitution: Any = None  # e of impacts that close it, in [0, 1]; by default that of the system's impact law
+
+    def __post_init__(self) -> None:
+        if self.sign not in (1, -1):
+            raise ParameterError(f"the sign of the contact {self.name!r} must be +1 or -1, got {self.sign!r}", "sign")
+
+    def gap(self, position: Any) -> Any:
+        """sign (q - p), at a position q."""
+        return self.sign * (position - self.position)
+
+
+def check_contacts(model: Any) -> None:
+    """Refuse contacts of a model that have no meaning.
+
+    Raises:
+        ParameterError: two of one name, an unknown coordinate, a model with sides, two contacts that leave a coordinate no room.
+    """
+    contacts, kind = model.contacts, type(model).__name__
+    names = [contact.name for contact in contacts]
+    if len(set(names)) < len(names):
+        raise ParameterError(f"{kind}.contacts must have names of their own, got {', '.join(names)}", "model")
+    if model.sides:
+        raise ParameterError(f"{kind} has contacts, so it must have no sides: give it `sides = ()`", "model")
+    for contact in contacts:
+        if contact.coordinate not in model.coordinates:
+            known = ", ".join(model.coordinates)
+            raise ParameterError(f"the contact {contact.name!r} holds {contact.coordinate!r}, but {kind} has {known}", "model")
+    for a in contacts:
+        for b in contacts:
+            if a is not b and a.coordinate == b.coordinate and not (a.sign != b.sign and b.gap(a.position) > 0.0):
+                raise ParameterError(f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them", "model")

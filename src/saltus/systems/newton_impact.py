@@ -1,0 +1,67 @@
+"""Newton's law of impact for models with several contacts, with a transfer between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import check_number, settle_numbers
+from saltus.errors import ParameterError
+from saltus.systems.factors import Factors
+from saltus.systems.impact import ImpactLaw
+from saltus.systems.model import Model
+
+
+@dataclass(frozen=True, slots=True)
+class NewtonImpact(ImpactLaw):
+    """0 <= J _|_ v+ + E v- >= 0 at all contacts whose gap is 0, with the rates v of the gaps and the impulses J (Moreau).
+
+    E has the restitution of each contact on its diagonal and the transfer g elsewhere. A contact with an impulse is left with
+    -e_i v_i- less g times the other ones' v-. For g = 0 the energy lost at an impact is 1/2 sum J_i (1 - e_i) |v_i-| on fixed
+    ground. A transfer may gain energy: see `energy_gain`.
+    """
+
+    e: Any = 0.0  # of all contacts, or a tuple with one for each in the order of the model; in [0, 1]
+    transfer: float = 0.0  # g in [0, 1]
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "transfer", at_least=0.0, at_most=1.0)
+        several = isinstance(self.e, (tuple, list))
+        for i, value in enumerate(self.e if several else (self.e,)):
+            check_number(f"e.{i}" if several else "e", value, at_least=0.0, at_most=1.0)
+        object.__setattr__(self, "e", Factors(float(x) for x in self.e) if several else float(self.e))
+
+    def restitution_matrix(self, model: Model) -> list[list[Any]]:
+        """E, with a contact's own restitution where it has one."""
+        contacts = model.contacts
+        factors = self.e if isinstance(self.e, Factors) else (self.e,) * len(contacts)
+        if len(factors) != len(contacts):
+            names = ", ".join(contact.name for contact in contacts)
+            raise ParameterError(f"impact.e must have {len(contacts)} value(s), for {names}, got {len(factors)}", "impact.e")
+        matrix: list[list[Any]] = [[self.transfer for _ in contacts] for _ in contacts]
+        for i, (contact, factor) in enumerate(zip(contacts, factors, strict=True)):
+            matrix[i][i] = factor if contact.restitution is None else contact.restitution
+        return matrix
+
+
+def energy_gain(model: Model, impact: ImpactLaw) -> dict[str, float]:
+    """By how much an impact at each contact may raise the kinetic energy, as a share of what the impact at most takes; <= 0: not.
+
+    With all other contacts closed, at rest and the impact the only one: the velocities after it are v+ = -E v- where an impulse
+    acts, and (v+' M v+) / (v-' M v-) - 1 is the share, on fixed ground and in the position where all contacts are closed. For two
+    layers it is negative iff M_ss e_s^2 - 2 M_sj e_s g + M_jj g^2 <= M_ss in the gaps' coordinates.
+    """
+    contacts, names = model.contacts, model.coordinates
+    position = {contact.coordinate: float(contact.position) for contact in contacts}
+    q = tuple(position.get(name, 0.0) for name in names)
+    mass = np.atleast_2d(np.array(model.mass_matrix(q[0] if len(q) == 1 else q), dtype=float))
+    matrix, gain = np.array(impact.restitution_matrix(model), dtype=float), {}
+    for s, contact in enumerate(contacts):
+        before, after = np.zeros(len(names)), np.zeros(len(names))
+        before[names.index(contact.coordinate)] = -contact.sign
+        for j, other in enumerate(contacts):
+            after[names.index(other.coordinate)] += other.sign * matrix[j, s]
+        gain[contact.name] = float(after @ mass @ after / (before @ mass @ before)) - 1.0
+    return gain
