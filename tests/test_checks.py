@@ -1,12 +1,16 @@
 """Refusals that many functions share name the function, the argument, and what would be right."""
 
+import inspect
+import pickle
 from enum import StrEnum
 
 import pytest
 
 import saltus
-from saltus.checks import check_kind, checked_by
-from saltus.errors import ParameterError, near
+from saltus import checks
+from saltus.checks import check_kind, check_memory, check_work, free_memory
+from saltus.errors import ParameterError, SaltusError, near
+from saltus.public_functions import answered, checked_by
 
 
 @checked_by(lambda **arguments: None)
@@ -17,14 +21,14 @@ def searched(system, *, window=None, starts=8):
 @pytest.mark.parametrize(
     ("given", "named", "sentence"),
     [
-        ((1,), {"windw": 2}, r"searched\(\) got an unexpected keyword argument 'windw'; did you mean 'window'\?$"),
-        ((1,), {"region": 2}, r"searched\(\) got an unexpected keyword argument 'region'; known here: starts, system, window$"),
+        ((1,), {"windw": 2}, r"searched\(\) has no argument 'windw'; did you mean 'window'\?$"),
+        ((1,), {"region": 2}, r"searched\(\) has no argument 'region'; known here: starts, system, window$"),
         ((), {}, r"searched\(\) missing a required argument: 'system'$"),
         ((1, 2), {}, r"searched\(\) too many positional arguments$"),
     ],
 )
 def test_arguments_that_do_not_fit_are_refused_with_the_name_of_the_function(given, named, sentence):
-    with pytest.raises(TypeError, match=sentence):
+    with pytest.raises(ParameterError, match=sentence):
         searched(*given, **named)
 
 
@@ -55,3 +59,75 @@ def test_near_names_are_those_that_a_user_writes():
     assert near("rd", colour) == "did you mean 'red'?"
     assert near("grean", colour, ("greens",)) == "did you mean 'green' or 'greens'?"
     assert near("x", colour, ("blue",)) == "known here: green, red"
+
+
+# --- every public function ---------------------------------------------------------------------------------------------------
+
+SYSTEM = saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(frequency=1.0))
+
+
+def functions():
+    """The public functions of saltus, by their names."""
+    return {name: getattr(saltus, name) for name in saltus.__all__ if inspect.isfunction(getattr(saltus, name))}
+
+
+@pytest.mark.parametrize("name", functions())
+def test_a_misspelt_argument_is_answered_with_the_near_name(name):
+    function = functions()[name]
+    known = [p.name for p in inspect.signature(function).parameters.values() if p.kind is p.KEYWORD_ONLY]
+    for argument in known:
+        with pytest.raises(ParameterError, match=rf"'?{argument}'?") as refusal:
+            function(SYSTEM, **{f"{argument}_": 1})
+        assert len(str(refusal.value)) < 400
+
+
+@pytest.mark.parametrize("name", functions())
+def test_objects_of_a_wrong_kind_are_answered_with_the_name_of_the_argument(name):
+    function = functions()[name]
+    needed = [p for p in inspect.signature(function).parameters.values() if p.default is p.empty and p.kind < p.VAR_POSITIONAL]
+    if not needed or name in ("load_study",):  # its argument may be any path
+        return
+    for wrong in (object(), 3, "text", None, [1, 2], {"a": 1}):
+        with pytest.raises(SaltusError) as refusal:
+            function(*[wrong for _ in needed])
+        assert len(str(refusal.value)) < 400
+
+
+def test_a_package_that_is_called_names_the_function_that_is_meant():
+    with pytest.raises(ParameterError, match=r"saltus.attractors is a package, not a function; did you mean 'find_attractors'"):
+        saltus.attractors(SYSTEM)
+    with pytest.raises(ParameterError, match=r"saltus.theory is a package, not a function"):
+        saltus.theory()
+
+
+def test_a_public_function_can_be_pickled():
+    assert pickle.loads(pickle.dumps(saltus.simulate)) is saltus.simulate
+
+
+def test_a_mistake_of_saltus_stays_one():
+    def mistaken(count: int) -> None:
+        raise AttributeError("a mistake")
+
+    with pytest.raises(AttributeError, match="a mistake"):
+        answered(mistaken)(3)
+    with pytest.raises(ParameterError, match=r"^count must be a whole number, got 'x'$"):
+        answered(mistaken)("x")
+
+
+def test_memory_and_work_are_estimated(monkeypatch):
+    monkeypatch.setattr(checks, "free_memory", lambda: 1e9)
+    check_memory("starts", 0.7e9, "starts")
+    with pytest.raises(ParameterError, match=r"^starts is too large: 9 starts need about 0.9 GB of memory, and 1 GB are free$"):
+        check_memory("starts", 0.9e9, "9 starts")
+    with pytest.raises(ParameterError, match=r"^starts is too large: 1000000 starts need about 2.05 GB"):
+        saltus.find_attractors(SYSTEM, starts=1_000_000)
+    with pytest.raises(ParameterError, match=r"^periods is too large: 1e\+06 periods of a motion kept whole \(dense=False"):
+        saltus.simulate(SYSTEM, theta=0.1, periods=1_000_000)
+    with pytest.raises(ParameterError, match=r"take about 40 days of one core"):
+        check_work("periods", 1e6, 1e7)
+    with pytest.raises(ParameterError, match=r"^threads must lie in \[1, 1024\], got 100000$"):
+        saltus.simulate_many(SYSTEM, theta=[0.1], periods=1, threads=10**5)
+
+
+def test_the_free_memory_is_told():
+    assert 1e6 < free_memory() < 1e15

@@ -19,7 +19,16 @@ SOURCE = Path(saltus.__file__).parent
 FILES = sorted(SOURCE.rglob("*.py"))
 ROOMS = sorted(path.parent.name for path in SOURCE.glob("*/__init__.py"))
 
-SHARED = {"errors", "checks", "files", "progress", "provenance", "branch_lines", "_front_door"}  # what every room may import
+SHARED = {
+    "errors",
+    "checks",
+    "files",
+    "progress",
+    "provenance",
+    "public_functions",
+    "branch_lines",
+    "_front_door",
+}  # what every room may import
 # The rooms whose front doors a room may use besides its own; `plots` knows datasets only, `continuation` functions and arrays.
 MAY_IMPORT = {
     "systems": set(),

@@ -5,12 +5,16 @@ A room imports another one only through these names. Nothing is loaded before it
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from types import FunctionType, ModuleType
 from typing import Any
 
 from lazy_loader import attach_stub
 
-from saltus.errors import near
+from saltus.errors import ParameterError, near
+
+FOR_USERS = ("saltus", "saltus.theory", "saltus.sweep")  # whose functions users call, with arguments of any kind
 
 
 def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
@@ -20,10 +24,33 @@ def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[
         AttributeError: by `__getattr__`, of a name that is not there, with the names that are near to it.
     """
     load, names, public = attach_stub(package, file)
+    sys.modules[package].__class__ = Room
 
     def get(name: str) -> Any:
         if name.startswith("__") or name in public:
-            return load(name)
+            return _answering(load(name)) if package in FOR_USERS else load(name)
         raise AttributeError(f"{package} has no {name!r}; {near(name, public)}")
 
     return get, names, public
+
+
+class Room(ModuleType):
+    """A package of saltus: called by mistake it names the functions that may be meant."""
+
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        own = self.__name__.rpartition(".")[2]
+        meant = [name for name in self.__all__ if own[:-1] in name and name.islower()]
+        hint = near(own, meant) if meant else "use one of its functions"
+        raise ParameterError(f"{self.__name__} is a package, not a function; {hint}")
+
+
+def _answering(found: Any) -> Any:
+    """A public function that answers arguments of a wrong kind by their names; whatever else has a name as it is."""
+    if not isinstance(found, FunctionType) or hasattr(found, "answers"):
+        return found
+    from saltus.public_functions import answered
+
+    answering = answered(found)
+    vars(answering)["answers"] = True
+    setattr(sys.modules[found.__module__], found.__name__, answering)  # pickle looks for it there
+    return answering

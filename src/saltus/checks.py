@@ -2,25 +2,44 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-import functools
-import inspect
 import math
+import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from saltus.errors import ParameterError, near
+from saltus.errors import ParameterError, shown
 
 if TYPE_CHECKING:
     from saltus.systems import System
 
-P = ParamSpec("P")
-R = TypeVar("R", covariant=True)
-
 RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The most that may be asked for, on any machine; what a request needs of the memory is estimated beside it."""
+
+    count: int = 10_000_000  # Motions, points, samples: more of them at once is a slip of the pen, and fits into no memory.
+    periods: int = 10**12  # Forcing periods, or units of time, of one motion: days of one core.
+    threads: int = 1024  # More than a machine has cores; each thread takes memory before it does anything.
+    order: int = 1000  # Of a harmonic: the step of the integrator shrinks with it.
+    seed: int = 2**63 - 1  # What files and random generators hold.
+    motion: int = 2048  # Bytes that a motion of an ensemble takes; 1000 were measured, and samples come to it.
+    dense: int = 6000  # Bytes that a forcing period of one motion takes which is kept whole; 5400 were measured.
+    work: float = 1e12  # Motions times forcing periods: four days of one core, at three million in a second.
+    memory: float = 0.8  # The share of the free memory that one request may take: the rest keeps the machine usable.
+
+
+LIMITS = Limits()
+MOST = dict.fromkeys(("periods", "transient", "settle"), LIMITS.periods)
+MOST |= {"seed": LIMITS.seed, "threads": LIMITS.threads, "workers": LIMITS.threads, "order": LIMITS.order}
 HALF_WIDTH = 1.5  # of the window that is taken where none is given: about the size of the motions that the paper shows
 
 
@@ -51,7 +70,7 @@ def number_problem(
     wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
     if not number:
         kind = wanted.replace("lie in", "be a number in").replace("be finite", "be a finite number")
-        return f"must {kind}, got {value!r}"
+        return f"must {kind}, got {shown(value)}"
     inside = (
         math.isfinite(value)
         and (above is None or value > above)
@@ -62,7 +81,7 @@ def number_problem(
     if inside:
         return None
     hint = " (degrees?)" if unit == "rad" and math.isfinite(value) and 3.2 < abs(value) <= 360 else ""
-    return f"must {wanted}, got {value!r}{hint}"
+    return f"must {wanted}, got {shown(value)}{hint}"
 
 
 def _range_text(above: float | None, below: float | None, at_least: float | None, at_most: float | None) -> str:
@@ -81,14 +100,77 @@ def _short(value: float) -> str:
 
 
 def check_count(name: str, value: Any, at_least: int, at_most: int | None = None) -> None:
-    """Refuse what is not a whole number within the stated bounds.
+    """Refuse what is not a whole number within the stated bounds; the upper one is that of `Limits` where none is given.
 
     Raises:
         ParameterError: with the name, the range and the value.
     """
-    check_number(name, value, at_least=at_least, at_most=at_most)
-    if value != int(value):
-        raise ParameterError(f"{name} must be a whole number, got {value!r}", name)
+    at_most = MOST.get(name.rpartition(".")[2], LIMITS.count) if at_most is None else at_most
+    problem = number_problem(value, at_least=at_least, at_most=at_most)
+    if problem is None and value != int(value):
+        problem = f"must be a whole number, got {shown(value)}"
+    if problem is not None:
+        raise ParameterError(f"{name} {problem.replace('be a number', 'be a whole number')}", name)
+
+
+def check_memory(name: str, size: float, what: str) -> None:
+    """Refuse a request that needs more than its share of the memory that is free, before anything is computed.
+
+    Args:
+        name: the argument to make smaller.
+        size: the estimate, in bytes.
+        what: what needs it, such as "1000000 starts".
+
+    Raises:
+        ParameterError: with the estimate and what is free.
+    """
+    free = free_memory()
+    if size > LIMITS.memory * free:
+        raise ParameterError(
+            f"{name} is too large: {what} need about {size / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free", name
+        )
+
+
+def check_work(name: str, motions: float, periods: float) -> None:
+    """Refuse what would take days: so many motions of so many forcing periods.
+
+    Raises:
+        ParameterError: with the estimate.
+    """
+    if motions * periods > LIMITS.work:
+        days = motions * periods / LIMITS.work * 4.0
+        raise ParameterError(
+            f"{name} is too large: {motions:.3g} motions of {periods:.3g} forcing periods take about {days:.2g} days of one "
+            f"core, and {LIMITS.work:.0e} periods in all are the most",
+            name,
+        )
+
+
+def check_starts(starts: Any, beside: int = 1) -> None:
+    """Refuse a number of initial states that is none, or that needs too much memory, each `beside` so many others at once.
+
+    Raises:
+        ParameterError: with the range, or the estimate of the memory.
+    """
+    check_count("starts", starts, 1)
+    each = f" in each of {beside} places" if beside > 1 else ""
+    check_memory("starts", float(starts) * beside * LIMITS.motion, f"{starts} starts{each}")
+
+
+def free_memory() -> float:
+    """The memory that programs can have without others losing theirs, in bytes; infinite where the system does not tell."""
+    found = [math.inf]
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        found += [1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable")]
+    with contextlib.suppress(OSError, ValueError):  # the limit of a container
+        group = Path("/sys/fs/cgroup")
+        used = float((group / "memory.current").read_text())
+        found.append(max(0.0, float((group / "memory.max").read_text()) - used))
+    if len(found) == 1 and hasattr(os, "sysconf"):
+        with contextlib.suppress(OSError, ValueError):
+            found.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))
+    return min(found)
 
 
 def check_kind(name: str, value: Any, *kinds: type, source: str = "") -> None:
@@ -100,7 +182,7 @@ def check_kind(name: str, value: Any, *kinds: type, source: str = "") -> None:
     if not isinstance(value, kinds):
         wanted = kinds[0].__name__
         article, returned = "an" if wanted[0].lower() in "aeio" else "a", f", as {source} gives it" if source else ""
-        raise ParameterError(f"{name} must be {article} {wanted}{returned}, got {value!r:.80}", name)
+        raise ParameterError(f"{name} must be {article} {wanted}{returned}, got {shown(value)}", name)
 
 
 def check_bounds(bounds: Any) -> tuple[float, float]:
@@ -112,9 +194,9 @@ def check_bounds(bounds: Any) -> tuple[float, float]:
     try:
         low, high = (float(x) for x in bounds)
     except (TypeError, ValueError):
-        raise ParameterError(f"bounds must be two numbers (lowest, highest), got {bounds!r}", "bounds") from None
+        raise ParameterError(f"bounds must be two numbers (lowest, highest), got {shown(bounds)}", "bounds") from None
     if not -math.inf < low < high < math.inf:
-        raise ParameterError(f"bounds must be two numbers, the smaller one first, got {bounds!r}", "bounds")
+        raise ParameterError(f"bounds must be two numbers, the smaller one first, got {shown(bounds)}", "bounds")
     return low, high
 
 
@@ -129,7 +211,7 @@ def check_axis(name: str, values: Any) -> np.ndarray:
     except (TypeError, ValueError):
         axis = np.empty(0)
     if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all() or not (np.diff(axis) > 0).all():
-        raise ParameterError(f"{name} must be numbers that rise, each above the one before, got {values!r:.80}", name)
+        raise ParameterError(f"{name} must be numbers that rise, each above the one before, got {shown(values)}", name)
     return axis
 
 
@@ -139,7 +221,7 @@ def check_path(system: Any, path: Any, name: str = "path") -> None:
     Raises:
         ParameterError: of the argument `name`, with the paths that are near.
     """
-    if path in system.parameters:
+    if isinstance(path, str) and path in system.parameters:
         return
     try:
         system.get(path)
@@ -199,7 +281,9 @@ def check_window(window: Any, system: System) -> Window:
     except (TypeError, ValueError):
         bounds = np.empty(0)
     if bounds.shape != (2, 2) or not np.isfinite(bounds).all() or not (bounds[:, 0] < bounds[:, 1]).all():
-        raise ParameterError(f"window must be ((least, largest coordinate), (least, largest velocity)), got {window!r}", "window")
+        raise ParameterError(
+            f"window must be ((least, largest coordinate), (least, largest velocity)), got {shown(window)}", "window"
+        )
     return Window(*map(tuple, bounds.tolist()))
 
 
@@ -214,61 +298,8 @@ def check_states(name: str, states: Any) -> np.ndarray:
     except (TypeError, ValueError):
         array = np.full((1, 2), np.nan)
     if not np.isfinite(array).all():
-        raise ParameterError(f"{name} must be states (coordinate, velocity), an array (n, 2), got {states!r}", name)
+        raise ParameterError(f"{name} must be states (coordinate, velocity), an array (n, 2), got {shown(states)}", name)
     return array
-
-
-class Checked(Protocol[P, R]):
-    """A function whose arguments can be checked without computing anything."""
-
-    __name__: str
-
-    def __call__(self, *given: P.args, **named: P.kwargs) -> R:
-        """What the function gives."""
-
-    def check(self, *given: P.args, **named: P.kwargs) -> None:
-        """Refuse what the function would refuse."""
-
-
-def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Checked[P, R]]:
-    """A decorator by which a function refuses arguments without meaning before it begins, and has `function.check(...)`.
-
-    `check` is called with every argument of the function by its name, defaults included.
-    """
-
-    def decorate(function: Callable[P, R]) -> Checked[P, R]:
-        signature = inspect.signature(function)
-        open_ended = [p.name for p in signature.parameters.values() if p.kind is p.VAR_KEYWORD]
-
-        def refuse(*given: Any, **named: Any) -> None:
-            try:
-                bound = signature.bind(*given, **named)
-            except TypeError as error:
-                unknown = [name for name in named if name not in signature.parameters]
-                hint = f"; {near(unknown[0], signature.parameters)}" if unknown and not open_ended else ""
-                raise TypeError(f"{function.__name__}() {error}{hint}") from None
-            bound.apply_defaults()
-            arguments = dict(bound.arguments)
-            for name in open_ended:
-                arguments |= arguments.pop(name)
-            check(**arguments)
-
-        @functools.wraps(function)
-        def call(*given: Any, **named: Any) -> R:
-            given = tuple(_kept(value) for value in given)
-            named = {name: _kept(value) for name, value in named.items()}
-            refuse(*given, **named)
-            return function(*given, **named)
-
-        vars(call)["check"] = refuse
-        return cast(Checked[P, R], call)
-
-    return decorate
-
-
-def _kept(value: Any) -> Any:
-    """The value, or a tuple of what an iterator yields, which could otherwise be looked at only once."""
-    return tuple(value) if isinstance(value, Iterator) else value
 
 
 def settle_numbers(owner: Any, *names: str, **bounds: Any) -> None:

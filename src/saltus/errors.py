@@ -6,6 +6,8 @@ import difflib
 from collections.abc import Iterable
 from typing import Any
 
+LONGEST_NAME, LONGEST_LIST = 80, 200  # characters of what is compared with known names, and of the list of these
+
 
 class SaltusError(Exception):
     """The base of every error that saltus raises on purpose; the command line prints it as one sentence."""
@@ -56,7 +58,19 @@ def near(name: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
     Names in `also` are proposed where they are near, and are not listed otherwise.
     """
     known = sorted(str(name) for name in known)  # the repr of an enumeration's member is not what a user writes
-    close = difflib.get_close_matches(name, [*known, *also], n=3, cutoff=0.6)
+    close = difflib.get_close_matches(name[:LONGEST_NAME], [*known, *also], n=3, cutoff=0.6)
     if close:
         return "did you mean " + " or ".join(repr(c) for c in close) + "?"
-    return "known here: " + (", ".join(known) if known else "none")
+    listed = ", ".join(known) if known else "none"
+    return "known here: " + (listed if len(listed) <= LONGEST_LIST else listed[:LONGEST_LIST].rpartition(", ")[0] + ", ...")
+
+
+def shown(value: Any, most: int = 60) -> str:
+    """A value as a sentence repeats it: on one line and not longer than `most` characters."""
+    if isinstance(value, int) and abs(value) >= 10**20:
+        return "a very large number"  # Python itself refuses to write some of them
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # a user's own class may raise anything
+        text = f"an object of type {type(value).__name__}"
+    return text if len(text) <= most else text[: most - 3] + "..."

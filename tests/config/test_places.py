@@ -4,9 +4,10 @@ import math
 
 import pytest
 
-from saltus.checks import check_along, check_bounds, check_count, check_number, check_path, checked_by
+from saltus.checks import check_along, check_bounds, check_count, check_number, check_path
 from saltus.errors import ParameterError
 from saltus.flow import simulate
+from saltus.public_functions import checked_by
 from saltus.studies import phase_portrait, response_spectrum, stability_chart
 from saltus.systems import Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction
 

@@ -343,11 +343,11 @@ def test_motion_after_ten_thousand_periods_goes_on_as_from_time_zero():
         ({"thete": 0.3}, "Metainterface has no coordinate 'thete'; did you mean 'theta'?"),
         ({"theta": 0.3, "periods": None}, "say how long: either periods=... or duration=..."),
         ({"theta": 0.3, "duration": 1.0}, "say how long: either periods=... or duration=..."),
-        ({"theta": 0.3, "periods": -1}, "periods must lie in [0, inf), got -1"),
-        ({"theta": 0.3, "periods": math.inf}, "periods must lie in [0, inf), got inf"),
-        ({"theta": 0.3, "periods": None, "duration": -0.5}, "duration must lie in [0, inf), got -0.5"),
-        ({"theta": 0.3, "periods": None, "duration": math.nan}, "duration must lie in [0, inf), got nan"),
-        ({"theta": 0.3, "periods": "3"}, "periods must be a number in [0, inf), got '3'"),
+        ({"theta": 0.3, "periods": -1}, "periods must lie in [0, 1e+12], got -1"),
+        ({"theta": 0.3, "periods": math.inf}, "periods must lie in [0, 1e+12], got inf"),
+        ({"theta": 0.3, "periods": None, "duration": -0.5}, "duration must lie in [0, 1e+12], got -0.5"),
+        ({"theta": 0.3, "periods": None, "duration": math.nan}, "duration must lie in [0, 1e+12], got nan"),
+        ({"theta": 0.3, "periods": "3"}, "periods must be a number in [0, 1e+12], got '3'"),
         ({"theta": 0.3, "tol": 1e-16}, "tol must lie in [1e-15, 1e-06], got 1e-16"),
         ({"theta": 0.3, "tol": 1e-5}, "tol must lie in [1e-15, 1e-06], got 1e-05"),
         ({"theta": 0.3, "tol": 0}, "tol must lie in [1e-15, 1e-06], got 0"),
@@ -398,4 +398,4 @@ def test_motion_that_leaves_the_range_of_numbers_is_refused_with_the_instant():
 
     runaway = WALL.with_({"model.stiffness": 0.0, "model.damping": 0.0, "load.force.mean": -1e300})
     with pytest.raises(MotionError, match="the motion leaves the range of numbers at time"):
-        simulate(runaway, x=0.0, velocity=-1e300, duration=1e10)
+        simulate(runaway, x=0.0, velocity=-1e300, duration=1e10, dense=False)

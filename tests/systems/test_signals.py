@@ -155,7 +155,7 @@ def test_impossible_records_are_refused_in_a_sentence(time, value, options, mess
     [
         (lambda: Harmonic(math.nan), "amplitude must be finite, got nan"),
         (lambda: Harmonic(1.0, phase=math.inf), "phase must be finite"),
-        (lambda: Harmonic(1.0, order=1.5), "order must be a whole number of at least 1, got 1.5"),
+        (lambda: Harmonic(1.0, order=1.5), "order must be a whole number, got 1.5"),
         (lambda: Harmonic(1.0, order=0), "order"),
         (lambda: Harmonic(1.0, order=True), "order"),
         (lambda: Harmonic("0.5"), "amplitude must be"),
@@ -179,7 +179,7 @@ def test_impossible_signals_and_loads_are_refused_in_a_sentence(make, message):
 
 @pytest.mark.parametrize("order", ["1", None, math.nan, math.inf, [1]])
 def test_an_order_that_is_no_number_is_refused_in_a_sentence(order):
-    with pytest.raises(ParameterError, match=r"order must be a whole number"):
+    with pytest.raises(ParameterError, match=r"order must (be a whole number|lie in)"):
         Harmonic(1.0, order=order)
 
 

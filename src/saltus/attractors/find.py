@@ -13,11 +13,12 @@ from saltus.attractors.attractor import REST, UNDECIDED, Attractor, Attractors
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.registry import NoLabel, Registry
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.checks import Rectangle, check_count, check_number, check_states, check_window, checked_by
+from saltus.checks import Rectangle, check_count, check_number, check_starts, check_states, check_window
 from saltus.errors import ParameterError
 from saltus.flow import RECURRENCE, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, initial_states
 from saltus.progress import Progress, part_of, silent
+from saltus.public_functions import checked_by
 from saltus.systems import System
 
 
@@ -39,7 +40,7 @@ def _check(
 ) -> None:
     with_clock(system)
     check_states("also", also)
-    check_count("starts", starts, 1)
+    check_starts(starts)
     check_count("max_period", max_period, 1, RECURRENCE.compiled_max_period)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     check_window(window, system)

@@ -13,6 +13,7 @@ from saltus.cli.interrupt import interruptible
 from saltus.errors import SaltusError
 
 BAD_INPUT = 2
+LONGEST = 380  # characters of a sentence
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 INTERRUPTION = "interrupted; no file was left half-written"
 
@@ -36,9 +37,19 @@ def guarded() -> Iterator[None]:
         stop(f"{place}cannot be read or written ({(error.strerror or str(error)).lower()})", BAD_INPUT)
     except MemoryError:
         stop("there is not enough memory for this; ask for fewer samples or periods", BAD_INPUT)
+    except RecursionError:
+        stop("what is given is nested too deeply", BAD_INPUT)
+
+
+def shortened(sentence: str) -> str:
+    """A sentence of at most `LONGEST` characters on one line: what is in a file may have any length."""
+    line = " ".join(sentence.split())
+    if len(line) <= LONGEST:
+        return line
+    return f"{line[: LONGEST * 2 // 3]} ... {line[-LONGEST // 3 + 5 :]}"
 
 
 def stop(sentence: str, status: int) -> NoReturn:
     """Say `sentence` on stderr and end with `status`."""
-    print(f"saltus: {sentence}", file=sys.stderr, flush=True)
+    print(f"saltus: {shortened(sentence)}", file=sys.stderr, flush=True)
     raise typer.Exit(status)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from saltus.checks import LIMITS
 from saltus.config.readers import Reader, read_angle, read_number, read_table, read_text, read_whole, read_within, show
 from saltus.config.source import Source
 from saltus.errors import near
@@ -67,8 +68,8 @@ def _readers(model: Model, margins: tuple[str, ...]) -> dict[str, Reader]:
     return {
         **{name: read_angle if model.unit_of(name) == "rad" else read_number for name in model.coordinates},
         "velocity": read_velocities if len(model.coordinates) > 1 else read_number,
-        "periods": read_within(read_number, above=0.0),
-        "duration": read_within(read_number, above=0.0),
+        "periods": read_within(read_number, above=0.0, at_most=LIMITS.periods),
+        "duration": read_within(read_number, above=0.0, at_most=LIMITS.periods),
         "tol": read_within(read_number, at_least=1e-15, at_most=1e-6),
         "time": read_number,
         "side": _read_side,

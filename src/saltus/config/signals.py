@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-import csv
 import math
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from saltus.checks import LIMITS, free_memory
 from saltus.config.readers import read, read_number, read_table, read_text, readers_of, show
 from saltus.config.source import Keys, Source
 from saltus.systems import Harmonic, Record
+
+RECORD_MEMORY = 20  # bytes that a character of a record takes while it is read, about: text, lines, pairs of numbers
 
 
 def read_load(source: Source, data: Any) -> dict[str, Any]:
@@ -59,13 +62,20 @@ def read_samples(source: Source, keys: Keys, name: str) -> tuple[np.ndarray, np.
     where = f"{'.'.join(keys)} {name!r}"
     path = source.path.parent / Path(name)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        found, problem = path.stat(), ""
+        if not stat.S_ISREG(found.st_mode):  # a device or a pipe may have no end
+            problem = "is no file"
+        elif RECORD_MEMORY * found.st_size > LIMITS.memory * free_memory():
+            problem = f"has {found.st_size} bytes, more than fits into the free memory"
+        text = "" if problem else path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        source.refuse(keys, f"{where} does not exist; paths are relative to the study file")
+        problem = "does not exist; paths are relative to the study file"
     except UnicodeDecodeError:
-        source.refuse(keys, f"{where} is not a text file; a record has two columns, time and value")
+        problem = "is not a text file; a record has two columns, time and value"
     except (OSError, ValueError) as error:
-        source.refuse(keys, f"{where} cannot be read ({getattr(error, 'strerror', None) or error})")
+        problem = f"cannot be read ({getattr(error, 'strerror', None) or error!s:.120})"
+    if problem:
+        source.refuse(keys, f"{where} {problem}")
     rows: list[tuple[float, float]] = []
     headed = False
     for number, line in enumerate(text.splitlines(), start=1):
@@ -74,7 +84,7 @@ def read_samples(source: Source, keys: Keys, name: str) -> tuple[np.ndarray, np.
         row = _row(line)
         if row is None:
             if rows or headed:
-                source.refuse(keys, f"{where}: line {number} must begin with two finite numbers, got {show(line.strip())}")
+                source.refuse(keys, f"{where}: line {number} must be two finite numbers, got {show(line.strip())}")
             headed = True
             continue
         if rows and row[0] <= rows[-1][0]:
@@ -87,11 +97,11 @@ def read_samples(source: Source, keys: Keys, name: str) -> tuple[np.ndarray, np.
 
 
 def _row(line: str) -> tuple[float, float] | None:
-    """The first two numbers of a line, or None where they are not two finite numbers."""
+    """The first two numbers of a line, or None; between commas there may be no third, as it may be a decimal comma's rest."""
     separator = next((s for s in ";,\t" if s in line), None)
-    cells = next(csv.reader([line], delimiter=separator)) if separator else line.split()
+    cells = [cell.strip().strip('"') for cell in line.split(separator)]
     try:
-        time, value = (float(cell) for cell in cells[:2])
+        time, value = (float(cell) for cell in (cells if separator == "," else cells[:2]))
     except ValueError:
         return None
     return (time, value) if math.isfinite(time) and math.isfinite(value) else None

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import LIMITS, check_number
 from saltus.errors import ParameterError
 
 MOST_PERIODS = 2**53  # as many as can be counted exactly
@@ -33,7 +33,7 @@ def clock(time: Any, length: Any, periods: float | None, duration: float | None)
     if (periods is None) == (duration is None):
         raise ParameterError("say how long: either periods=... or duration=...")
     span = periods if duration is None else duration
-    check_number("periods" if duration is None else "duration", span, at_least=0.0)
+    check_number("periods" if duration is None else "duration", span, at_least=0.0, at_most=LIMITS.periods)
     assert span is not None
     if length is None:
         if periods is not None:

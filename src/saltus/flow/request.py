@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import LIMITS, check_memory, check_number
 from saltus.errors import ParameterError, near
 from saltus.flow.forcing_time import Clock, clock
 from saltus.flow.structures import limits_of
@@ -57,13 +58,23 @@ class MotionRequest:
         check_number("time", self.time)
         if self.side not in (None, 1, -1):
             raise ParameterError(f"side must be +1 or -1, got {self.side!r}", "side")
+        when = clock(float(self.time), self.system.load.period, self.periods, self.duration)
+        if self.dense and self.samples is None:
+            _check_dense(when, self.periods, self.duration)
         return {
             "position": position,
             "speeds": speeds,
             "limits": limits,
-            "clock": clock(float(self.time), self.system.load.period, self.periods, self.duration),
+            "clock": when,
             "sample_times": None if self.samples is None else _sample_times(self.samples, float(self.time)),
         }
+
+
+def _check_dense(when: Clock, periods: float | None, duration: float | None) -> None:
+    """Refuse a motion that is too long to be kept whole."""
+    name, span = ("duration", duration) if periods is None else ("periods", periods)
+    count = float(span or 0.0) / (1.0 if periods is not None else when.length or 2.0 * math.pi)
+    check_memory(name, count * LIMITS.dense, f"{count:.3g} periods of a motion kept whole (dense=False or samples=... keep less)")
 
 
 def _sample_times(samples: Any, start: float) -> np.ndarray:

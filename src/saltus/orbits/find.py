@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_count
-from saltus.errors import MotionError
+from saltus.checks import check_count, check_path
+from saltus.errors import MotionError, ParameterError, near, shown
 from saltus.flow import (
     RECURRENCE,
     EventKind,
@@ -69,13 +70,8 @@ def find_orbit(
         ParameterError: an argument without meaning.
         MotionError: the motion comes to rest for good, does not settle, or Newton's method does not converge; with what to do.
     """
-    check_system(system, "find_orbit")
-    if period is not None:
-        check_count("period", period, 1)
-    check_count("max_period", max_period, 1)
-    if settle is not None:
-        check_count("settle", settle, 0)
-    base = Problem(system, Signature((), 1), parameters)  # refuses what has no orbits
+    _check(system, parameters, coordinates, {"period": period, "max_period": max_period, "settle": settle})
+    base = Problem(system, Signature((), 1), tuple(parameters))  # refuses what has no orbits
     state = {**coordinates, "velocity": velocity}
     if settle is not None:
         state = _after(system, state, settle)
@@ -92,6 +88,21 @@ def find_orbit(
         "chaotic, slow to settle or longer; try another start, max_period=..., or settle=0 with period=... for an unstable orbit "
         "near the start"
     )
+
+
+def _check(system: System, parameters: Iterable[str], coordinates: Mapping[str, Any], counts: dict[str, int | None]) -> None:
+    """Refuse arguments without meaning."""
+    check_system(system, "find_orbit")
+    for name, count in counts.items():
+        if count is not None or name == "max_period":
+            check_count(name, count, 0 if name == "settle" else 1)
+    names = system.model.coordinates
+    for name in coordinates:
+        if name not in names:
+            hint = near(name, names, ("velocity", "parameters", *counts))
+            raise ParameterError(f"{type(system.model).__name__} has no coordinate {shown(name)}; {hint}", name)
+    for path in parameters:
+        check_path(system, path, "parameters")
 
 
 def _after(system: System, state: dict[str, Any], periods: int) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import Rectangle, Window, check_count, check_path, check_window
+from saltus.checks import Rectangle, Window, check_count, check_path, check_starts, check_window
 from saltus.errors import ParameterError
 from saltus.flow import Recurrence, find_recurrence
 from saltus.orbits.near_returns import orbits_near_returns, solved_near
@@ -96,7 +96,8 @@ def search_orbits(
     """
     check_system(system, "search_orbits", coordinates=1)
     check_count("max_period", max_period, 1)
-    check_count("starts", starts, 1)
+    check_starts(starts)
+    check_count("seed", seed, 0)
     check_path(system, path)
     area, grid = check_window(window, system), np.atleast_1d(np.asarray(list(values), dtype=float))
     if not grid.size or not np.isfinite(grid).all():
@@ -127,7 +128,7 @@ def search_orbits(
 
 def initial_states(system: System, count: int, window: Window, seed: int) -> np.ndarray:
     """(count, 2): coordinates and velocities spread over a window; those beyond a one-sided contact are reflected at it."""
-    offset = np.random.default_rng(seed).random(2)
+    offset = np.random.default_rng(int(seed)).random(2)
     return within_window(system, 2.0 * ((offset + np.arange(1, count + 1)[:, None] * EVEN) % 1.0) - 1.0, window)
 
 

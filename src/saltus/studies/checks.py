@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from saltus.checks import check_along, check_bounds, check_count, check_path
+from saltus.checks import check_along, check_bounds, check_count, check_path, check_starts
 from saltus.errors import ParameterError
 from saltus.systems import System, check_system
 
@@ -17,4 +17,6 @@ def check_diagram(system: System, path: str, bounds: tuple[float, float], **coun
     check_along(system, path, (low, high), "bounds")
     for name, count in counts.items():
         check_count(name, count, 1 if name in ("max_period", "starts") else 0)
+        if name == "starts":
+            check_starts(count)
     return low, high

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import Equilibrium, Separatrix, equilibria, separatrices
-from saltus.checks import Rectangle, check_count, check_number, check_states, check_window, checked_by
+from saltus.checks import Rectangle, check_count, check_number, check_states, check_window
 from saltus.errors import ParameterError
 from saltus.flow import simulate
 from saltus.orbits import EVEN
 from saltus.progress import Progress, silent
 from saltus.provenance import provenance
+from saltus.public_functions import checked_by
 from saltus.systems import System, VelocityReduction
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def phase_portrait(
 def _spread(system: System, window: Rectangle, points: tuple[Equilibrium, ...], seed: int) -> np.ndarray:
     """States (n, 2) beside the stable equilibria, and spread evenly over the part of the window in which the system can be."""
     area, shifts = check_window(window, system), np.arange(1, PORTRAIT_STARTS.tried * PORTRAIT_STARTS.spread + 1)[:, None] * EVEN
-    states = area.centre + area.half * (2.0 * ((np.random.default_rng(seed).random(2) + shifts) % 1.0) - 1.0)
+    states = area.centre + area.half * (2.0 * ((np.random.default_rng(int(seed)).random(2) + shifts) % 1.0) - 1.0)
     states = states[_possible(system, states[:, 0])][: PORTRAIT_STARTS.spread]
     if not len(states):
         raise ParameterError(

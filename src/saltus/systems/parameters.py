@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from saltus.errors import ParameterError, near
+from saltus.errors import ParameterError, near, shown
 from saltus.systems.factors import Factors
 from saltus.systems.load import Load
 from saltus.systems.signals import Constant, Sum, as_signal
@@ -55,10 +55,8 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
     for path, value in changes.items():
         head, _, rest = str(path).partition(".")
         if head not in parts and not (isinstance(node, Load) and head.isidentifier() and not rest):
-            raise ParameterError(
-                f"no parameter {where + str(path)!r}: {type(node).__name__} has no {head!r}; {near(head, children(node))}",
-                where + str(path),
-            )
+            hint = f"{type(node).__name__} has no {shown(head)}; {near(head, children(node))}"
+            raise ParameterError(f"no parameter {shown(where + str(path))}: {hint}", where + str(path))
         if rest:
             below[head][rest] = value
         else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from saltus.errors import ParameterError, near
+from saltus.errors import ParameterError, near, shown
 from saltus.systems.impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model, check_sides
@@ -35,13 +35,15 @@ def register(cls: T) -> T:
     Raises:
         ParameterError: what is neither; a model whose sides and reset do not go together.
     """
+    if not isinstance(cls, type):
+        raise ParameterError(f"register takes a Model or an ImpactLaw, got {shown(cls)}")
     if issubclass(cls, Model):
         check_sides(cls)
         MODELS[cls.__name__] = cls
     elif issubclass(cls, ImpactLaw):
         IMPACTS[cls.__name__] = cls
     else:
-        raise ParameterError(f"register takes a Model or an ImpactLaw, got {cls!r}")
+        raise ParameterError(f"register takes a Model or an ImpactLaw, got {shown(cls)}")
     return cls
 
 

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from saltus.errors import ParameterError, near
+from saltus.errors import ParameterError, near, shown
 from saltus.systems.load import Load
 from saltus.systems.registry import find
 from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
@@ -32,8 +32,11 @@ def to_dict(part: Any) -> Any:
 def from_dict(kind: str, data: Any) -> Any:
     """The inverse of `to_dict` for `kind` one of model, load, impact."""
     if not isinstance(data, Mapping):
-        raise ParameterError(f"{kind} must be a table of keys and values, got {data!r}", kind)
+        raise ParameterError(f"{kind} must be a table of keys and values, got {shown(data)}", kind)
     if kind == "load":
+        for name in data:
+            if not isinstance(name, str) or not name.isidentifier() or name == "self":
+                raise ParameterError(f"load has no channel {shown(name)}", f"load.{shown(name)}")
         channels = {name: read_signal(value, f"load.{name}") for name, value in data.items() if name != "frequency"}
         return Load(frequency=data.get("frequency"), **channels)
     fields = dict(data)
@@ -41,7 +44,7 @@ def from_dict(kind: str, data: Any) -> Any:
         raise ParameterError(f"{kind}.type is missing: it names the {kind}, such as 'Metainterface' or 'VelocityReduction'", kind)
     name = fields.pop("type")
     if not isinstance(name, str):
-        raise ParameterError(f"{kind}.type must be a name in quotes, got {name!r}", f"{kind}.type")
+        raise ParameterError(f"{kind}.type must be a name in quotes, got {shown(name)}", f"{kind}.type")
     return build(find(kind, name), fields, kind)
 
 

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import RADIANS, check_number, settle_numbers
+from saltus.checks import RADIANS, check_count, check_number, settle_numbers
 from saltus.errors import ParameterError
 
 
@@ -67,12 +67,7 @@ class Harmonic(Signal):
 
     def __post_init__(self) -> None:
         settle_numbers(self, "amplitude", "mean", "phase")
-        try:
-            whole = not isinstance(self.order, bool) and self.order == int(self.order) >= 1
-        except (TypeError, ValueError, OverflowError):
-            whole = False
-        if not whole:
-            raise ParameterError(f"order must be a whole number of at least 1, got {self.order!r}", "order")
+        check_count("order", self.order, 1)
         object.__setattr__(self, "order", int(self.order))
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from saltus.checks import check_kind
-from saltus.errors import ParameterError, near
+from saltus.errors import ParameterError, near, shown
 from saltus.systems.contact import check_contacts
 from saltus.systems.impact import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
@@ -63,11 +63,13 @@ class System:
 
     def get(self, path: str) -> Any:
         """The part at a dotted path; a constant channel is its number."""
+        if not isinstance(path, str):
+            raise ParameterError(f"a path must be a text such as 'load.frequency', got {shown(path)}", "path")
         node: Any = self
         for name in path.split("."):
             parts = children(node)
             if name not in parts:
-                raise ParameterError(f"no parameter {path!r}; {near(path, self.parameters)}", path)
+                raise ParameterError(f"no parameter {shown(path)}; {near(path, self.parameters)}", path)
             node = parts[name]
         return node.value if type(node).__name__ == "Constant" else node
 
@@ -98,7 +100,7 @@ class System:
     def from_dict(cls, data: Mapping[str, Any]) -> System:
         """The inverse of `to_dict`; `load` and `impact` may be left out."""
         if not isinstance(data, Mapping):
-            raise ParameterError(f"a system is a table with a model, a load and an impact law, got {data!r}")
+            raise ParameterError(f"a system is a table with a model, a load and an impact law, got {shown(data)}")
         unknown = set(data) - {"model", "load", "impact"}
         if unknown:
             name = min(map(str, unknown))
@@ -177,8 +179,10 @@ def _each(value: Any) -> list[Any]:
 def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:
     try:
         return parse(text)
-    except ValueError as error:
-        raise ParameterError(f"this is not the {language} of a system: {error}") from None
+    except RecursionError:
+        raise ParameterError(f"this is not the {language} of a system: it is nested too deeply") from None
+    except (TypeError, ValueError, AttributeError) as error:  # no text, or no such text
+        raise ParameterError(f"this is not the {language} of a system: {error!s:.120}") from None
 
 
 def check_system(system: Any, asking: str, *, coordinates: int | None = None, several_contacts: bool = False) -> None:
@@ -188,7 +192,7 @@ def check_system(system: Any, asking: str, *, coordinates: int | None = None, se
         ParameterError: with what `asking` takes.
     """
     if not isinstance(system, System):
-        raise ParameterError(f"{asking} takes a System(model=..., load=..., impact=...), got {system!r}", "system")
+        raise ParameterError(f"{asking} takes a System(model=..., load=..., impact=...), got {shown(system)}", "system")
     names = system.model.coordinates
     if coordinates is not None and len(names) != coordinates:
         wanted = "one coordinate" if coordinates == 1 else f"{coordinates} coordinates"

@@ -18,9 +18,20 @@ from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.find import find_attractors
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.checks import Window, check_axis, check_count, check_kind, check_number, check_window, checked_by
+from saltus.checks import (
+    LIMITS,
+    Window,
+    check_axis,
+    check_count,
+    check_kind,
+    check_memory,
+    check_number,
+    check_window,
+    check_work,
+)
 from saltus.errors import ParameterError
 from saltus.progress import Progress, part_of, silent
+from saltus.public_functions import checked_by
 from saltus.systems import System, reversed_system
 
 if TYPE_CHECKING:
@@ -70,6 +81,9 @@ def _check(
     if curves:
         _check_curves(system, grid)
     check_count("rows", rows, 1)
+    check_work("periods", len(grid[0]) * len(grid[1]), periods)
+    at_once = len(grid[1]) * (len(grid[0]) if store is None else min(rows, len(grid[0])))
+    check_memory("velocity", float(at_once) * LIMITS.motion, f"{at_once} cells at once")
     if store is not None and Path(store).exists():
         check_basin_store(Path(store), system)
 

@@ -60,6 +60,8 @@ def classify(
     check_count("periods", periods, SETTINGS.thirds * 2 * LYAPUNOV.batches)
     check_count("transient", transient, 0)
     check_count("max_period", max_period, RECURRENCE.compiled_max_period)
+    check_count("seed", seed, 0)
+    check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     case = VerdictRequest(system, clock, int(periods), int(max_period), int(seed), float(tol), progress)
     ends = case.follow(start, int(transient + periods), max(SETTINGS.states, 4 * int(max_period)), (0.0, 0.1))
     verdict = settled(case, ends, start[0]) or unsettled(case, ends)

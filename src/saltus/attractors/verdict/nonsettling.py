@@ -133,7 +133,7 @@ def _evidence(runs: list[Exponents], opinion: ZeroOne | None) -> dict[str, Any]:
 
 def _beside(case: VerdictRequest, state: dict[str, Any]) -> Recurrence:
     """How motions end that begin at a state, the first, and beside it."""
-    around = np.random.default_rng(case.seed).uniform(-SETTINGS.aside, SETTINGS.aside, (SETTINGS.companions, 2))
+    around = np.random.default_rng(int(case.seed)).uniform(-SETTINGS.aside, SETTINGS.aside, (SETTINGS.companions, 2))
     states = _row(case, state) + np.concatenate([[[0.0, 0.0]], around])
     return case.follow(states, max(case.periods, SETTINGS.least), 4 * case.max_period, (0.9, 1.0))
 

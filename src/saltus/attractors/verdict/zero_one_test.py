@@ -52,7 +52,7 @@ def zero_one_test(series: Any, *, seed: int = 0, count: int = 100) -> ZeroOne:
     if np.ptp(values) <= CONSTANT * max(1.0, float(np.abs(values).max())):
         return ZeroOne(0.0, 0.0, values.size)
     lags = np.arange(1, values.size // 10 + 1)
-    c = np.random.default_rng(seed).uniform(np.pi / 5, 4 * np.pi / 5, (int(count), 1))
+    c = np.random.default_rng(int(seed)).uniform(np.pi / 5, 4 * np.pi / 5, (int(count), 1))
     bounded = values.mean() ** 2 * (1 - np.cos(lags * c)) / (1 - np.cos(c))
     found = [_correlation(lags, row) for row in _displacement(values, c, lags.size) - bounded]
     low, middle, high = np.quantile(found, [0.25, 0.5, 0.75])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import check_memory, check_number, check_work
 from saltus.errors import ParameterError
 from saltus.flow.ensemble.compiled_lanes import compile_beside, compile_driver_aside, load_lane_functions
 from saltus.flow.ensemble.ensemble_dataset import to_dataset
@@ -107,7 +107,10 @@ def _run(
         jobs.numbers[:, JobNumber.CAPTURE_SPEED] = _capture(system, inputs.parameters, wanted.limits)
     spans = jobs.labels[:, JobLabel.LAST_PERIOD] - jobs.labels[:, JobLabel.FIRST_PERIOD]
     begun = jobs.numbers[:, JobNumber.END_TIME] > jobs.numbers[:, JobNumber.START_TIME]
-    lanes = compiled_lanes(system, run, wanted, read_last(last, int(np.max(spans + begun, initial=1))))
+    check_work("periods" if duration is None else "duration", inputs.size, float(np.max(spans, initial=0)))
+    kept = read_last(last, int(np.max(spans + begun, initial=1)))
+    check_memory("last", 16.0 * len(wanted.sample) * kept * inputs.size, f"samples of {kept} periods of {inputs.size} motions")
+    lanes = compiled_lanes(system, run, wanted, kept)
     if driver is not None:
         compile_beside(driver)
     ends = lanes.run(jobs, threads, progress, total=float(np.sum(spans + 1)))

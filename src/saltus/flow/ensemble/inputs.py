@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from saltus.checks import LIMITS, check_memory
 from saltus.errors import ParameterError, near
 from saltus.flow.ensemble.ensemble_dataset import rate_name, result_names
 from saltus.flow.request import ARGUMENTS
@@ -47,6 +49,8 @@ def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coord
     dims, shape, coords, together = broadcast_arrays(arrays)
     check_parameters(system, broadcast_arrays({path: arrays[path] for path in given})[3])
     _check_names(system, dims, coords, arrays, given)
+    size = math.prod(shape)
+    check_memory(dims[0] if dims else "parameters", float(size) * LIMITS.motion, f"{size} motions at once")
     return Inputs(dims, shape, coords, together, tuple(given))
 
 

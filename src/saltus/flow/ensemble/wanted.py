@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, near
+from saltus.checks import check_count
+from saltus.errors import ParameterError, near, shown
 from saltus.flow.ensemble.threads import available_cores
 
 
@@ -61,10 +62,12 @@ def read_names(argument: str, given: Any, known: Iterable[str] | None = None) ->
     try:
         names = (given,) if isinstance(given, str) else tuple(given)
     except TypeError:
-        raise ParameterError(f"{argument} must be names, got {given!r}", argument) from None
+        raise ParameterError(f"{argument} must be names, got {shown(given)}", argument) from None
     for name in names:
+        if not isinstance(name, str):
+            raise ParameterError(f"{argument} must be names, got {shown(given)}", argument)
         if known is not None and name not in known:
-            raise ParameterError(f"{argument} knows no {name!r}; {near(str(name), known)}", argument)
+            raise ParameterError(f"{argument} knows no {shown(name)}; {near(str(name), known)}", argument)
     return names
 
 
@@ -99,6 +102,5 @@ def read_threads(threads: Any) -> int:
         ParameterError: no whole number from 1 on.
     """
     threads = available_cores() if threads is None else threads
-    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-        raise ParameterError(f"threads must be a whole number of at least 1, got {threads!r}", "threads")
+    check_count("threads", threads, 1)
     return int(threads)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Rectangle, check_count, checked_by
+from saltus.checks import Rectangle, check_count
 from saltus.progress import Progress, part_of, silent
+from saltus.public_functions import checked_by
 from saltus.studies.chart.borders import with_borders
 from saltus.studies.chart.disagreements import disagreements
 from saltus.studies.chart.request import ChartRequest

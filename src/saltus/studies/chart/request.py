@@ -9,8 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_along, check_axis, check_count, check_number, check_path, check_window
-from saltus.errors import ParameterError
+from saltus.checks import (
+    check_along,
+    check_axis,
+    check_count,
+    check_memory,
+    check_number,
+    check_path,
+    check_starts,
+    check_window,
+    check_work,
+)
+from saltus.errors import ParameterError, shown
 from saltus.provenance import check_provenance, identity, provenance
 from saltus.studies.chart.motions import KEPT
 from saltus.systems import System, check_system
@@ -64,8 +74,12 @@ class ChartRequest:
         _check_paths(self.system, self.paths, (self.horizontal, self.vertical))
         if self.periods is None:
             object.__setattr__(self, "periods", periods_to_settle(self.system))
-        for name in ("starts", "periods", "rows"):
+        for name in ("periods", "rows"):
             check_count(name, getattr(self, name), 1)
+        check_starts(self.starts, min(self.rows, len(self.vertical)) * len(self.horizontal))
+        check_work("periods", float(self.starts) * len(self.vertical) * len(self.horizontal), self.periods)
+        cells, numbers = len(self.vertical) * len(self.horizontal), 8 * (KEPT + 2)  # of 8 bytes each
+        check_memory("horizontal", 8.0 * numbers * cells, f"{cells} cells")
         check_count("max_period", self.max_period, 1, MAX_PERIOD)
         check_count("seed", self.seed, 0)
         check_number("least", self.least, above=0.0)
@@ -163,8 +177,9 @@ def _check_driven(system: Any) -> None:
 
 def _check_paths(system: System, paths: Any, axes: tuple[np.ndarray, np.ndarray]) -> None:
     """Refuse paths that lead to no number, and values that the system refuses."""
-    if isinstance(paths, str) or len(paths) != 2 or paths[0] == paths[1]:
-        raise ParameterError(f"paths must be two parameters, (along horizontal, along vertical), got {paths!r}", "paths")
+    texts = isinstance(paths, (list, tuple)) and len(paths) == 2 and all(isinstance(path, str) for path in paths)
+    if not texts or paths[0] == paths[1]:
+        raise ParameterError(f"paths must be two parameters, (along horizontal, along vertical), got {shown(paths)}", "paths")
     for path, values in zip(paths, axes, strict=True):
         check_path(system, path, "paths")
         check_along(system, path, (values.min(), values.max()), "paths")

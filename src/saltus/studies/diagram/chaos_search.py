@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from saltus.attractors import largest_exponents
-from saltus.checks import Rectangle, check_count, check_window, checked_by
+from saltus.checks import Rectangle, check_count, check_window
 from saltus.flow import Outcome, find_recurrence
 from saltus.orbits import initial_states
 from saltus.progress import Progress, part_of, silent
+from saltus.public_functions import checked_by
 from saltus.studies.checks import check_diagram
 from saltus.studies.diagram.bands import Band, Bands, Tried, spread_over
 from saltus.systems import System

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Rectangle, check_bounds, check_count, check_kind, check_number, check_window, checked_by
+from saltus.checks import Rectangle, check_bounds, check_count, check_kind, check_number, check_window
 from saltus.errors import ParameterError
 from saltus.orbits import STEP
 from saltus.progress import Progress, part_of, silent
+from saltus.public_functions import checked_by
 from saltus.studies.checks import check_diagram
 from saltus.studies.diagram.branch_set import BranchSet
 from saltus.studies.diagram.diagram_dataset import diagram_tree

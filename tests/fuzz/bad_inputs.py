@@ -1,0 +1,151 @@
+"""Makers of bad studies, records, JSON, files and calls: each is the same for the same seed."""
+
+import copy
+import inspect
+import json
+import math
+import random
+
+import numpy as np
+import tomli_w
+
+VALUES = (
+    *(0, 1, -1, 2, 0.5, -0.0, 1e-320, 1e22, 1e308, -1e308, 2**63 - 1, 2**64, math.nan, math.inf, -math.inf, True, False),
+    *("", "a", "80 deg", "[red]", "[/]", "$x_", "\x1b[2J", "é" * 300, "self", "__class__", "../../etc/passwd", "load.frequency"),
+    *([], [1], [1, 2], [2, 1], [[0, 1], [0, 1]], [math.nan], ["a"], {}, {"self": 1}, {"from": 0, "to": 1, "count": 2}),
+    *({"from": 0, "to": 1, "count": 1e9}, {"amplitude": 1e308}, {"type": "Metainterface"}, {"time": [0, 1], "value": [0, 1]}),
+)
+STUDY = {
+    "model": {"type": "Metainterface", "beta0": 1.4, "damping": 0.1},
+    "load": {"frequency": 1.0, "horizontal": {"amplitude": 0.5}, "vertical": -0.5},
+    "impact": {"type": "VelocityReduction", "e": 0.9},
+    "simulate": {"theta": 0.3, "periods": 3},
+    "bifurcation_diagram": {"path": "load.frequency", "bounds": [0.5, 1.0], "starts": 4, "seed": 1},
+    "attractors": {"starts": 4, "seed": 1, "max_period": 2},
+    "stability_chart": {"horizontal": [0.1, 0.2], "vertical": [-0.5, -0.4], "starts": 2, "periods": 40},
+}
+NAMES = (
+    *[
+        "type",
+        "beta0",
+        "damping",
+        "frequency",
+        "amplitude",
+        "order",
+        "time",
+        "value",
+        "file",
+        "self",
+        "x",
+        "theta",
+        "seed",
+        "starts",
+        "window",
+        "curves",
+    ],
+    "é",
+    "a.b",
+)
+
+
+def mutated(rng: random.Random, tree, times: int):
+    """A tree of dicts and lists with so many changes: a value replaced, a key renamed, added or left out."""
+    tree = copy.deepcopy(tree)
+    for _ in range(times):
+        place = tree
+        while isinstance(place, dict) and place:
+            key = rng.choice(sorted(place))
+            if isinstance(place[key], dict) and place[key] and rng.random() < 0.75:
+                place = place[key]
+                continue
+            change = rng.randrange(4)
+            if change == 0:
+                del place[key]
+            elif change == 1:
+                place[rng.choice(NAMES)] = place.pop(key)
+            elif change == 2:
+                place[rng.choice(NAMES)] = copy.deepcopy(rng.choice(VALUES))
+            else:
+                place[key] = copy.deepcopy(rng.choice(VALUES))
+            break
+    return tree
+
+
+def damaged(rng: random.Random, content: bytes) -> bytes:
+    """Bytes with a bit flipped, a part cut, zeroed, doubled or written over."""
+    if not content:
+        return bytes(rng.randrange(256) for _ in range(8))
+    start, length = rng.randrange(len(content)), rng.choice((1, 4, 64, 1000))
+    part = slice(start, start + length)
+    change = rng.randrange(5)
+    if change == 0:
+        return content[:start] + bytes([content[start] ^ 1 << rng.randrange(8)]) + content[start + 1 :]
+    if change == 1:
+        return content[:start]
+    new = (bytes(len(content[part])), content[part] * 2, rng.randbytes(min(length, len(content) - start)))[change - 2]
+    return content[:start] + new + content[part.stop :]
+
+
+def study(rng: random.Random) -> bytes:
+    """A study that is wrong in a few places, or whose text is."""
+    text = tomli_w.dumps(mutated(rng, STUDY, rng.randrange(1, 4))).encode("utf-8", "surrogatepass")
+    return damaged(rng, text) if rng.random() < 0.3 else text
+
+
+def record(rng: random.Random) -> bytes:
+    """A record of a few samples that is wrong in a few places."""
+    separator = rng.choice((",", ";", "\t", " ", ", "))
+    rows = [
+        [str(i), str(rng.choice((0.5, -1, 1e308, "nan", "1,5", "x", "", '"2"')) if rng.random() < 0.2 else i)] for i in range(6)
+    ]
+    if rng.random() < 0.3:
+        rows[rng.randrange(6)].append("7")
+    if rng.random() < 0.2:
+        rng.shuffle(rows)
+    text = "\n".join(separator.join(row) for row in rows).encode()
+    return damaged(rng, text) if rng.random() < 0.4 else text
+
+
+def system_json(rng: random.Random) -> str:
+    """The JSON of a system that is wrong in a few places, or whose text is."""
+    tree = mutated(rng, {name: STUDY[name] for name in ("model", "load", "impact")}, rng.randrange(1, 4))
+    text = json.dumps(tree)
+    if rng.random() < 0.3:
+        text = damaged(rng, text.encode()).decode("utf-8", "replace")
+    return rng.choice(("[" * 5000, '{"model":' * 5000, "1" * 5000)) if rng.random() < 0.01 else text
+
+
+def objects(rng: random.Random, good) -> object:
+    """Something that is no argument, or nearly one."""
+    kinds = (
+        *VALUES,
+        None,
+        object(),
+        int,
+        good,
+        np.nan,
+        np.array([1.0, np.nan]),
+        np.zeros((2, 3)),
+        np.array(["a"]),
+        1j,
+        b"x",
+        lambda *_: 1,
+    )
+    return rng.choice(kinds)
+
+
+def call(rng: random.Random, function, good):
+    """Arguments for a function: most of the needed ones, a few of the others, any of which may be bad."""
+    given, named = [], {}
+    for parameter in inspect.signature(function).parameters.values():
+        needed = parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD
+        if parameter.name in ("workers", "scheduler", "store") or (not needed and rng.random() < 0.7):
+            continue
+        value = good if parameter.name == "system" and rng.random() < 0.8 else objects(rng, good)
+        if parameter.kind is parameter.VAR_KEYWORD:
+            named[rng.choice(("theta", "x", "period", "starts"))] = value
+        elif parameter.kind is parameter.KEYWORD_ONLY:
+            named[parameter.name if rng.random() < 0.95 else parameter.name + "s"] = value
+        else:
+            given.append(value)
+    return given, named

@@ -1,0 +1,167 @@
+"""Whatever is given, the answer is a result or one sentence: no traceback, no file left, no work begun that has no bounds.
+
+The cases are the same in every run: 200 of each kind, and with SALTUS_CASES or in `make thorough` as many as that says (20 000).
+"""
+
+import inspect
+import os
+import random
+import resource
+import time
+
+import bad_inputs
+import pytest
+
+import saltus
+from saltus.errors import SaltusError
+from saltus.systems import System
+
+THOROUGH = int(os.environ.get("SALTUS_CASES", "20000"))
+COUNTS = [200, pytest.param(THOROUGH, marks=pytest.mark.thorough)]
+LONGEST, SLOWEST, LARGEST = 400, 10.0, 2e9  # characters, seconds, bytes
+
+
+class Computed(BaseException):
+    """The checks are over, and something would be computed."""
+
+
+@pytest.fixture
+def nothing_is_computed(monkeypatch):
+    """Every motion ends the case, before it begins."""
+    from saltus.flow import simulation
+    from saltus.flow.ensemble import ensemble
+    from saltus.orbits import problem
+
+    def begun(*_, **__):
+        raise Computed
+
+    monkeypatch.setattr(simulation, "follow", begun)
+    monkeypatch.setattr(ensemble, "_run", begun)
+    monkeypatch.setattr(problem.Problem, "evaluate", begun)
+
+
+def answer(case: int, ask, *given, **named) -> str | None:
+    """The sentence with which a case is refused, if it is."""
+    begun, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    try:
+        ask(*given, **named)
+    except SaltusError as error:
+        sentence = str(error)
+    except Computed:
+        sentence = None
+    except Exception as error:
+        pytest.fail(f"case {case}: {type(error).__name__}: {error!s:.300} for {given!r:.300} {named!r:.300}")
+    else:
+        sentence = None
+    assert sentence is None or len(sentence) < LONGEST, f"case {case}: {sentence}"
+    assert time.process_time() - begun < SLOWEST, f"case {case}"
+    assert 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) < LARGEST, f"case {case}"
+    return sentence
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_bad_studies(tmp_path, nothing_is_computed, count):
+    from saltus.cli.guard import shortened
+    from saltus.cli.run_command import check
+    from saltus.config import load_study
+
+    path, rng, refused = tmp_path / "study.toml", random.Random(1), 0
+
+    def run():
+        try:
+            study = load_study(path)
+            for ask in study.asks:
+                check(study, ask, tmp_path / "out")
+        except SaltusError as error:
+            raise SaltusError(shortened(str(error))) from error
+
+    for case in range(count):
+        path.write_bytes(bad_inputs.study(rng))
+        refused += answer(case, run) is not None
+        assert [file.name for file in tmp_path.iterdir()] == ["study.toml"]
+    assert refused > count / 2
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_bad_records(tmp_path, count):
+    from saltus.config import load_study
+
+    text = '[model]\ntype = "Metainterface"\nbeta0 = 1.4\n[load]\nhorizontal = { file = "q.csv", quantity = "force" }\n'
+    (tmp_path / "study.toml").write_text(text)
+    rng, refused = random.Random(2), 0
+    for case in range(count):
+        (tmp_path / "q.csv").write_bytes(bad_inputs.record(rng))
+        refused += answer(case, load_study, tmp_path / "study.toml") is not None
+    assert refused > count / 3
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_bad_json(count):
+    rng, refused = random.Random(3), 0
+    for case in range(count):
+        refused += answer(case, System.from_json, bad_inputs.system_json(rng)) is not None
+    assert refused > count / 2
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """A store and a netCDF file with what saltus draws of them."""
+    from saltus.cli.run_command import run_study
+
+    folder = tmp_path_factory.mktemp("results")
+    import tomli_w
+
+    asks = {"stability_chart": bad_inputs.STUDY["stability_chart"], "simulate": {"theta": 0.3, "periods": 2}}
+    (folder / "study.toml").write_text(tomli_w.dumps({name: bad_inputs.STUDY[name] for name in ("model", "load")} | asks))
+    run_study(folder / "study.toml", folder, False, None)
+    return folder
+
+
+@pytest.mark.parametrize("count", [100, pytest.param(THOROUGH // 4, marks=pytest.mark.thorough)])
+def test_damaged_results(results, tmp_path, count):
+    """A file of a store or a netCDF file is damaged: `status` and `plot` say so, or what is read is as it was."""
+    from saltus.cli.plot_command import open_result
+    from saltus.sweep import status
+
+    rng = random.Random(4)
+    store, motion = results / "stability_chart.zarr", results / "motion.nc"
+    files = [motion] * 20 + sorted(file for file in store.rglob("*") if file.is_file())
+    good = {path: open_result(path).load() for path in (store, motion)}
+    for case in range(count):
+        file = rng.choice(files)
+        whole = motion if file == motion else store
+        content = file.read_bytes()
+        file.write_bytes(bad_inputs.damaged(rng, content))
+        changed = file.read_bytes() != content
+        read = []
+        sentence = answer(case, lambda path=whole, into=read: into.append(open_result(path).load()))
+        assert sentence is not None or not changed or file != motion, f"case {case}"
+        assert sentence is not None or read[0].identical(good[whole]), f"case {case}: {file}"  # a space in JSON, say
+        if whole == store:
+            answer(case, status, store)
+            answer(case, status, store, verify=True)
+        file.write_bytes(content)
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_bad_calls(nothing_is_computed, tmp_path, monkeypatch, count):
+    monkeypatch.chdir(tmp_path)
+    functions = [getattr(saltus, name) for name in saltus.__all__ if inspect.isfunction(getattr(saltus, name))]
+    system = System.from_dict({name: bad_inputs.STUDY[name] for name in ("model", "load")})
+    rng, refused = random.Random(5), 0
+    for case in range(count):
+        function = rng.choice(functions)
+        given, named = bad_inputs.call(rng, function, system)
+        refused += answer(case, function, *given, **named) is not None
+    assert refused > 0.8 * count
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_long_sentence_is_shortened():
+    from saltus.cli.guard import shortened
+
+    assert shortened("short\nsentence") == "short sentence"
+    text = shortened("begin " + "x" * 5000 + " end")
+    assert text.startswith("begin")
+    assert text.endswith("end")
+    assert len(text) < LONGEST
