@@ -22,6 +22,7 @@ class ResponseSettings:
     inset_places: int = 24  # The number of places along each side of the axes that are tried for an inset.
     inset_margin: float = 0.05  # The ticks of an inset take this share of the axes.
     inset_weight: float = 0.65  # Lines in an inset are drawn with this share of their width, as they lie closer together.
+    dotted_values: int = 25  # Simulated motions are drawn at about so many values: more dots hide the lines that they confirm.
     mark_distance: float = 1.5  # Marks of one kind that are nearer, in mm, are left to the insets and to the data.
 
 
@@ -116,9 +117,14 @@ def _mark(style: dict[str, Any]) -> dict[str, Any]:
 
 
 def draw_attractors(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
-    """The attractors found by direct simulation, as dots over the branches."""
+    """The attractors found by direct simulation, as dots over the branches: at some values, and all that lie on no branch."""
     dots = spectrum["attractors"]
-    ax.plot(dots["parameter"], dots[quantity] / scale, zorder=4, **DOTS)
+    values = np.unique(dots["parameter"].values)
+    shown = np.isin(dots["parameter"].values, values[:: max(1, round(len(values) / SETTINGS.dotted_values))])
+    ax.plot(dots["parameter"].values[shown], dots[quantity].values[shown] / scale, zorder=4, **DOTS)
+    if "unplaced" in spectrum.children:
+        other = spectrum["unplaced"]
+        ax.plot(other["parameter"], other[quantity] / scale, zorder=4, **DOTS)
 
 
 def draw_bands(ax: Any, spectrum: Any) -> None:

@@ -124,17 +124,18 @@ def _moved(orbit: RestingOrbit, rounds: int) -> float:
 
 
 def _attractors(search: DiagramSearch) -> xarray.Dataset:
-    """What motions settled on, a dot for each attractor at each value."""
+    """What motions settled on at the values of the grid, a dot for each attractor that is followed."""
     found = search.found
-    data = _dots(search, found.rows)
-    data["starts"] = ("dot", found.starts, {"long_name": "motions of the simulation that have settled on it"})
-    data["placed"] = ("dot", (found.place[found.rows] == Place.ON_BRANCH).astype(np.int8))
+    shown = np.isin(found.motions.value[found.rows], search.grid) & (found.place[found.rows] != Place.LONGER)
+    data = _dots(search, found.rows[shown])
+    data["starts"] = ("dot", found.starts[shown], {"long_name": "motions of the simulation that have settled on it"})
+    data["placed"] = ("dot", (found.place[found.rows[shown]] == Place.ON_BRANCH).astype(np.int8))
     data["placed"].attrs["long_name"] = "whether it lies on a stable part of a branch"
     return data
 
 
 def _unplaced(search: DiagramSearch) -> xarray.Dataset:
-    """The attractors that lie on no branch, with the reason."""
+    """The attractors that lie on no branch, at all values, with the reason."""
     rows = search.found.unplaced
     data, places = _dots(search, rows), search.found.place[rows]
     data["reason"] = ("dot", np.array([Place(place).name.lower() for place in places], dtype="U16"))
