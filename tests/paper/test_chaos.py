@@ -6,6 +6,7 @@ import xarray as xr
 from claim_verdicts import verdicts
 from spectrum_cases import branch, diagram
 
+from saltus.attractors import Unsettled
 from saltus.paper import ClaimVerdict
 from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.measures import chaos_measures
@@ -15,19 +16,18 @@ def panel(*spans, wandering=(), bounds=(0.0, 3.0), stable=True):
     """A diagram with one branch over its whole range, bands at `spans`, and chaos or transients at the values `wandering`."""
     tree = diagram(branch(bounds, [0.5, 0.6], [stable, stable]), bounds=bounds)
     low, high = (np.array([span[i] for span in spans], float) for i in (0, 1))
-    marks = np.full(len(spans), "PD", dtype="U16")
-    columns = {"low": low, "high": high, "exponent": np.full(len(spans), 0.1), "low_mark": marks, "high_mark": marks}
+    marks = np.full(len(spans), "cascade", dtype="U16")
+    columns = {"low": low, "high": high, "exponent": np.full(len(spans), 0.1), "low_edge": marks, "high_edge": marks}
     tree["bands"] = xr.DataTree(xr.Dataset({name: ("band", values) for name, values in columns.items()}))
     values = np.linspace(*bounds, 31)
     chaotic = np.array([any(a <= v <= b for a, b in spans) for v in values])
     wanders = chaotic | np.isin(np.round(values, 6), np.round(wandering, 6))
     table = {
-        "exponent": np.where(wanders, 0.1, np.nan)[:, None],
-        "error": np.where(wanders, 0.01, np.nan)[:, None],
-        "chaotic": chaotic[:, None].astype(int),
-        "undecided": (wanders & ~chaotic)[:, None].astype(int),
+        "exponent": np.where(wanders, 0.1, np.nan),
+        "error": np.where(wanders, 0.01, np.nan),
+        "verdict": np.where(chaotic, Unsettled.CHAOTIC, Unsettled.TRANSIENT),
     }
-    tree["exponents"] = xr.DataTree(xr.Dataset({k: (("value", "start"), v) for k, v in table.items()}, {"value": values}))
+    tree["exponents"] = xr.DataTree(xr.Dataset({k: ("value", v) for k, v in table.items()}, {"value": values}))
     tree.attrs["system"] = under_force().to_json()
     return tree
 

@@ -109,12 +109,8 @@ def diagram(amplitudes=(0.5, 1.0), limits=(1.74, 3.48)):
     empty = np.empty(0)
     bands = xarray.Dataset(dict.fromkeys(("low", "high"), ("band", empty)) | {"kind": ("band", np.empty(0, dtype="U2"))})
     dots = xarray.Dataset({"parameter": ("dot", empty), "amplitude": ("dot", empty)})
-    values = np.array([0.6, 0.9])
-    shape = (2, 1, 3)
-    strobes = xarray.Dataset(
-        {name: (("value", "start", "period"), np.full(shape, x)) for name, x in (("position", 0.3), ("peak", 0.5))},
-        {"value": values},
-    )
+    columns = {"position": np.full(6, 0.3), "peak": np.full(6, 0.5), "value": np.repeat([0.6, 0.9], 3)}
+    strobes = xarray.Dataset({name: ("dot", values) for name, values in columns.items()})
     attrs = {
         "bounds": [0.5, 1.0],
         "coordinate": "theta",

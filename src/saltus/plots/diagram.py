@@ -22,7 +22,7 @@ class StateSettings:
 
     finest: float = 1.3  # The least size of a point.
     coarsest: float = 3.5  # The largest size of a point.
-    at_rest: float = 1e-9  # A motion whose largest amplitude in any period is below this is at rest, and left out.
+    at_rest: float = 1e-9  # A motion that stays within this of the contact for a period is at rest, and left out.
 
 
 DRAWN_STATES = StateSettings()
@@ -73,11 +73,10 @@ def draw_stroboscopic_states(ax: Any, tree: Any) -> None:
     """Direct simulation: where motions are at phase 0 of the load, period after period, from every start."""
     section = tree["stroboscopic"]
     draw_bands(ax, tree)
-    places = section["position"].values
-    moving = np.nanmax(section["peak"].values, axis=2, initial=0.0) > DRAWN_STATES.at_rest
-    values = np.broadcast_to(section["value"].values[:, None, None], places.shape)
+    moving = section["peak"].values > DRAWN_STATES.at_rest
+    values, places = section["value"].values[moving], section["position"].values[moving]
     low, high = ax.get_xlim()
     width = ax.get_window_extent().width / ax.figure.dpi * 72.0  # points
-    size = np.clip(0.5 * width / max(len(section["value"]), 1), DRAWN_STATES.finest, DRAWN_STATES.coarsest)
-    ax.plot(values[moving].ravel(), places[moving].ravel(), markersize=size, **POINTS)
+    size = np.clip(0.5 * width / max(len(np.unique(values)), 1), DRAWN_STATES.finest, DRAWN_STATES.coarsest)
+    ax.plot(values, places, markersize=size, **POINTS)
     ax.set_xlim(low, high)

@@ -1,4 +1,4 @@
-"""The largest Lyapunov exponent of many motions at once, from few long stretches: what searching for chaos takes."""
+"""The largest Lyapunov exponent of many motions at once, as samples of their attractors: what searching for chaos takes."""
 
 from __future__ import annotations
 
@@ -7,68 +7,87 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
-from saltus.attractors.lyapunov.averages import Estimate
-from saltus.attractors.lyapunov.settings import LYAPUNOV
+from saltus.attractors.lyapunov.averages import resolution
 from saltus.flow import Stop, last_states, motions_from, stop_names
 from saltus.systems import System
+
+FEWEST = 4  # motions of which a scatter is taken
 
 
 @dataclass(frozen=True, eq=False)
 class Largest:
-    """The largest exponents, an entry for each motion; nan where a motion has ended or come to rest."""
+    """Largest exponents with half widths of their 95 % intervals, per unit of dimensionless time; an entry for each group."""
 
-    exponent: np.ndarray  # per unit of dimensionless time
-    error: np.ndarray  # half width of its 95 % interval
-    positive: np.ndarray  # whether it is above its error and the resolution, in all and in both halves
-    rates: np.ndarray  # (32, n): from each stretch
-    duration: np.ndarray  # (n,): of the run
-
-    @classmethod
-    def of(cls, rates: np.ndarray, duration: np.ndarray) -> Largest:
-        """The averages of rates (32, n) over runs of these durations, (n,)."""
-        found = Estimate.of(rates)
-        return cls(found.value, found.error, found.positive(duration), rates, duration)
-
-    def averaged(self, chosen: np.ndarray) -> Largest:
-        """The exponents of groups of motions that follow one another, averaged over those chosen, (groups, size).
-
-        Motions on one attractor are samples of it, whose average has a smaller error than each of them.
-        """
-        rates = self.rates.reshape(-1, *chosen.shape)
-        counted = chosen & np.isfinite(rates)
-        with np.errstate(invalid="ignore"):
-            mean = np.where(counted, rates, 0.0).sum(axis=2) / counted.sum(axis=2)
-        return Largest.of(mean, self.duration.reshape(chosen.shape)[:, 0])
+    exponent: np.ndarray  # (groups,): nan where fewer than four motions of a group have an exponent
+    error: np.ndarray
+    positive: np.ndarray  # (groups,): whether it is above its error and the resolution
+    negative: np.ndarray  # (groups,): whether it is below them
 
 
 def largest_exponents(
-    system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray], *, periods: int = 12, tol: float = 1e-10
+    system: System,
+    states: np.ndarray,
+    parameters: Mapping[str, np.ndarray],
+    *,
+    periods: int,
+    tol: float = 1e-10,
 ) -> Largest:
-    """The growth of one small perturbation of each motion from states (n, 2) at phase 0 over 32 stretches of so many periods.
+    """The largest exponent of each group of motions from states (groups, size, 2) at phase 0, over so many forcing periods.
 
-    Within a stretch the derivatives of the end to the start, through impacts, are those of `simulate_many`: along the direction
-    that grows most they are accurate however far it grows, so that no frame need be kept orthonormal and a stretch may be long
-    (`lyapunov_many` needs short ones: it follows the direction that shrinks, too).
+    The motions of a group are taken for independent samples of one attractor, so that their scatter gives the error, by Student's
+    t. Motions that are lost are left out, and so are those whose perturbations surely shrink where others surely grow. A
+    perturbation is given a quarter of the periods to turn to the direction that grows. The derivatives of the end to the start,
+    through impacts, are those of `simulate_many`: along that direction they are accurate however far it grows.
+
+    The resolution is 2 ln(t) / t for the time t of one motion, as regular ones may part like t^2.
+
+    Args:
+        parameters: numbers by dotted path, (groups,) each, in place of the system's.
     """
-    states, direction = np.array(states, dtype=float), np.tile(np.sqrt([0.5, 0.5]), (len(states), 1))
-    frequency = np.broadcast_to(parameters.get("load.frequency", np.array(system.load.frequency, dtype=float)), len(states))
-    growth = np.full((LYAPUNOV.stretches, len(states)), np.nan)
-    options = {"periods": periods, "sensitivities": (), "sample": (), "until": ("rest",), "tol": tol}
-    for stretch in range(LYAPUNOV.stretches):
-        here = np.flatnonzero(np.isfinite(states).all(axis=1))
-        if not here.size:
-            break
-        columns = {path: values[here] for path, values in parameters.items()}
-        ends = motions_from(system, states[here], parameters=columns, **options)
+    groups, size = states.shape[:2]
+    frequency = parameters.get("load.frequency", np.array(system.load.frequency, dtype=float))
+    duration = periods * 2.0 * math.pi / np.broadcast_to(frequency, groups)
+    columns = {path: np.repeat(values, size) for path, values in parameters.items()}
+    begin, direction = states.reshape(-1, 2), np.full((groups * size, 2), math.sqrt(0.5))
+    begin, direction, _ = _stretched(system, begin, direction, columns, max(1, periods // 4), tol)
+    _, _, growth = _stretched(system, begin, direction, columns, periods, tol)
+    return _averaged(growth.reshape(groups, size) / duration[:, None], resolution(duration))
+
+
+def _stretched(
+    system: System, states: np.ndarray, direction: np.ndarray, columns: dict[str, np.ndarray], periods: int, tol: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """States, directions and ln of the growth of small perturbations after so many periods; nan where a motion is lost."""
+    here = np.isfinite(states).all(axis=1)
+    later, turned, growth = np.full_like(states, np.nan), np.full_like(states, np.nan), np.full(len(states), np.nan)
+    if not here.any():
+        return later, turned, growth
+    chosen = {path: values[here] for path, values in columns.items()}
+    options = {"parameters": chosen, "periods": periods, "sensitivities": (), "sample": (), "until": ("rest",), "tol": tol}
+    ends = motions_from(system, states[here], **options)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         grown = np.einsum("nij,nj->ni", ends["derivative"].values, direction[here])
         length = np.linalg.norm(grown, axis=1)
         # What is captured at rest would have to be followed through all of its impacts, of which there are millions.
         moving = (ends["side"].values != 0) & (stop_names(ends) != Stop.CAPTURED)
         going = moving & np.isfinite(length) & (length > 0.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            growth[stretch, here] = np.where(going, np.log(length), np.nan)
-            direction[here] = grown / length[:, None]
-        states[here] = np.where(going[:, None], last_states(system, ends), np.nan)
-    duration = periods * 2.0 * math.pi / frequency
-    return Largest.of(growth / duration, LYAPUNOV.stretches * duration)
+        growth[here] = np.where(going, np.log(length), np.nan)
+        turned[here] = grown / length[:, None]
+    later[here] = np.where(going[:, None], last_states(system, ends), np.nan)
+    return later, turned, growth
+
+
+def _averaged(rates: np.ndarray, least: np.ndarray) -> Largest:
+    """The averages of rates (groups, size), of which those below `least` (groups,) count as 0."""
+    surely = np.abs(rates) > least[:, None]
+    grows, shrinks = surely & (rates > 0.0), surely & (rates < 0.0)
+    counted = np.isfinite(rates) & ~(shrinks & grows.any(axis=1)[:, None])
+    count = counted.sum(axis=1)
+    enough = np.where(count < FEWEST, np.nan, count)
+    mean = np.where(counted, rates, 0.0).sum(axis=1) / enough
+    scatter = np.sqrt((np.where(counted, rates - mean[:, None], 0.0) ** 2).sum(axis=1) / (enough - 1.0))
+    error = stdtrit(enough - 1.0, 0.975) * scatter / np.sqrt(enough)
+    with np.errstate(invalid="ignore"):
+        return Largest(mean, error, mean - error > least, mean + error < -least)

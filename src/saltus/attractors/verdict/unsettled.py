@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors.lyapunov.largest_exponent import Largest, largest_exponents
+from saltus.attractors.lyapunov.largest_exponent import largest_exponents
 from saltus.flow import RECURRENCE, Outcome, Recurrence, find_recurrence, return_period
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
@@ -69,13 +69,15 @@ class JudgementSettings:
     rounds: int = 6  # The largest number of further rounds.
     # Forcing periods, added up over companions, in which none may settle. If none has settled within E, transients of a mean life
     # of E / 3 or less are excluded with a probability of 95 %, as the number that settle within E is Poisson distributed.
-    exposure: int = 48_000
+    exposure: int = 30_000
     # Number of those that must have settled, where others go on: a life is estimated from three to within a factor of about 3.
     # Where some settle and others stop to do so, these must outlast three of the lives that the former show.
     settled: int = 3
-    measured: int = 8  # Number of survivors of which the exponent is measured; their average is the question's exponent.
-    stretch: int = 12  # Forcing periods of a stretch of the exponent (32 of them).
-    longer_stretch: int = 60  # The same, where the shorter run leaves open whether the exponent is positive.
+    # Number of survivors of which the exponent is measured, all of which are samples of one attractor.
+    measured: int = 12
+    # Forcing periods of each run of these. A longer one follows where that before leaves open what the exponent is: weak chaos of
+    # exponent 0.005 takes a thousand periods.
+    runs: tuple[int, ...] = (64, 320, 1600)
     # Distance between the beginnings of companions from one state, or they would all be one motion. Chaos of exponent 0.005
     # brings them apart within 3000 units of time; those from several states are apart from the beginning.
     apart: float = 1e-7
@@ -95,6 +97,7 @@ class Judged:
     doubt: np.ndarray  # (n,): a `Doubt` each
     exponent: np.ndarray  # (n,): the largest one of what has not settled, per unit of time; nan where all settled at once
     error: np.ndarray  # (n,): half width of its 95 % interval
+    gone: np.ndarray  # (n,): how many companions have settled
     life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the one that is excluded with 95 %
     period: np.ndarray  # (n,): forcing periods after which a periodic motion repeats itself, 0 where that is not known
     states: np.ndarray  # (n, companions, 2): the last stroboscopic states, of survivors where there are any
@@ -129,7 +132,7 @@ def judge_unsettled(
 
     A question is a set of stroboscopic states under one set of parameters: the last ones of a motion, or of several motions that
     have not settled. Companions start at them and are followed in rounds. Chaos takes two things. The average of the survivors'
-    largest exponents is above 0 by more than its 95 % error and the resolution 2 ln(t) / t, in both halves of the run. And within
+    largest exponents is above 0 by more than its 95 % error and the resolution 2 ln(t) / t. And within
     a number of forcing periods, added up over companions, none settles: settling from chaotic transients is a Poisson process,
     whose rate is estimated or bounded by that. If some settle, their places are taken by survivors, so that an attractor beside a
     transient becomes an ever larger share of the companions, and shows itself by three mean lives in which none settles.
@@ -143,8 +146,7 @@ def judge_unsettled(
     """
     run = _Judgement.begin(system, states, parameters, settings)
     run.follow(settings.first_periods, part_of(progress, 0.0, 0.2, "judging"))
-    run.measure(settings.stretch, np.flatnonzero(run.open))
-    run.measure(settings.longer_stretch, np.flatnonzero(run.open & ~run.positive & ~run.negative))
+    run.measure()
     for i in range(settings.rounds):
         run.open &= (run.positive & ~run.lasts) | (~run.positive & ~run.negative & (run.gone > 0))
         run.follow(settings.round_periods, part_of(progress, 0.3 + 0.7 * i / settings.rounds, 1.0, "judging"))
@@ -232,22 +234,18 @@ class _Judgement:
         question = rows[here // self.settings.companions]
         self.settled = self.settled.joined(SettledLater(question, ends.last[here], ends.period[here]))
 
-    def measure(self, stretch: int, rows: np.ndarray) -> None:
-        """The exponents of some survivors of these questions, averaged over those that are not surely regular."""
-        if not rows.size:
-            return
+    def measure(self) -> None:
+        """The exponents of some survivors, by ever longer runs as long as these leave open whether they are positive."""
         count = min(self.settings.measured, self.settings.companions)
         chosen = np.linspace(0, self.settings.companions - 1, count).astype(int)
-        states = self.states[rows][:, chosen].reshape(-1, 2)
-        columns = {path: np.repeat(values[rows], count) for path, values in self.parameters.items()}
-        found = largest_exponents(self.system, states, columns, periods=stretch, tol=self.settings.tol)
-        self._average(rows, found, count)
-
-    def _average(self, rows: np.ndarray, found: Largest, count: int) -> None:
-        regular = (found.exponent + found.error < 0.0).reshape(-1, count)
-        mean = found.averaged(np.where(regular.all(axis=1)[:, None], True, ~regular))
-        self.exponent[rows], self.error[rows], self.positive[rows] = mean.exponent, mean.error, mean.positive
-        self.negative[rows] = mean.exponent + mean.error < 0.0
+        for periods in self.settings.runs:
+            rows = np.flatnonzero(self.open & ~self.positive & ~self.negative)
+            if not rows.size:
+                return
+            columns = {path: values[rows] for path, values in self.parameters.items()}
+            found = largest_exponents(self.system, self.states[rows][:, chosen], columns, periods=periods, tol=self.settings.tol)
+            for name in ("exponent", "error", "positive", "negative"):
+                getattr(self, name)[rows] = getattr(found, name)
 
     def look_for_long_periods(self) -> None:
         """Follow what is not surely chaotic, and has not settled, until it does: near bifurcations exponents are near 0."""
@@ -275,7 +273,7 @@ class _Judgement:
             verdict[chosen], doubt[chosen] = kind, Doubt.NONE
         with np.errstate(divide="ignore"):
             life = np.where(lasts, (self.exposure - self.before) / 3.0, self.exposure / self.gone)
-        return Judged(verdict, doubt, self.exponent, self.error, life, self.period, self.states, self.settled)
+        return Judged(verdict, doubt, self.exponent, self.error, self.gone, life, self.period, self.states, self.settled)
 
 
 def _companions(states: np.ndarray, settings: JudgementSettings) -> np.ndarray:

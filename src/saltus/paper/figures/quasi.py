@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors import excludes_tori
+from saltus.attractors import Unsettled, excludes_tori
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import joined
 from saltus.paper.figures.figure import paper_figure
@@ -53,9 +53,7 @@ def draw(data: Any) -> Any:
 
 def _stroboscopic_states(ax: Any, tree: Any) -> None:
     draw_bands(ax, tree)
-    places = tree["stroboscopic"]["position"].values
-    values = np.broadcast_to(tree["stroboscopic"]["value"].values[:, None, None], places.shape)
-    ax.plot(values.ravel(), places.ravel(), **POINTS)
+    ax.plot(tree["stroboscopic"]["value"], tree["stroboscopic"]["position"], **POINTS)
 
 
 def _exponents(ax: Any, tree: Any) -> None:
@@ -63,11 +61,10 @@ def _exponents(ax: Any, tree: Any) -> None:
     draw_bands(ax, tree)
     ax.axhline(0.0, color=FAINT, lw=0.6, zorder=1)
     table = tree["exponents"]
-    values = np.broadcast_to(table["value"].values[:, None], table["exponent"].shape)
-    for kind, colour, face in (("chaotic", STABLE, STABLE), ("undecided", UNSTABLE, "white")):
-        here = table[kind].values.astype(bool)
+    for kind, colour, face in ((Unsettled.CHAOTIC, STABLE, STABLE), (Unsettled.UNDECIDED, UNSTABLE, "white")):
+        here = table["verdict"].values == kind
         ax.errorbar(
-            values[here], table["exponent"].values[here], table["error"].values[here],
+            table["value"].values[here], table["exponent"].values[here], table["error"].values[here],
             linestyle="none", marker="o", markersize=2.2, markerfacecolor=face, color=colour, elinewidth=0.5, zorder=3,
         )  # fmt: skip
 
@@ -79,8 +76,7 @@ def measure(data: Any) -> dict[str, Measured | None]:
 
 def _resolved(panel: Any) -> Measured:
     bands, table, reason = panel["bands"], panel["exponents"], panel.attrs["torus"]
-    chaotic, undecided = (table[kind].values.astype(bool) for kind in ("chaotic", "undecided"))
-    periodic = int((~chaotic & ~undecided).any(axis=1).sum())
+    periodic = int(np.isin(table["verdict"].values, (Unsettled.PERIODIC, Unsettled.TRANSIENT)).sum())
     largest = float(np.max(bands["exponent"].values, initial=-np.inf))
     return measured(
         bool(reason) and largest > 0.0 and periodic > 0,
@@ -88,7 +84,7 @@ def _resolved(panel: Any) -> Measured:
         bands=[{"low": low, "high": high} for low, high in zip(bands["low"].values, bands["high"].values, strict=True)],
         largest=largest,
         periodic=periodic,
-        frequencies=chaotic.shape[0],
+        frequencies=table.sizes["value"],
     )
 
 

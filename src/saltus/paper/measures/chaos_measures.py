@@ -96,10 +96,8 @@ def ground_spectra(panels: Panels) -> dict[str, Measured]:
 def _wandering(spectrum: Any) -> np.ndarray:
     """The values of the grid at which motions wander with a positive exponent: chaos, lasting or not."""
     table = spectrum["exponents"]
-    positive = (table["exponent"].values - table["error"].values > 0.0) & (
-        table["chaotic"].values + table["undecided"].values > 0
-    )
-    return np.asarray(table["value"].values[positive.any(axis=1)])
+    positive = table["exponent"].values - table["error"].values > 0.0
+    return np.asarray(table["value"].values[positive])
 
 
 def _at_high_frequency(panels: Panels) -> Measured:
@@ -133,11 +131,11 @@ def _route(panels: Panels) -> Measured:
     for frequency, tree in panels.items():
         born = [branch for _, branch in branches_of(tree) if "PD" in branch.attrs["end_kinds"]]
         periods = sorted({int(branch["period"][0]) for branch in born})
-        marks = [str(mark) for edge in ("low_mark", "high_mark") for mark in tree["bands"][edge].values]
+        edges = [str(kind) for edge in ("low_edge", "high_edge") for kind in tree["bands"][edge].values]
         doublings, grazings = count(tree, "PD"), count(tree, "GR")
         doubled.append(doublings > 0 and any(period % 2 == 0 for period in periods))
         row = {"frequency": frequency, "doublings": doublings, "grazings": grazings}
-        rows.append(row | {"periods": [{"period": q} for q in periods], "marks": [{"mark": mark} for mark in marks]})
+        rows.append(row | {"periods": [{"period": q} for q in periods], "edges": [{"edge": edge} for edge in edges]})
     return measured(bool(doubled) and all(doubled) and all(row["grazings"] > 0 for row in rows), panels=rows)
 
 

@@ -1,145 +1,186 @@
-"""Bands of chaos along a parameter, as results: what was tried, the bands, and the special points at their edges."""
+"""Bands of chaos along a parameter, as results: what became of motions at all values, the bands and their edges."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.attractors import Unsettled
+from saltus.studies.diagram.simulated import SimulatedMotions
+
 if TYPE_CHECKING:
     import xarray
 
-REACH = 0.005  # largest distance, as a share of the range, at which a special point belongs to the edge of a band
-AT_BOUND = "bound"  # the mark of an edge that is the end of the range
-BAND_COLUMNS = {
-    "low": "least value with chaos",
-    "high": "largest value with chaos",
-    "before": "next value below that was tried, at which no motion is shown to be chaotic",
-    "after": "next value above that was tried, at which no motion is shown to be chaotic",
-    "exponent": "largest Lyapunov exponent found in it, per unit of dimensionless time",
-    "error": "of that exponent, half width of its 95 % interval",
-}
+
+class EdgeKind(StrEnum):
+    """What happens to the chaos at the edge of a band."""
+
+    description: str
+
+    BOUND = "bound", "the range of the study ends"
+    CASCADE = "cascade", "period doublings accumulate: beyond, the motion has 2^k times the period of an orbit that doubles"
+    FOLD = "fold", "a stable orbit ends in a fold: chaos begins with intermittency"
+    GRAZING = "grazing", "a stable orbit touches the contact"
+    CRISIS = "crisis", "the attractor touches an unstable orbit, and motions leave it"
+    UNDECIDED = "undecided", "it is not known whether the motions beyond are chaotic"
+    UNKNOWN = "unknown", "none of these is shown"
+
+    def __new__(cls, word: str, description: str) -> EdgeKind:
+        """A kind is its word."""
+        kind = str.__new__(cls, word)
+        kind._value_, kind.description = word, description
+        return kind
 
 
 @dataclass(frozen=True)
 class Tried:
-    """What became of motions at some values of the parameter: a row for each value, a column for each start."""
+    """What became of motions at all values that were tried, in rising order."""
 
     values: np.ndarray  # (n,)
-    chaotic: np.ndarray  # (n, starts)
-    exponent: np.ndarray  # (n, starts): the largest one of what has not settled, else nan
-    error: np.ndarray
-    undecided: np.ndarray  # (n, starts): neither settled nor proved chaotic
-    states: np.ndarray  # (n, starts, kept, 2): the last stroboscopic states, of a periodic motion those of one period
-    peaks: np.ndarray  # (n, starts, kept): max abs of the coordinate in each of the last periods
+    verdict: np.ndarray  # (n,): an `Unsettled`; PERIODIC also where all motions settle or rest
+    exponent: np.ndarray  # (n,): the largest one of what has not settled, else nan
+    error: np.ndarray  # (n,): half width of its 95 % interval
+    life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the one that is excluded with 95 %
+    period: np.ndarray  # (n,): the longest one of what settles, in forcing periods; 0 where nothing does
+    states: np.ndarray  # (n, k, 2): stroboscopic states of what has not settled, else nan
 
     @property
-    def has_chaos(self) -> np.ndarray:
+    def chaotic(self) -> np.ndarray:
         """At which values a motion is chaotic, (n,)."""
-        return np.asarray(self.chaotic.any(axis=1))
+        return np.asarray(self.verdict == Unsettled.CHAOTIC)
 
-    def chaotic_states(self, row: int, count: int) -> np.ndarray:
-        """States of the chaotic motions at a value, (count, 2)."""
-        return spread_over(self.states[row][self.chaotic[row]], count)
-
-    def adopt(self, row: int, other: Tried, other_row: int) -> None:
-        """Take a chaotic motion from elsewhere to a value that has none: the last of its starts gives way."""
-        start = int(np.flatnonzero(other.chaotic[other_row])[0])
-        for name in ("chaotic", "exponent", "error", "undecided", "states", "peaks"):
-            getattr(self, name)[row, -1] = getattr(other, name)[other_row, start]
+    @property
+    def undecided(self) -> np.ndarray:
+        """At which values a motion is neither regular, nor a transient, nor shown to be chaotic, (n,)."""
+        return np.asarray(self.verdict == Unsettled.UNDECIDED)
 
 
-def spread_over(states: np.ndarray, count: int) -> np.ndarray:
-    """So many of the states (..., 2), evenly spread over them, (count, 2)."""
-    states = states.reshape(-1, 2)
-    return np.asarray(states[np.linspace(0, len(states) - 1, count).astype(int)])
+@dataclass(frozen=True)
+class Edge:
+    """The end of a band: the last value with chaos, the first one without, and what happens between them."""
+
+    inner: float
+    outer: float
+    kind: EdgeKind = EdgeKind.UNKNOWN
+    special: float = np.nan  # the value of the special point that shows the kind
+    distance: float = np.nan  # of the attractor's states to the nearest unstable orbit, relative to the size of the attractor
 
 
 @dataclass(frozen=True)
 class Band:
     """An interval of the parameter in which a motion is chaotic at every value that was tried."""
 
-    low: float
-    high: float
-    before: float  # the largest value below that was tried, at which none is shown to be; `low` itself at the range's edge
-    after: float  # the least one above
+    lower: Edge
+    upper: Edge
     exponent: float  # the largest one found in it
-    error: float
-    low_mark: str = ""  # the kind of the special point at this edge
-    high_mark: str = ""
+    error: float  # half width of its 95 % interval
+
+    @property
+    def low(self) -> float:
+        """The least value with chaos."""
+        return self.lower.inner
+
+    @property
+    def high(self) -> float:
+        """The largest value with chaos."""
+        return self.upper.inner
+
+    def __contains__(self, value: float) -> bool:
+        return self.low <= value <= self.high
 
 
 @dataclass(frozen=True)
 class Bands:
-    """The bands of chaos of a range, what was tried on its grid, and the special points at their edges."""
+    """The bands of chaos of a range, and all that was simulated to find them."""
 
     path: str
     bands: tuple[Band, ...]
     tried: Tried
-
-    def marked(self, special: list[tuple[str, float]]) -> Bands:
-        """The bands with the kind of the special point at each edge, where there is one near it."""
-        reach = REACH * float(np.ptp(self.tried.values))
-        marked = [
-            replace(
-                band,
-                low_mark=_mark(band.before, band.low, special, reach),
-                high_mark=_mark(band.high, band.after, special, reach),
-            )
-            for band in self.bands
-        ]
-        return replace(self, bands=tuple(marked))
+    motions: SimulatedMotions
 
     def to_datasets(self) -> dict[str, xarray.Dataset]:
-        """`bands`, `exponents` (by value and start) and `stroboscopic` (states and peaks of what moves)."""
+        """`bands`, `exponents` (by value) and `stroboscopic` (states and peaks of what moves, a dot each)."""
         return {"bands": band_dataset(self.bands), "exponents": self._exponents(), "stroboscopic": self._stroboscopic()}
 
     def _exponents(self) -> xarray.Dataset:
-        tried, over = self.tried, ("value", "start")
-        columns = {
-            "exponent": (over, tried.exponent, {"long_name": "largest Lyapunov exponent of motions that have not settled"}),
-            "error": (over, tried.error, {"long_name": "half width of its 95 % interval"}),
-            "chaotic": (over, tried.chaotic.astype(np.int8)),
-            "undecided": (over, tried.undecided.astype(np.int8), {"long_name": "neither settled nor shown to be chaotic"}),
-        }
-        return self._along_values(columns)
-
-    def _stroboscopic(self) -> xarray.Dataset:
-        tried, over = self.tried, ("value", "start", "period")
-        columns = {
-            "position": (over, tried.states[..., 0], {"long_name": "first coordinate at phase 0, in the last forcing periods"}),
-            "velocity": (over, tried.states[..., 1], {"long_name": "its velocity there"}),
-            "peak": (over, tried.peaks, {"long_name": "its largest absolute value in each of these periods"}),
-        }
-        return self._along_values(columns)
-
-    def _along_values(self, columns: dict[str, Any]) -> xarray.Dataset:
         import xarray
 
-        return xarray.Dataset(columns, {"value": ("value", self.tried.values, {"long_name": self.path})})
+        tried, settled = self.tried, ["undecided", "chaotic", "transient", "regular"]
+        flags = {"flag_values": np.arange(len(settled), dtype=np.int8), "flag_meanings": " ".join(settled)}
+        columns = {
+            "exponent": ("value", tried.exponent, {"long_name": "largest Lyapunov exponent of motions that have not settled"}),
+            "error": ("value", tried.error, {"long_name": "half width of its 95 % interval"}),
+            "verdict": ("value", tried.verdict.astype(np.int8), flags),
+            "life": (
+                "value",
+                tried.life,
+                {"long_name": "mean life of transients; of chaos the life that is excluded", "units": "periods"},
+            ),
+            "period": ("value", tried.period, {"long_name": "longest period of what settles", "units": "forcing periods"}),
+        }
+        return xarray.Dataset(columns, {"value": ("value", tried.values, {"long_name": self.path})})
+
+    def _stroboscopic(self) -> xarray.Dataset:
+        import xarray
+
+        motions = self.motions
+        shown = np.isfinite(motions.peaks)
+        value = np.broadcast_to(motions.value[:, None], shown.shape)
+        columns = {
+            "position": (motions.states[..., 0], "first coordinate at phase 0, in the last forcing periods"),
+            "velocity": (motions.states[..., 1], "its velocity there"),
+            "peak": (motions.peaks, "its largest absolute value in each of these periods"),
+            "value": (value, self.path),
+        }
+        return xarray.Dataset({name: ("dot", array[shown], {"long_name": text}) for name, (array, text) in columns.items()})
 
 
-def _mark(a: float, b: float, special: list[tuple[str, float]], reach: float) -> str:
-    """The kind of the special point in the bracket of an edge, or else the nearest one within reach of it."""
-    low, high = min(a, b), max(a, b)
-    if low == high:
-        return AT_BOUND
-    away = [(max(low - value, value - high, 0.0), kind) for kind, value in special]
-    nearest = min(away, default=(np.inf, ""))
-    return nearest[1] if nearest[0] <= reach else ""
+def bands_of(tried: Tried) -> tuple[Band, ...]:
+    """The runs of successive values with chaos."""
+    chaos = np.concatenate([[False], tried.chaotic, [False]]).astype(int)
+    first, last = np.flatnonzero(np.diff(chaos) == 1), np.flatnonzero(np.diff(chaos) == -1) - 1
+    bands = []
+    for a, b in zip(first.tolist(), last.tolist(), strict=True):
+        low, high = _edge(tried, a, a - 1), _edge(tried, b, b + 1)
+        top = a + int(np.nanargmax(tried.exponent[a : b + 1]))
+        bands.append(Band(low, high, float(tried.exponent[top]), float(tried.error[top])))
+    return tuple(bands)
+
+
+def _edge(tried: Tried, inner: int, outer: int) -> Edge:
+    """The edge between two neighbouring values; the range may end at the inner one."""
+    value = float(tried.values[inner])
+    if not 0 <= outer < len(tried.values):
+        return Edge(value, value, EdgeKind.BOUND)
+    kind = EdgeKind.UNDECIDED if tried.undecided[outer] else EdgeKind.UNKNOWN
+    return Edge(value, float(tried.values[outer]), kind)
 
 
 def band_dataset(bands: tuple[Band, ...] = ()) -> xarray.Dataset:
-    """The bands, a row each; both ends of each edge's bracket."""
+    """The bands, a row each; both ends of each edge's bracket, and what happens there."""
     import xarray
 
-    columns: dict[str, Any] = {
-        name: ("band", np.array([getattr(band, name) for band in bands], dtype=float), {"long_name": text})
-        for name, text in BAND_COLUMNS.items()
+    columns: dict[str, Any] = {"kind": ("band", np.full(len(bands), "CH", dtype="U2"))}
+    numbers = {
+        "low": ([band.low for band in bands], "least value with chaos"),
+        "high": ([band.high for band in bands], "largest value with chaos"),
+        "before": ([band.lower.outer for band in bands], "next value below, at which no motion is shown to be chaotic"),
+        "after": ([band.upper.outer for band in bands], "next value above, at which no motion is shown to be chaotic"),
+        "exponent": ([band.exponent for band in bands], "largest Lyapunov exponent found in it, per unit of dimensionless time"),
+        "error": ([band.error for band in bands], "of that exponent, half width of its 95 % interval"),
     }
-    columns["kind"] = ("band", np.full(len(bands), "CH", dtype="U2"))
-    for name in ("low_mark", "high_mark"):
-        words = np.array([getattr(band, name) or "none" for band in bands], dtype="U16")
-        columns[name] = ("band", words, {"long_name": "kind of the special point at this edge"})
+    for name, (values, text) in numbers.items():
+        columns[name] = ("band", np.array(values, dtype=float), {"long_name": text})
+    for side, edges in (("low", [band.lower for band in bands]), ("high", [band.upper for band in bands])):
+        columns[f"{side}_edge"] = (
+            "band", np.array([str(edge.kind) for edge in edges], dtype="U16"), {"long_name": f"what happens at the {side} edge"},
+        )  # fmt: skip
+        special, distance = ([getattr(edge, name) for edge in edges] for name in ("special", "distance"))
+        columns[f"{side}_special"] = ("band", np.array(special, dtype=float), {"long_name": "value of the special point there"})
+        columns[f"{side}_distance"] = (
+            "band", np.array(distance, dtype=float), {"long_name": "of the attractor to the nearest unstable orbit, by its size"},
+        )  # fmt: skip
     return xarray.Dataset(columns)

@@ -1,51 +1,74 @@
-"""Looking for chaos along a parameter: motions that neither rest nor repeat themselves and whose neighbours part for good."""
+"""Looking for chaos along a parameter, in ever smaller steps where something changes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from bisect import bisect_left, insort
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from saltus.attractors import largest_exponents
+from saltus.attractors import JUDGEMENT, Judged, JudgementSettings, SettledLater, Unsettled, judge_unsettled
 from saltus.checks import Rectangle, check_count, check_window
-from saltus.flow import Outcome, find_recurrence
-from saltus.orbits import initial_states
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.checks import check_diagram
-from saltus.studies.diagram.bands import Band, Bands, Tried, spread_over
+from saltus.studies.diagram.bands import Bands, Tried, bands_of
+from saltus.studies.diagram.simulated import SimulatedMotions, simulate_from, starts_at
 from saltus.systems import System
 
 
 @dataclass(frozen=True)
 class ChaosSettings:
-    """How motions are judged to be chaotic, and how the edges of bands are located."""
+    """How chaos is looked for along a parameter."""
 
-    settling: int = 400  # Forcing periods that a motion is given to come to rest or to repeat itself.
-    # Periods of a stretch of the exponent, instead of 12, where that leaves open whether the exponent is positive.
-    longer_stretch: int = 60
-    # Forcing periods for which all companions of a motion must go on without settling: long transients of chaos are none.
-    confirming: int = 2000
-    # Companions of the motions at a value of the grid, all of which must be chaotic; at the halvings of an edge fewer do.
-    companions: int = 64
-    companions_at_edges: int = 12
-    apart: float = 1e-7  # Distance between the beginnings of companions, or those from one motion would all be that motion.
-    kept: int = 64  # Stroboscopic states that are kept of each motion.
-    seeds: int = 4  # States of a chaotic motion from which motions at the neighbouring values are begun.
-    halvings: int = 7  # Halvings of the bracket of an edge.
-    tol: float = 1e-10  # The error of a step.
+    settling: int = 300  # Forcing periods that a motion is given to come to rest or to repeat itself.
+    step: float = 1e-3  # Share of the range to which intervals are halved in which something changes, or with chaos at an end.
+    edge: float = 1e-4  # Share of the range to which the bracket of an edge is halved.
+    # States of the chaos at one end of an interval, and motions that have settled there, from which motions are begun within.
+    seeds: int = 2
+    neighbours: int = 4
+    states: int = 8  # Last states of each unsettled motion that are given to the judgement.
+    # Shares of the range beside a special point at which motions from its orbit are begun: narrow bands begin there.
+    beside: tuple[float, ...] = (-4e-4, -1.5e-4, 1.5e-4, 4e-4)
+    # Judgements of rising care. The first one is made at all values, and excludes lives below 660 forcing periods; the second one
+    # at edges and at some values between them (6600). The third one is made where companions settled at any of these (60 000).
+    judgements: tuple[JudgementSettings, ...] = (
+        replace(JUDGEMENT, companions=8, exposure=2000, round_periods=500, rounds=2),
+        replace(JUDGEMENT, companions=16, exposure=20_000),
+        replace(JUDGEMENT, exposure=180_000, rounds=9),
+    )
+    every: float = 0.02  # Share of the range in which each band has a value that is judged with care.
+    near: float = 0.003  # Share of the range about a value that fails the careful judgement in which all others are judged so.
+    confirmations: int = 20  # The largest number of rounds in which edges are located and confirmed.
 
 
 SETTINGS = ChaosSettings()
 
 
+class Seed(NamedTuple):
+    """A special point of a branch, at which bands of chaos may begin."""
+
+    kind: str
+    value: float  # of the parameter
+    state: tuple[float, float]  # of its orbit at phase 0
+
+
 def _check(
-    system: System, path: str, bounds: tuple[float, float], count: int, starts: int, window: object, seed: int, progress: object
+    system: System,
+    path: str,
+    bounds: tuple[float, float],
+    count: int,
+    starts: int,
+    window: object,
+    seed: int,
+    special: object,
+    progress: object,
 ) -> None:
     check_diagram(system, path, bounds, starts=starts, seed=seed)
-    check_count("count", count, 1)
+    check_count("count", count, 2)
     check_window(window, system)
 
 
@@ -59,157 +82,294 @@ def chaotic_bands(
     starts: int = 8,
     window: Rectangle | None = None,
     seed: int = 0,
+    special: Iterable[Seed] = (),
     progress: Progress = silent,
 ) -> Bands:
-    """Where motions are chaotic along a parameter, from `starts` states at each of `count` values.
+    """Where motions are chaotic along a parameter, first from `starts` states at each of `count` values.
 
-    A motion is called chaotic if it has not settled after 400 forcing periods, its largest Lyapunov exponent over the next 384
-    (or, where that leaves it open, 1920 more) exceeds its error bar in both halves of them, and none of 64 motions from beside
-    points of those that look so at this value (12 at the halvings of an edge) settles within 2000 periods: a motion on an
-    attractor never leaves it, and where one does chaos is transient. Transients that live for 100 000 periods on average pass
-    for chaos nevertheless. Every band is carried on to its neighbours by motions begun on it, and each edge is then halved
-    seven times between a value with chaos and one without. Windows of periodic motion between two values of the grid are not
-    seen; attractors whose basins hold no start are not either.
+    Intervals between values are halved to a thousandth of the range where the motions at their ends differ or one of them is
+    chaotic; motions within begin on those at both ends, so that an attractor is followed however little it attracts. What has
+    not settled after 300 forcing periods is judged by `judge_unsettled`. The edges of bands, and of windows of periodic motion
+    within them, are then halved to brackets of 1e-4 of the range, with motions begun on the chaos of the inner side. Windows
+    narrower than a thousandth of the range are seen by chance only; attractors whose basins hold no start, and that end before
+    the next value, are not.
 
     Args:
         system: what moves, with one coordinate, under a load with a frequency.
         path, bounds: dotted path of the parameter, and its range.
-        count: of values, evenly from the first bound to the last.
+        count: of values, evenly from the first bound to the last, at least 2.
         starts, window, seed: initial states, as `search_orbits` takes them.
+        special: special points of branches, beside which more is looked for.
         progress: called with the fraction done.
 
     Raises:
         ParameterError: an argument without meaning.
     """
-    search = _ChaosSearch(system, path)
-    values, states = np.linspace(*bounds, count), initial_states(system, starts, check_window(window, system), seed)
-    tried = search.at(values, states, SETTINGS.companions, part_of(progress, 0.0, 0.7, "looking for chaos"))
-    search.spread(tried)
-    progress(0.8, "looking for chaos")
-    bands = search.bands(tried)
+    values, area = np.linspace(*bounds, count), check_window(window, system)
+    states = starts_at(system, values, starts, area, seed).reshape(-1, 2)
+    begun = simulate_from(system, path, np.repeat(values, starts), states, SETTINGS.settling, part_of(progress, 0.0, 0.2))
+    return resolve_bands(system, path, bounds, begun, special, progress=part_of(progress, 0.2, 1.0))[0]
+
+
+def resolve_bands(
+    system: System,
+    path: str,
+    bounds: tuple[float, float],
+    begun: SimulatedMotions,
+    special: Iterable[Seed] = (),
+    settings: ChaosSettings = SETTINGS,
+    progress: Progress = silent,
+) -> tuple[Bands, SimulatedMotions]:
+    """The bands of chaos between two values, and all motions that were simulated to find them, those of `begun` left out.
+
+    `begun` is an ensemble over values between the bounds; `special` are special points, where more is looked for.
+    """
+    search = _BandSearch(system, path, float(bounds[1] - bounds[0]), sorted(special, key=lambda seed: seed.value), settings)
+    search.take(begun)
+    search.spread()
+    search.beside_special_points(bounds)
+    progress(0.2, "looking for chaos")
+    search.refine()
+    progress(0.6, "looking for chaos")
+    search.locate_edges()
     progress(1.0, "looking for chaos")
-    return Bands(path, bands, tried)
+    tried, further = search.tried(), search.further[1:]
+    motions = further[0].joined(*further[1:]) if further else begun.only(slice(0))
+    return Bands(path, bands_of(tried), tried, begun.joined(motions)), motions
 
 
-class _FollowedRows(NamedTuple):
-    """Motions after some forcing periods, (n, starts, ...)."""
+RANKS = (Unsettled.PERIODIC, Unsettled.TRANSIENT, Unsettled.UNDECIDED, Unsettled.CHAOTIC)  # of several, the last one counts
 
-    moving: np.ndarray  # neither at rest nor settled
-    states: np.ndarray
-    peaks: np.ndarray
+
+@dataclass(order=True)
+class _Place:
+    """What is known at one value of the parameter."""
+
+    value: float
+    verdict: Unsettled = field(default=Unsettled.PERIODIC, compare=False)  # all motions settle, where nothing else is known
+    exponent: float = field(default=np.nan, compare=False)
+    error: float = field(default=np.nan, compare=False)
+    life: float = field(default=np.nan, compare=False)
+    period: int = field(default=0, compare=False)  # of what settles slowly, or on a long period
+    care: int = field(default=0, compare=False)  # number of the judgement that the verdict is of
+    settled: int = field(default=0, compare=False)  # companions that settled in it
+    chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 2)), compare=False)  # (n, 2): states of what is unsettled
+    orbits: list[tuple[int, int, float, np.ndarray]] = field(default_factory=list, compare=False)
+
+    @property
+    def chaotic(self) -> bool:
+        """Whether there is chaos."""
+        return self.verdict is Unsettled.CHAOTIC
+
+    @property
+    def kinds(self) -> set[tuple[int, int]]:
+        """Period and impacts of the motions that have settled."""
+        return {orbit[:2] for orbit in self.orbits}
+
+    def judge(self, judged: Judged, row: int, care: int) -> None:
+        """Take an answer about what is unsettled here; a more careful one replaces what was thought before."""
+        verdict = Unsettled(judged.verdict[row])
+        if care < self.care or (care == self.care and RANKS.index(verdict) < RANKS.index(self.verdict)):
+            return
+        self.verdict, self.care, self.chaos = verdict, care, judged.states[row]
+        self.exponent, self.error = float(judged.exponent[row]), float(judged.error[row])
+        self.life, self.period = float(judged.life[row]), int(judged.period[row])
+        self.settled = int(judged.gone[row])
+
+    def settle(self, period: int, impacts: int, amplitude: float, state: np.ndarray) -> None:
+        """Add a motion that has settled here, unless it is known."""
+        for q, n, size, _ in self.orbits:
+            if (q, n) == (period, impacts) and abs(size - amplitude) <= 1e-4 * size:
+                return
+        self.orbits.append((period, impacts, amplitude, state))
+
+    def starts(self, seeds: int, orbits: int) -> np.ndarray:
+        """States from which motions at neighbouring values are begun, (n, 2)."""
+        chosen = self.chaos[np.linspace(0, len(self.chaos) - 1, seeds).astype(int)] if self.chaotic else self.chaos[:0]
+        return np.concatenate([chosen, *(orbit[3][None] for orbit in self.orbits[:orbits])])
 
 
 @dataclass
-class _ChaosSearch:
-    """Motions of one system at values of one of its parameters."""
+class _BandSearch:
+    """Motions of one system at ever more values of one of its parameters."""
 
     system: System
     path: str
-    # Pairs of neighbouring values of the grid: motions were started at the second one from chaotic states of the first one.
-    carried: set[tuple[int, int]] = field(default_factory=set)
+    span: float
+    special: Sequence[Seed]
+    settings: ChaosSettings
+    places: list[_Place] = field(default_factory=list)  # by value
+    further: list[SimulatedMotions] = field(default_factory=list)
+    # Pairs of neighbouring values: motions were begun at the second one on the chaos of the first one.
+    carried: set[tuple[float, float]] = field(default_factory=set)
 
-    def at(self, values: np.ndarray, states: np.ndarray, companions: int, progress: Progress = silent) -> Tried:
-        """Follow motions from states (starts, 2), or (n, starts, 2) of each value's own, and judge those that do not settle."""
-        begin = np.broadcast_to(states, (len(values), *states.shape[-2:]))
-        shape, ends = begin.shape[:2], self._follow(values, begin, SETTINGS.settling, progress)
-        chaotic, undecided = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
-        tried = Tried(values, chaotic, np.full(shape, np.nan), np.full(shape, np.nan), undecided, ends.states, ends.peaks)
-        rows = np.nonzero(ends.moving)
-        if rows[0].size:
-            self._judge(tried, rows, companions)
-        return tried
+    def place(self, value: float) -> _Place:
+        """What is known at a value; a new place where nothing is."""
+        at = bisect_left(self.places, _Place(value))
+        if at == len(self.places) or self.places[at].value != value:
+            insort(self.places, _Place(value))
+        return self.places[at]
 
-    def _judge(self, tried: Tried, rows: tuple[np.ndarray, ...], companions: int) -> None:
-        """Exponents of what has not settled, and whether it is chaotic."""
-        values = tried.values[rows[0]]
-        found = largest_exponents(self.system, tried.states[rows][:, -1], {self.path: values}, tol=SETTINGS.tol)
-        again = np.flatnonzero(~found.positive & (found.exponent > 0.0))  # weak chaos, or none: a longer run may decide
-        if again.size:
-            columns, stretch = {self.path: values[again]}, SETTINGS.longer_stretch
-            longer = largest_exponents(self.system, tried.states[rows][again, -1], columns, periods=stretch, tol=SETTINGS.tol)
-            for name in ("exponent", "error", "positive"):
-                getattr(found, name)[again] = getattr(longer, name)
-        tried.exponent[rows], tried.error[rows], positive = found.exponent, found.error, found.positive
-        tried.undecided[rows] = ~positive & ~(found.exponent + found.error < 0.0)
-        if positive.any():
-            self._confirm(tried, tuple(place[positive] for place in rows), companions)
+    def look(self, values: Sequence[float], starts: Sequence[np.ndarray], care: int = 0) -> None:
+        """Follow motions from states (n, 2) of each value's own, and judge those that do not settle."""
+        column = np.repeat(np.asarray(values, dtype=float), [len(states) for states in starts])
+        if len(column):
+            states = np.concatenate(starts)
+            self.take(simulate_from(self.system, self.path, column, states, self.settings.settling), care)
 
-    def _confirm(self, tried: Tried, kept: tuple[np.ndarray, ...], companions: int) -> None:
-        """Follow companions of motions that look chaotic: where one of them settles, chaos is a transient, however long."""
-        lines = np.unique(kept[0])
-        beside = SETTINGS.apart * np.arange(companions)[:, None]
-        states = [spread_over(tried.states[line, kept[1][kept[0] == line]], companions) + beside for line in lines]
-        later = self._follow(tried.values[lines], np.stack(states), SETTINGS.confirming)
-        stays = dict(zip(lines.tolist(), np.all(later.moving, axis=1).tolist(), strict=True))
-        for line, start in zip(*kept, strict=True):
-            tried.chaotic[line, start], tried.undecided[line, start] = stays[line], not stays[line]
+    def take(self, motions: SimulatedMotions, care: int = 0) -> None:
+        """Add motions to what is known, and judge those that have not settled."""
+        self._settle(motions)
+        for value in np.unique(motions.value):
+            self.place(float(value))
+        loose = motions.only(motions.unsettled)
+        values, row = np.unique(loose.value, return_inverse=True)
+        if not values.size:
+            return
+        most, last = int(np.bincount(row).max()), loose.states[:, -self.settings.states :]
+        states = np.full((len(values), most, *last.shape[1:]), np.nan)
+        for i in range(len(values)):
+            states[i, : np.count_nonzero(row == i)] = last[row == i]
+        self._judge(values, states.reshape(len(values), -1, 2), care)
 
-    def _follow(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent) -> _FollowedRows:
-        """Follow motions from states (n, starts, 2) at each of the values (n,)."""
-        shape, kept = states.shape[:2], SETTINGS.kept
-        ends = find_recurrence(
-            self.system,
-            states.reshape(-1, 2),
-            periods,
-            parameters={self.path: np.repeat(values, shape[1])},
-            kept=kept,
-            extrema=True,
-            tol=SETTINGS.tol,
-            progress=progress,
-        )
-        assert ends.extrema is not None
-        last, peaks = ends.states.copy(), np.abs(ends.extrema).max(axis=2)
-        moving = ends.outcome == Outcome.MOVING
-        shown = np.where(moving, kept, np.maximum(ends.period, 1))  # of what has settled one period alone
-        early = np.arange(last.shape[1]) < last.shape[1] - shown[:, None]
-        last[early], peaks[early] = np.nan, np.nan
-        return _FollowedRows(moving.reshape(shape), last.reshape(*shape, *last.shape[1:]), peaks.reshape(*shape, peaks.shape[1]))
+    def _judge(self, values: np.ndarray, states: np.ndarray, care: int) -> None:
+        """Judge what has not settled at these values, of which states (n, m, 2) are given, and follow what then settles."""
+        settings = self.settings.judgements[care]
+        judged = judge_unsettled(self.system, states, {self.path: values}, settings=settings)
+        for row, value in enumerate(values):
+            self.place(float(value)).judge(judged, row, care)
+        found = _some(judged.settled, self.settings.neighbours)
+        if len(found.question):
+            column = values[found.question]
+            self._settle(simulate_from(self.system, self.path, column, found.state, self.settings.settling))
 
-    def spread(self, tried: Tried) -> None:
-        """Carry chaos on to neighbouring values of the grid: motions begun on it, as long as they find more."""
-        neighbours = [pair for i, j in pairwise(range(len(tried.values))) for pair in ((i, j), (j, i))]
+    def _settle(self, motions: SimulatedMotions) -> None:
+        self.further.append(motions)
+        for i in np.flatnonzero(motions.periodic):
+            facts = int(motions.period[i]), int(motions.impact_count[i]), float(motions.amplitude[i])
+            self.place(float(motions.value[i])).settle(*facts, motions.last[i])
+
+    def spread(self) -> None:
+        """Carry chaos on to neighbouring values: motions begun on it, as long as they find more."""
         while True:
-            chaos, followed = tried.has_chaos, ~np.isnan(tried.states).all(axis=(1, 2, 3))
-            fresh = [(i, j) for i, j in neighbours if chaos[i] and not chaos[j] and followed[j] and (i, j) not in self.carried]
+            pairs = [pair for a, b in pairwise(self.places) for pair in ((a, b), (b, a))]
+            fresh = [(a, b) for a, b in pairs if a.chaotic and not b.chaotic and (a.value, b.value) not in self.carried]
             if not fresh:
                 return
-            self.carried.update(fresh)
-            states = np.stack([tried.chaotic_states(i, SETTINGS.seeds) for i, _ in fresh])
-            more = self.at(tried.values[[j for _, j in fresh]], states, SETTINGS.companions_at_edges)
-            for row, (_, j) in enumerate(fresh):
-                if more.has_chaos[row]:
-                    tried.adopt(j, more, row)
+            self.carried.update((a.value, b.value) for a, b in fresh)
+            self.look([b.value for _, b in fresh], [a.starts(self.settings.seeds, 0) for a, _ in fresh])
 
-    def bands(self, tried: Tried) -> tuple[Band, ...]:
-        """The bands between runs of values with chaos, their edges in brackets."""
-        chaos = np.concatenate([[False], tried.has_chaos, [False]]).astype(int)
-        first, last = np.flatnonzero(np.diff(chaos) == 1), np.flatnonzero(np.diff(chaos) == -1) - 1
-        values, n = tried.values, len(tried.values)
-        inner = np.concatenate([values[first], values[last]])
-        outer = np.concatenate([values[np.maximum(first - 1, 0)], values[np.minimum(last + 1, n - 1)]])
-        if len(first):
-            inner, outer = self._halve(tried, np.concatenate([first, last]), inner, outer)
-        (low, high), (before, after), bands = np.split(inner, 2), np.split(outer, 2), []
-        for k, (a, b) in enumerate(zip(first, last, strict=True)):
-            inside = np.where(tried.chaotic[a : b + 1], tried.exponent[a : b + 1], -np.inf)
-            top = np.unravel_index(int(inside.argmax()), inside.shape)
-            ends = (float(low[k]), float(high[k]), float(before[k]), float(after[k]))
-            bands.append(Band(*ends, float(inside[top]), float(tried.error[a : b + 1][top])))
-        return tuple(bands)
+    def beside_special_points(self, bounds: tuple[float, float]) -> None:
+        """Begin motions on the orbits of special points at values beside these."""
+        values = [(seed.value + share * self.span, seed.state) for seed in self.special for share in self.settings.beside]
+        inside = [(value, state) for value, state in values if bounds[0] <= value <= bounds[1]]
+        self.look([value for value, _ in inside], [np.array([state]) for _, state in inside])
 
-    def _halve(self, tried: Tried, rows: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Halve all brackets of edges at once; motions begin on the chaos of the inner side."""
-        inner, outer = inner.copy(), outer.copy()
-        states = np.stack([tried.chaotic_states(row, SETTINGS.seeds) for row in rows])
-        for _ in range(SETTINGS.halvings):
-            wide = np.flatnonzero(inner != outer)
-            if not wide.size:
-                break
-            middle = 0.5 * (inner[wide] + outer[wide])
-            more = self.at(middle, states[wide], SETTINGS.companions_at_edges)
-            for row, k in enumerate(wide):
-                if more.has_chaos[row]:
-                    inner[k], states[k] = middle[row], more.chaotic_states(row, SETTINGS.seeds)
-                else:
-                    outer[k] = middle[row]
-        return inner, outer
+    def refine(self) -> None:
+        """Halve intervals in which something changes, or in which there is chaos, as long as they are wide."""
+        widest = self.settings.step * self.span
+        while True:
+            pairs = [(a, b) for a, b in pairwise(self.places) if b.value - a.value > widest and self._is_of_interest(a, b)]
+            if not pairs:
+                return
+            self._begin_between(pairs)
+            self.spread()
+
+    def _is_of_interest(self, a: _Place, b: _Place) -> bool:
+        """Whether chaos may begin, end or pause between two neighbouring values."""
+        inside = bisect_left(self.special, a.value, key=lambda seed: seed.value)
+        special = inside < len(self.special) and self.special[inside].value <= b.value
+        return special or a.kinds != b.kinds or {a.verdict, b.verdict} != {Unsettled.PERIODIC}
+
+    def _begin_between(self, pairs: Sequence[tuple[_Place, _Place]], care: int = 0) -> None:
+        """Motions at the middles of intervals, begun on those at both ends."""
+        middles = [0.5 * (a.value + b.value) for a, b in pairs]
+        few = (self.settings.seeds, self.settings.neighbours)
+        self.look(middles, [np.concatenate([a.starts(*few), b.starts(*few)]) for a, b in pairs], care)
+        for (a, b), middle in zip(pairs, middles, strict=True):
+            self.carried.update(((a.value, middle), (b.value, middle)))
+
+    def locate_edges(self) -> None:
+        """Halve the brackets of all edges and judge their chaotic sides with care; where these are none, those near them, too."""
+        for _ in range(self.settings.confirmations):
+            self._halve()
+            runs = [(run, self._some_of(run)) for run in self._runs()]
+            failed = self._confirm((place for _, some in runs for place in some), 1)
+            leaving = [some for _, some in runs if any(place.settled for place in some if place.chaotic)]
+            failed += self._confirm((place for some in leaving for place in some), 2)
+            if not failed:
+                return
+            self._confirm_near(failed)
+
+    def _confirm_near(self, failed: list[_Place]) -> None:
+        """Judge all chaos near values that have turned out to have none as these were judged."""
+        reach = self.settings.near * self.span
+        for care in {place.care for place in failed}:
+            values = np.array([place.value for place in failed if place.care == care])
+            self._confirm((place for place in self.places if np.abs(values - place.value).min() <= reach), care)
+
+    def _edges(self) -> list[tuple[_Place, _Place]]:
+        """Neighbours of which the first is chaotic and the second is not."""
+        pairs = [pair for a, b in pairwise(self.places) for pair in ((a, b), (b, a))]
+        return [(a, b) for a, b in pairs if a.chaotic and not b.chaotic]
+
+    def _halve(self) -> None:
+        """Halve the brackets of all edges: with care where it took care to see that there is no chaos beyond."""
+        while True:
+            wide = [(a, b) for a, b in self._edges() if abs(b.value - a.value) > self.settings.edge * self.span]
+            if not wide:
+                return
+            for care in {b.care for _, b in wide}:
+                self._begin_between([pair for pair in wide if pair[1].care == care], care)
+
+    def _confirm(self, places: Iterable[_Place], care: int) -> list[_Place]:
+        """Judge chaos with more care where that has not been done; returns where there is none after all."""
+        doubtful = list({place.value: place for place in places if place.chaotic and place.care < care}.values())
+        for size in {len(place.chaos) for place in doubtful}:
+            alike = [place for place in doubtful if len(place.chaos) == size]
+            self._judge(np.array([place.value for place in alike]), np.stack([place.chaos for place in alike]), care)
+        return [place for place in doubtful if not place.chaotic]
+
+    def _runs(self) -> list[list[_Place]]:
+        """Successive places with chaos."""
+        runs: list[list[_Place]] = [[]]
+        for place in self.places:
+            if place.chaotic:
+                runs[-1].append(place)
+            elif runs[-1]:
+                runs.append([])
+        return [run for run in runs if run]
+
+    def _some_of(self, run: list[_Place]) -> list[_Place]:
+        """The ends of a band, and values evenly between them."""
+        count = 2 + int((run[-1].value - run[0].value) / (self.settings.every * self.span))
+        return [run[i] for i in np.unique(np.linspace(0, len(run) - 1, count).astype(int))]
+
+    def tried(self) -> Tried:
+        """What became of motions at all values."""
+        most = max(judgement.companions for judgement in self.settings.judgements)
+        states = np.full((len(self.places), most, 2), np.nan)
+        for row, place in enumerate(self.places):
+            states[row, : len(place.chaos)] = place.chaos
+        return Tried(
+            values=np.array([place.value for place in self.places]),
+            verdict=np.array([place.verdict for place in self.places]),
+            exponent=np.array([place.exponent for place in self.places]),
+            error=np.array([place.error for place in self.places]),
+            life=np.array([place.life for place in self.places]),
+            period=np.array([max((orbit[0] for orbit in place.orbits), default=place.period) for place in self.places]),
+            states=states,
+        )
+
+
+def _some(settled: SettledLater, most: int) -> SettledLater:
+    """A few of the motions of each question, those of different periods first."""
+    order = np.lexsort((settled.state[:, 0], settled.period, settled.question))
+    kept: list[int] = []
+    counts: dict[tuple[int, int], int] = {}
+    for i in order:
+        key = int(settled.question[i]), int(settled.period[i])
+        counts[key] = counts.get(key, 0) + 1
+        if counts[key] <= most // 2:
+            kept.append(int(i))
+    return SettledLater(settled.question[kept], settled.state[kept], settled.period[kept])

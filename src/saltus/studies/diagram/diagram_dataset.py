@@ -10,6 +10,7 @@ import numpy as np
 from saltus.orbits import Branch, PeriodicOrbit, RestingOrbit, defects
 from saltus.provenance import provenance
 from saltus.studies.diagram.attractors_found import Place
+from saltus.studies.diagram.band_edges import explained
 from saltus.studies.diagram.bands import band_dataset
 from saltus.studies.diagram.diagram_search import DiagramSearch
 from saltus.systems import System
@@ -59,7 +60,7 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
     datasets = confirmed([branches[i] for i in order])
     nodes |= {f"branch_{i:03d}": data for i, data in enumerate(datasets)}
     chaos = search.chaos
-    bands = {"bands": band_dataset()} if chaos is None else chaos.marked(turning_points(branches)).to_datasets()
+    bands = {"bands": band_dataset()} if chaos is None else explained(system, chaos, branches).to_datasets()
     found = {"attractors": _attractors(search), "unplaced": _unplaced(search)}
     return xarray.DataTree.from_dict({**nodes, **found, **bands, "search": _searched(search)})
 
@@ -68,19 +69,6 @@ def _limits(system: System, path: str, bounds: tuple[float, float]) -> list[floa
     """The amplitudes that motions of the mechanism do not pass, rad; none where they vary with the parameter of the diagram."""
     low, high = ([float(limit.value) for limit in amplitude_limits(system, {path: value})] for value in bounds)
     return low if low == high else []
-
-
-def turning_points(branches: list[Branch]) -> list[tuple[str, float]]:
-    """The special points at which motions lose their stability or end: kind and parameter."""
-    found = []
-    for branch in branches:
-        places = {id(point): i for i, point in enumerate(branch.points)}
-        for special in branch.special:
-            i = places.get(id(special.point))
-            beside = [] if i is None else [branch.points[j].orbit.stable for j in (i - 1, i + 1) if 0 <= j < len(branch.points)]
-            if any(beside) and not (len(beside) == 2 and all(beside)):
-                found.append((special.kind, special.parameter))
-    return found
 
 
 def confirmed(branches: list[Branch]) -> list[xarray.Dataset]:

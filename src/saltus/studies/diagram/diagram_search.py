@@ -13,9 +13,10 @@ from saltus.flow import motions_from, stroboscopic
 from saltus.orbits import keeps_symmetry, orbits_near_returns, solved_near, within_window
 from saltus.progress import Progress, silent
 from saltus.studies.diagram.attractors_found import AttractorsFound, Place
+from saltus.studies.diagram.band_edges import seeds_of
 from saltus.studies.diagram.bands import Bands
 from saltus.studies.diagram.branch_set import BranchSet
-from saltus.studies.diagram.chaos_search import chaotic_bands
+from saltus.studies.diagram.chaos_search import resolve_bands
 from saltus.studies.diagram.effort import EffortSettings
 from saltus.studies.diagram.placement import PlacedBranch, placed, stable_motions
 from saltus.studies.diagram.simulated import SimulatedMotions, simulate_from, starts_at
@@ -176,7 +177,11 @@ class DiagramSearch:
 
     def look_for_chaos(self, progress: Progress) -> None:
         """Find the bands of chaos, and follow what settles in windows within them."""
-        self.chaos = chaotic_bands(self.system, self.path, self.bounds, window=self.window, seed=self.seed, progress=progress)
+        special, motions = seeds_of(self.branches.branches), self.found.motions
+        kept = np.unique(motions.value, return_index=True)[1], self.found.rows, np.flatnonzero(motions.unsettled)
+        begun = motions.only(np.unique(np.concatenate(kept)))  # each attractor once, and every value
+        self.chaos, further = resolve_bands(self.system, self.path, self.bounds, begun, special, progress=progress)
+        self.found.add(further)
         self.follow(silent)
 
     def estimate(self, follow: bool) -> None:
