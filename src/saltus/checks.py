@@ -200,6 +200,15 @@ def check_bounds(bounds: Any) -> tuple[float, float]:
     return low, high
 
 
+def check_step(step: Any) -> None:
+    """Refuse what is no first step along a branch, in scaled unknowns.
+
+    Raises:
+        ParameterError: no number in (0, 1000].
+    """
+    check_number("step", step, above=0.0, at_most=1000.0)
+
+
 def check_axis(name: str, values: Any) -> np.ndarray:
     """The numbers along an axis of a grid.
 

@@ -49,6 +49,18 @@ def test_a_changed_constant_of_the_module_is_seen(branch, monkeypatch):
         orbits_of(branch)
 
 
+def test_a_constant_that_changes_in_a_session_is_seen_by_the_next_motion(monkeypatch):
+    def end():
+        return saltus.simulate(system(), x=0.5, periods=3).x
+
+    before = end()
+    monkeypatch.setitem(globals(), "STIFFNESS", 1.5)
+    changed = end()
+    assert abs(changed - before) > 1e-3
+    monkeypatch.undo()
+    assert end() == before
+
+
 def test_another_class_of_the_same_name_is_seen(branch, monkeypatch):
     @dataclass(frozen=True, kw_only=True)
     class Other(Hinged):

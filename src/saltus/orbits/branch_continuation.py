@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from saltus.checks import check_along, check_bounds, check_kind, check_path
+from saltus.checks import check_along, check_bounds, check_kind, check_path, check_step
 from saltus.continuation import STEPS, Continuation, End, both_ways
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.orbits.branch import START, Branch
 from saltus.orbits.branch_events import BranchEvents
 from saltus.orbits.find import orbit_near
@@ -47,8 +47,12 @@ def continue_orbit(
         progress: called with the share of the range that has been seen and the value of the parameter.
 
     Raises:
-        ParameterError: what is no orbit, an unknown parameter, bounds that exclude the orbit.
+        ParameterError: what is no orbit, an unknown parameter, bounds that exclude the orbit, a step that leads nowhere.
     """
+    check_step(step)
+    for name, function in (functions or {}).items():
+        if not callable(function):
+            raise ParameterError(f"functions must be functions of an orbit, and {name!r} is {shown(function)}", "functions")
     low, high = _checked(orbit, path, bounds)
     first: Any
     events: Any

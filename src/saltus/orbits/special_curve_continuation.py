@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_bounds, check_kind, check_path
+from saltus.checks import check_bounds, check_kind, check_path, check_step
 from saltus.continuation import STEPS, Continuation, Cut, End, TestFunction, both_ways
 from saltus.errors import ParameterError
 from saltus.orbits.branch_continuation import STEP
@@ -89,6 +89,7 @@ def continue_special(
             parameter that takes away the symmetry which a BPC or a grazing on both sides rests on.
     """
     check_kind("special", special, SpecialPoint, source="branch.special")
+    check_step(step)
     if special.kind not in FOLLOWED:
         raise ParameterError(f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}")
     if isinstance(special.orbit, RestingOrbit):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from saltus.checks import check_bounds, check_kind
+from saltus.checks import check_bounds, check_kind, check_step
 from saltus.continuation import End
 from saltus.errors import ParameterError
 from saltus.orbits.branch import Branch
@@ -42,6 +42,7 @@ def switch_branch(
         ParameterError: a special point where no branch begins.
     """
     check_kind("special", special, SpecialPoint, source="branch.special")
+    check_step(step)
     bounds = check_bounds(bounds)
     if special.kind not in (SpecialKind.PD, SpecialKind.BPC):
         raise ParameterError(f"no branch begins at a {special.kind}; switch at a PD or a BPC (grazings are gone through anyway)")
@@ -135,6 +136,7 @@ def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_pe
         ParameterError: a special point that is no PD.
     """
     check_kind("first", first, SpecialPoint, source="branch.special")
+    check_step(step)
     if first.kind != SpecialKind.PD:
         raise ParameterError(f"a cascade begins at a PD, not at a {first.kind}")
     bounds, points = check_bounds(bounds), [first]

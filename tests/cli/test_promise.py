@@ -1,0 +1,105 @@
+"""The promise: whatever kills a run, and whenever, the same command again ends with the same bytes in every file."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+SYSTEM = """
+[model]
+type = "Metainterface"
+beta0 = "80 deg"
+damping = 0.1
+[load]
+frequency = 1.0
+horizontal = { amplitude = 0.5 }
+vertical = -0.5
+"""
+STUDIES = {
+    "motion": "[simulate]\ntheta = 0.3\nperiods = 200\n",
+    "portrait": "[phase_portrait]\nduration = 20\n",
+    "spectrum": "[response_spectrum]\nbounds = [0.95, 1.05]\nmax_period = 1\nstarts = 4\neffort = 'quick'\n",
+    "attractors": "[attractors]\nstarts = 8\nmax_period = 2\n",
+    "basins": "[basins]\ntheta = { from = -1, to = 1, count = 20 }\nvelocity = { from = -1, to = 1, count = 20 }\nrows = 2\n",
+    "chart": "[stability_chart]\nhorizontal = { from = 0.1, to = 0.5, count = 8 }\n"
+    "vertical = { from = -0.9, to = -0.3, count = 8 }\nstarts = 2\nperiods = 60\n",
+    "borders": "[stability_chart]\nhorizontal = { from = 0.1, to = 0.5, count = 4 }\n"
+    "vertical = { from = -0.9, to = -0.3, count = 3 }\nstarts = 2\nperiods = 60\ncurves = 1\n",
+}
+NO_LOAD = SYSTEM.replace("frequency = 1.0\nhorizontal = { amplitude = 0.5 }\n", "")  # a phase portrait is of a constant load
+
+
+def command(folder, kind):
+    study = folder / "study.toml"
+    study.write_text((NO_LOAD if kind == "portrait" else SYSTEM) + STUDIES[kind])
+    return [sys.executable, "-m", "saltus", "run", str(study), "-o", str(folder / "out")]
+
+
+def files(folder):
+    """The bytes of every file below a folder, those of pictures too."""
+    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
+def finished(folder, kind):
+    """The seconds that a run takes which nothing disturbs, and what it leaves."""
+    begun = time.monotonic()
+    done = subprocess.run(command(folder, kind), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return time.monotonic() - begun, files(folder / "out")
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("kind", STUDIES)
+def test_killed_at_random_moments_a_study_ends_with_the_same_bytes(kind, tmp_path):
+    """15 kills of each of seven kinds of study; of some of them several hit one after the other, before it may end."""
+    rng, kills = random.Random(kind), int(os.environ.get("SALTUS_KILLS", "15"))
+    (tmp_path / "first").mkdir()
+    finished(tmp_path / "first", kind)  # compiles what is not there yet
+    (tmp_path / "whole").mkdir()
+    seconds, whole = finished(tmp_path / "whole", kind)
+    assert whole
+    assert files(tmp_path / "first" / "out") == whole
+    struck = 0
+    while struck < kills:
+        folder = tmp_path / f"{struck}"
+        folder.mkdir()
+        for _ in range(rng.choice((1, 1, 2, 3))):
+            process = subprocess.Popen(command(folder, kind), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            time.sleep(rng.uniform(0.2, 1.0) * seconds)
+            process.send_signal(signal.SIGKILL)
+            struck += process.wait() == -signal.SIGKILL
+        assert finished(folder, kind)[1] == whole
+
+
+@pytest.mark.thorough
+def test_two_runs_at_once_leave_the_same_bytes(tmp_path):
+    (tmp_path / "whole").mkdir()
+    _, whole = finished(tmp_path / "whole", "chart")
+    (tmp_path / "both").mkdir()
+    both = [subprocess.Popen(command(tmp_path / "both", "chart"), stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [process.communicate()[1] for process in both]
+    codes = sorted(process.returncode for process in both)
+    assert codes in ([0, 0], [0, 2])
+    assert codes == [0, 0] or any("another run is writing to" in text for text in said)
+    assert files(tmp_path / "both" / "out") == whole
+
+
+@pytest.mark.thorough
+def test_a_process_that_compiles_computes_the_same_bytes_as_one_that_loads(tmp_path, monkeypatch):
+    """Chaotic motions show the last digit of everything; the lanes are compiled in a cache of their own, then loaded from it."""
+    script = (
+        "import hashlib, numpy as np, saltus\n"
+        "model = saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1)\n"
+        "load = saltus.Load(frequency=0.5, horizontal=saltus.Harmonic(amplitude=2.0), vertical=-0.5)\n"
+        "system = saltus.System(model=model, load=load)\n"
+        "many = saltus.simulate_many(system, theta=np.linspace(-1, 1, 200), velocity=0.1, periods=200, tol=1e-11)\n"
+        "one = saltus.simulate(system, theta=0.3, periods=100)\n"
+        "print(hashlib.sha256(many['theta'].values.tobytes() + np.float64(one.theta).tobytes()).hexdigest())\n"
+    )
+    monkeypatch.setenv("SALTUS_CACHE_DIR", str(tmp_path))
+    runs = [subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout for _ in range(3)]
+    assert len(set(runs)) == 1
