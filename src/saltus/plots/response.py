@@ -232,7 +232,18 @@ def response_legend(figure: Any, spectra: list[Any], *, limits: bool = True, cri
         columnspacing=1.2,
         handletextpad=0.5,
         handlelength=3.6,
+        title=missed_states(spectra),
+        title_fontsize="medium",
     )
+
+
+def missed_states(spectra: list[Any]) -> str | None:
+    """In words, the share of random states that end on a motion which is not drawn: the 95 % interval for each panel."""
+    known = [spectrum.attrs for spectrum in spectra if "missed_low" in spectrum.attrs]
+    if not known:
+        return None
+    shares = ", ".join(f"{100 * attrs['missed_low']:.1f} to {100 * attrs['missed_high']:.1f} %" for attrs in known)
+    return f"random states that end on a motion that is not drawn: {shares} (95 % interval)"
 
 
 def line_labels(spectra: list[Any]) -> list[tuple[str, list[dict[str, Any]]]]:
