@@ -11,6 +11,7 @@ from saltus.paper import FIGURES, ClaimVerdict
 from saltus.paper.claims.claim import judge, judge_claim, measured, printed_unit, with_summaries
 from saltus.paper.claims.claim_tables import ClaimEntry, ListForm, Listing, Origin, claim_tables, section_titles
 from saltus.paper.claims.ledger import ledger, listed, tally, to_markdown
+from saltus.paper.errata import errata
 from saltus.paper.release_check import failures
 
 ROOT = Path(__file__).parents[2]
@@ -150,6 +151,12 @@ def test_every_erratum_has_a_second_kind_of_evidence_and_every_proof_is_a_test()
             if entry.proof:
                 file, name = entry.proof.split("::")
                 assert f"def {name}(" in known[ROOT / file], id
+
+
+def test_errata_and_claims_name_each_other():
+    named = {entry.erratum for claims in claim_tables().values() for entry in claims.values() if entry.erratum}
+    assert named <= errata().keys()
+    assert {*range(1, 30)} <= errata().keys()
 
 
 def test_the_ledger_counts_section_by_section_in_the_papers_order():

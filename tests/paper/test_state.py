@@ -116,7 +116,7 @@ def test_a_figure_is_out_of_date_by_a_change_in_what_it_uses_and_by_no_other(mod
 
     figure = replace(fig08.FIGURE, compute=fig08.compute, draw=None)
     (tmp_path / "fig08.nc").write_bytes(b"data")
-    state.write(figure, tmp_path, [])
+    state.write(figure, tmp_path, [], 1.0)
     assert state.up_to_date(figure, tmp_path)
     original = state._source
     assert original(module)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import html
 import json
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.resources import files
@@ -18,6 +19,7 @@ from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import Claim, ClaimVerdict, with_summaries
 from saltus.paper.claims.claim_tables import Origin, section_titles
 from saltus.paper.claims.ledger import LISTING_TITLES, ledger_table, listed, tally, to_markdown
+from saltus.paper.errata import errata
 from saltus.paper.figures.figure import PaperFigure
 
 
@@ -76,7 +78,18 @@ def _page(present: dict[PaperFigure, list[Claim]], everything: list[Claim], fold
             if figure.section == number:
                 yield from _figure(figure, claims, folder)
         yield from _claims_table([claim for claim in everything if claim.section == number and claim.id not in shown])
+    yield from _errata(everything)
     yield "</body></html>"
+
+
+def _errata(everything: list[Claim]) -> Iterator[str]:
+    """Each erratum with what is right, and the claims that it corrects."""
+    yield '<h2 id="errata">Errata</h2><table><tr><th>erratum</th><th>where</th><th>what is right</th><th>claims</th></tr>'
+    for number, erratum in errata().items():
+        links = ", ".join(f'<a href="#{claim.id}">{claim.id}</a>' for claim in everything if claim.erratum == number)
+        cells = f"<td>{html.escape(erratum.place)}</td><td>{html.escape(erratum.correct)}</td><td>{links}</td>"
+        yield f'<tr id="erratum-{number}"><td>{number}</td>{cells}</tr>'
+    yield "</table>"
 
 
 def _filter() -> Iterator[str]:
@@ -103,8 +116,17 @@ def _figure(figure: PaperFigure, claims: list[Claim], folder: Path) -> Iterator[
     if figure.table is not None:
         yield _html_table((folder / f"{figure.name}.md").read_text(encoding="utf-8"))
     links = (f'<a href="{name}">{name}</a>' for name in figure.files())
-    yield f'<p class="files">{" · ".join(links)}</p>'
+    yield f'<p class="files">{" · ".join(links)}<br>{html.escape(_making(figure, folder))}</p>'
     yield from _claims_table(claims)
+
+
+def _making(figure: PaperFigure, folder: Path) -> str:
+    """How the figure was made: command, time, parameters, versions and the checksum of its data."""
+    record = state.read(figure, folder) or {}
+    versions = ", ".join(f"{name} {number}" for name, number in record.get("versions", {}).items())
+    parameters = "; ".join(f"{name} = {value}" for name, value in figure.parameters.items())
+    parts = [f"saltus reproduce {figure.name}", f"{record.get('seconds', math.nan):g} s", parameters or "default parameters", versions]
+    return " · ".join([*parts, f"SHA-256 of {figure.name}.nc {record.get('files', {}).get(f'{figure.name}.nc', '')}"])
 
 
 def _claims_table(claims: list[Claim]) -> Iterator[str]:
@@ -119,7 +141,10 @@ def _row(claim: Claim) -> str:
     own = ' <em class="own">own check</em>' if claim.origin is Origin.OURS else ""
     row = f"<td>{html.escape(claim.statement)}{own}</td>"
     row += "".join(f"<td>{html.escape(cell)}</td>" for cell in (claim.where, claim.paper, claim.value))
-    row += f'<td class="verdict">{claim.verdict_text}</td><td>{html.escape(claim.evidence)}</td>'
+    verdict = claim.verdict_text
+    if claim.erratum in errata():
+        verdict = verdict.replace(f"erratum {claim.erratum}", f'<a href="#erratum-{claim.erratum}">erratum {claim.erratum}</a>')
+    row += f'<td class="verdict">{verdict}</td><td>{html.escape(claim.evidence)}</td>'
     return f'<tr id="{claim.id}" class="{_style_class(claim.verdict)}">{row}</tr>'
 
 

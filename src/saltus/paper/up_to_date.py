@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import asdict
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from saltus.paper.claims.claim import Claim
 from saltus.paper.claims.claim_tables import claim_tables
 from saltus.paper.figures.figure import PaperFigure
 
+PACKAGES = ("numpy", "numba", "scipy", "xarray", "matplotlib")  # on whose versions the digits may depend
 FOLDER = ".saltus"  # inside the output folder
 
 
@@ -107,10 +109,15 @@ def claims(figure: PaperFigure, folder: Path) -> list[Claim]:
     return [Claim.from_dict(row) for row in rows]
 
 
-def write(figure: PaperFigure, folder: Path, made: Iterable[Claim]) -> None:
-    """Record what made the figure's outputs, their fingerprints and claims; last, so that an interrupted run leaves none."""
+def write(figure: PaperFigure, folder: Path, made: Iterable[Claim], seconds: float) -> None:
+    """Record what made the figure's outputs, with which versions and in which time, their fingerprints and claims.
+
+    It is written last, so that an interrupted run leaves none.
+    """
     files = {name: fingerprint(folder / name) for name in figure.files()}
-    record = {"key": key(figure), "files": files, "claims": [claim.to_dict() for claim in made]}
+    versions = {name: version(name) for name in ("saltus", *PACKAGES)}
+    record = {"key": key(figure), "files": files, "seconds": round(seconds, 1), "versions": versions}
+    record["claims"] = [claim.to_dict() for claim in made]
     write_text(folder / FOLDER / f"{figure.name}.json", json.dumps(record, indent=1))
 
 

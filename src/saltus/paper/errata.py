@@ -1,0 +1,23 @@
+"""The paper's errata as data: where each is, and what is right."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Erratum:
+    """One erratum of `errata.toml`."""
+
+    place: str  # equation label, section or figure
+    correct: str  # with the reason, where a line says it
+
+
+@cache
+def errata() -> dict[int, Erratum]:
+    """All errata by number."""
+    tables = tomllib.loads((files("saltus.paper") / "errata.toml").read_text(encoding="utf-8"))
+    return {int(number): Erratum(**keys) for number, keys in tables.items()}
