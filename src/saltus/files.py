@@ -129,7 +129,9 @@ def read_dataset(path: Path | str) -> Any:
     content = checked_content(path)
     try:
         with xarray.open_datatree(io.BytesIO(content), engine="h5netcdf") as tree:
-            tree.load()
+            for node in tree.subtree:  # not `tree.load()`, which leaves a variable lazy that has the name of a child of the root
+                for variable in node.variables.values():
+                    variable.load()
     except Exception as error:  # h5netcdf, HDF5 and xarray have many ways to say so
         with _without_unraisable():
             traceback.clear_frames(error.__traceback__)

@@ -21,6 +21,15 @@ def small():
     return xarray.Dataset(variables, {"x": np.arange(5.0)}, {"kind": "waves", "tol": 1e-12, "window": [0.0, 1.0]})
 
 
+def test_every_variable_is_in_memory_also_one_with_the_name_of_a_group(tmp_path):
+    groups = {"wave": small(), "other": small()}  # small() has a variable of the name of the first group
+    path = write_dataset(tmp_path / "tree.nc", xarray.DataTree.from_dict(groups))
+    tree = read_dataset(path)
+    path.unlink()
+    for name in groups:
+        np.testing.assert_array_equal(tree[name]["wave"].values, small()["wave"].values)
+
+
 def test_the_file_and_its_folders_are_made(tmp_path):
     path = write_text(tmp_path / "a" / "b.txt", "thêta")
     assert path.read_text(encoding="utf-8") == "thêta"

@@ -184,7 +184,7 @@ def test_the_ledger_counts_section_by_section_in_the_papers_order():
 def test_the_table_escapes_bars_and_has_each_claim_once_under_its_section():
     text = to_markdown([judged(True, section="2"), judged(False, section="5.1", statement="|θ| > 0")])
     assert "\\|θ\\| > 0" in text
-    assert text.index("## 2 Mech") < text.index("## 5.1 Small")
+    assert text.index("## 2 Mechanical model") < text.index("## 5.1 Small vibrations")
     assert text.count("| x |") == 2
 
 

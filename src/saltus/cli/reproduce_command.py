@@ -21,7 +21,9 @@ def reproduce_paper(names: Sequence[str], output: Path, force: bool) -> None:
         table.add_row(result.name, f"made in {result.seconds:.1f} s" if result.made else "up to date", FIGURES[result.name].title)
     console.print(table)
     claims = with_summaries(claim for result in results for claim in result.claims)
-    verdicts = Table(*HEADINGS, box=None)
+    verdicts = Table(HEADINGS[0], box=None, padding=(0, 1, 0, 0))
+    for heading in HEADINGS[1:]:
+        verdicts.add_column(heading, width=max(map(len, heading.split())))
     for row in ledger(claims):
         verdicts.add_row(*row.cells())
     console.print(verdicts)

@@ -37,7 +37,7 @@ class SectionCount:
         return self.name, *map(str, counts), f"{self.ours[ClaimVerdict.HOLDS]} of {own}" if own else "–"
 
 
-HEADINGS = ("section", "statements", *map(str, PAPER_VERDICTS), "own checks that hold")
+HEADINGS = ("section", "total", *map(str, PAPER_VERDICTS), "own checks")
 
 
 def ledger(claims: Iterable[Claim]) -> list[SectionCount]:

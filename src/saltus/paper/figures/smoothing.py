@@ -160,7 +160,7 @@ def _confirmed(branches: dict[float | None, Any], count: int) -> Any:
     return dataset(
         {
             "amplitude": ("motion", amplitude, "rad", "max abs(theta) of the smoothed orbit"),
-            "exact": ("motion", exact, "rad", "max abs(theta) of the exact motion from its state, after 388 periods"),
+            "settled": ("motion", exact, "rad", "max abs(theta) of the exact motion from its state, after 388 periods"),
             "sharpness": ("motion", sharpness, "1", "B"),
             "frequency": ("motion", frequency, "1", "Omega"),
         },
@@ -261,7 +261,7 @@ def _draw_settled(ax: Any, confirmed: Any) -> None:
     """On what exact motions from the states of smoothed orbits settle, as dots."""
     here = confirmed["sharpness"].values == SHOWN[0]
     ax.plot(
-        confirmed["frequency"].values[here], confirmed["exact"].values[here],
+        confirmed["frequency"].values[here], confirmed["settled"].values[here],
         linestyle="none", marker="o", markersize=2.6, color=STABLE, zorder=4, label=r"exact motion from there",
     )  # fmt: skip
     ax.legend(loc="upper left", ncols=2, columnspacing=1.0)
@@ -317,7 +317,7 @@ def measure(data: Any) -> dict[str, Measured]:
 def _accuracy(features: Any, confirmed: Any) -> dict[str, Measured]:
     """Whether a B that is large enough gives the limit cycles, and stable motions that the exact equation confirms."""
     sharpness = features["sharpness"].values
-    away = abs(confirmed["amplitude"].values - confirmed["exact"].values)
+    away = abs(confirmed["amplitude"].values - confirmed["settled"].values)
     rows: list[dict[str, Any]] = []
     for b in sharpness[1:]:
         here = confirmed["sharpness"].values == b
