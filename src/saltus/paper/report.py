@@ -125,7 +125,12 @@ def _making(figure: PaperFigure, folder: Path) -> str:
     record = state.read(figure, folder) or {}
     versions = ", ".join(f"{name} {number}" for name, number in record.get("versions", {}).items())
     parameters = "; ".join(f"{name} = {value}" for name, value in figure.parameters.items())
-    parts = [f"saltus reproduce {figure.name}", f"{record.get('seconds', math.nan):g} s", parameters or "default parameters", versions]
+    parts = [
+        f"saltus reproduce {figure.name}",
+        f"{record.get('seconds', math.nan):g} s",
+        parameters or "default parameters",
+        versions,
+    ]
     return " · ".join([*parts, f"SHA-256 of {figure.name}.nc {record.get('files', {}).get(f'{figure.name}.nc', '')}"])
 
 
