@@ -201,12 +201,12 @@ def check_bounds(bounds: Any) -> tuple[float, float]:
 
 
 def check_step(step: Any) -> None:
-    """Refuse what is no first step along a branch, in scaled unknowns.
+    """Refuse what is no longest step along a curve: shorter ones come nowhere, longer ones are longer than any curve's features.
 
     Raises:
-        ParameterError: no number in (0, 1000].
+        ParameterError: no number in [1e-6, 1].
     """
-    check_number("step", step, above=0.0, at_most=1000.0)
+    check_number("step", step, at_least=1e-6, at_most=1.0)
 
 
 def check_axis(name: str, values: Any) -> np.ndarray:

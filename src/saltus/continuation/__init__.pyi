@@ -4,6 +4,7 @@ from .course import Course
 from .curve import Curve, Point
 from .end import CurveEnd, End, EndReason
 from .events import Cut, Events
+from .missed import CurveMissed, Missed, MissedReason
 from .natural_parameter import NaturalCurve, bisected
 from .pseudo_arclength import EquationCurve
 from .step_length import STEPS, StepSettings
@@ -18,6 +19,7 @@ __all__ = [
     "Course",
     "Curve",
     "CurveEnd",
+    "CurveMissed",
     "Cut",
     "End",
     "EndReason",
@@ -25,6 +27,8 @@ __all__ = [
     "Evaluation",
     "Events",
     "Evidence",
+    "Missed",
+    "MissedReason",
     "NaturalCurve",
     "Point",
     "StepSettings",

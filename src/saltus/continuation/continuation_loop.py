@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,11 @@ import numpy as np
 from saltus.continuation.course import Course
 from saltus.continuation.end import CurveEnd, End
 from saltus.continuation.events import Cut, Events
+from saltus.continuation.missed import CurveMissed, Missed
+from saltus.continuation.solved_between import solved_between, turning_point
 from saltus.continuation.step_length import STEPS, StepSettings
 from saltus.continuation.test_functions import located
+from saltus.continuation.trail import Trail, TrailPoint
 from saltus.continuation.zero import Zero
 from saltus.progress import Progress, silent
 
@@ -47,13 +51,14 @@ class Continuation:
     watch: Callable[[Any], object] = lambda point: None
     points: list[Any] = field(default_factory=list)
     special: list[Zero] = field(default_factory=list)
-    missed: list[str] = field(default_factory=list)
+    missed: list[Missed] = field(default_factory=list)
     end: End | None = None
+    trail: Trail = field(init=False)
 
     def follow(self, first: Any, born: bool = False) -> None:
         """Follow the curve from a point until it ends; `born` at a special point, whose own events are not to be found again."""
         self.points.append(first)
-        self.end = self._on_a_bound(first)
+        self.end, self.trail = self._on_a_bound(first), Trail(self.events, first)
         before, step = None, min(self.steps.first, self.steps.longest)
         while self.end is None:
             point = self.points[-1]
@@ -79,7 +84,7 @@ class Continuation:
             ahead = curve.advance(before, point, length)
             if ahead is not None and self.events.accepts(point, ahead):
                 turn = curve.turn(point, ahead)
-                if turn < self.steps.most:
+                if turn < self.steps.most and (length < self.steps.restart or self.trail.explains(ahead)):
                     return ahead, self.steps.following(step, turn, ahead.iterations)
             step = self.steps.shrink * length
         self.end = self.events.stalled(self, point, length)
@@ -90,7 +95,13 @@ class Continuation:
 
         The step is cut at the bounds first, as what happens outside of them is none of the curve's events.
         """
-        ahead, end = self._beyond(point, ahead) or (ahead, None)
+        bounded = self._beyond(point, ahead)
+        if isinstance(bounded, End):
+            self.end = bounded
+            return False
+        ahead, end = bounded
+        samples = [] if born else self.trail.to_barrier(ahead)
+        ahead, end = (ahead, end) if not samples or samples[-1].point is ahead else (samples[-1].point, None)
         cut = self.events.cut(point, ahead)
         if isinstance(cut, End):
             self.end = cut
@@ -103,7 +114,9 @@ class Continuation:
         if closed:
             ahead, end, cut = self.points[0], End(CurveEnd.CLOSED), None
         if closed or not born:
-            self._locate(point, ahead)
+            self._locate(self.trail.examined(self.trail.up_to(samples, ahead)))
+        else:
+            self.trail.begin(ahead)
         self.points.append(ahead)
         self.watch(ahead)
         self.end = self.end or end or self.events.ended(self, ahead, cut)
@@ -115,27 +128,35 @@ class Continuation:
         following = self.events.across(self, cut)
         if isinstance(following, End):
             self.end = following
-        elif following is not None:
+            return False
+        self.trail.begin(cut.point if following is None else following)
+        if following is not None:
             self.points.append(following)
-            return True
-        return False
+        return following is not None
 
-    def _locate(self, a: Any, b: Any) -> None:
+    def _locate(self, samples: list[TrailPoint]) -> None:
         """Locate the special points of a step, in order."""
         found = []
-        for test in self.events.tests(a):
-            if not test.value(a) * test.value(b) < 0.0:
-                continue
-            zero = located(test, a, b)
-            if zero is None:
-                self.missed.append(f"{test.kind} between {a.parameter:.9g} and {b.parameter:.9g}")
-            else:
-                found.append(zero)
-        for zero in sorted(self.events.distinct(found), key=lambda zero: a.curve.norm(zero.point.place - a.place)):
+        for a, b in pairwise(samples):
+            signs = zip(self.trail.tests, a.values * b.values, strict=True)
+            changed = [test for test, sign in signs if sign < 0.0 and test is not self.trail.barrier]
+            singular = any(test.singular for test in changed)
+            for test in changed:
+                zero = located(test, a.point, b.point, singular)
+                if zero is None:
+                    self.missed.append(Missed(CurveMissed.NOT_LOCATED, test.kind, a.point.parameters, b.point.parameters))
+                else:
+                    found.append(zero)
+        first, last = samples[0].point, samples[-1].point
+        counts = self.events.outside(first), self.events.outside(last)
+        if not found and None not in counts and counts[0] != counts[1]:
+            self.missed.append(Missed(CurveMissed.STABILITY, "", first.parameters, last.parameters))
+        for zero in sorted(self.events.distinct(found), key=lambda zero: first.curve.norm(zero.point.place - first.place)):
             self.special.append(zero)
             if self.events.keeps_special:
                 self.points.append(zero.point)
             self.end = self.end or self.events.last(zero)
+        self.trail.go_on(samples)
 
     def _on_a_bound(self, point: Any) -> End | None:
         """The end of a curve that starts on a bound and leads beyond it."""
@@ -148,21 +169,24 @@ class Continuation:
     def _bound(self, name: str, value: float) -> End:
         return End(CurveEnd.BOUND, float(value), detail=f"{name} = " if len(self.bounds) > 1 else "")
 
-    def _beyond(self, a: Any, b: Any) -> tuple[Any, End] | None:
-        """The point on the first bound that a step goes over or ends on, and the end there."""
-        start, chord = a.parameters, b.parameters - a.parameters
-        shares = []
-        for i, (low, high) in enumerate(self.bounds.values()):
-            for bound, passed in ((low, b.parameters[i] < low), (high, b.parameters[i] > high)):
-                if passed and chord[i] != 0.0:
-                    shares.append(((bound - start[i]) / chord[i], i, bound))
-        if not shares:
-            end = self._on_a_bound(b)
-            return None if end is None else (b, end)
-        share, index, bound = min(shares)
-        guess, place = a.place + share * (b.place - a.place), index - len(self.bounds)
-        guess[place] = bound
-        return a.curve.solve_at(guess, b.place - a.place, place) or b, self._bound(list(self.bounds)[index], bound)
+    def _beyond(self, a: Any, b: Any) -> tuple[Any, End | None] | End:
+        """The point on the first bound that a step goes over or ends on, and the end there; an end alone if it is not found."""
+        passed = [crossing for i in range(len(self.bounds)) for crossing in self._crossings(a, b, i)]
+        if not passed:
+            return b, self._on_a_bound(b)
+        if any(point is None for _, _, point in passed):
+            return End(CurveEnd.NOT_LOCATED, b.parameter, "bound")
+        index, bound, point = min(passed, key=lambda found: a.curve.norm(found[2].place - a.place))
+        return point, self._bound(list(self.bounds)[index], bound)
+
+    def _crossings(self, a: Any, b: Any, i: int) -> list[tuple[int, float, Any]]:
+        """Where a step leaves the bounds of a parameter, if only to come back: its index, the bound and the point if found."""
+        index, found = i - len(self.bounds), []
+        turn = turning_point(a, b, index)
+        for bound, beyond in zip(list(self.bounds.values())[i], (np.less, np.greater), strict=True):
+            if beyond(b.place[index], bound) or (turn is not None and beyond(turn.place[index], bound)):
+                found.append((i, bound, next(iter(solved_between(a, b, index, bound)), None)))
+        return found
 
     def _closes(self, a: Any, b: Any) -> bool:
         """Whether a step goes by the first point of the curve, in the direction in which the curve was followed there."""

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from saltus.continuation.end import CurveEnd, End
+from saltus.continuation.missed import Missed
+from saltus.continuation.solved_between import solved_between
 from saltus.continuation.step_length import STEPS
 
 
@@ -19,7 +21,7 @@ class Course:
     points: tuple[Any, ...]
     special: tuple[Any, ...]
     ends: tuple[End, End]
-    missed: tuple[str, ...]  # test functions that changed their sign where no zero was located
+    missed: tuple[Missed, ...]  # what is between neighbouring points and was not located
 
     @cached_property
     def parameters(self) -> np.ndarray:
@@ -44,17 +46,11 @@ class Course:
         return bool(closing and a.curve.norm(b.place - a.place) <= 2.0 * STEPS.longest)
 
     def solved_at(self, value: float, index: int = -1) -> list[Any]:
-        """All its points at a value of one number of their places, solved there."""
+        """All its points at a value of one number of their places, solved there, in order."""
         found = [point for i in range(len(self.points) - 1) for point in self.solved_between(i, value, index)]
         return found + [point for point in self.points[-1:] if point.place[index] == value]
 
     def solved_between(self, before: int, value: float, index: int = -1) -> list[Any]:
-        """The point at a value of one number of the places, between the point of this number and the next, or none."""
+        """The points at a value of one number of the places, from the point of this number up to before the next."""
         a, b = self.points[before], self.points[before + 1]
-        start, end = a.place[index], b.place[index]
-        if start == end or (start - value) * (end - value) > 0.0 or end == value or not self.is_joined(before):
-            return []
-        guess = a.place + (value - start) / (end - start) * (b.place - a.place)
-        guess[index] = value
-        point = a.curve.solve_at(guess, a.tangent, index)
-        return [] if point is None else [point]
+        return solved_between(a, b, index, value) if self.is_joined(before) else []

@@ -68,6 +68,10 @@ class Curve(ABC, Generic[P]):
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
         """The point near a guess with the guess's own value at an index of its place; its tangent goes along the direction."""
 
+    def beside_singular(self, place: np.ndarray, direction: np.ndarray) -> P | None:
+        """The point at a place that is one, with the direction of its tangent, where the equations may be singular."""
+        return self.solve(place, direction)
+
     @abstractmethod
     def advance(self, before: P | None, point: P, step: float) -> P | None:
         """The point a step further, given the point before if there is one; None where the step is too long."""

@@ -54,6 +54,10 @@ class Events:
         """The test functions on the step that begins at a point."""
         return ()
 
+    def outside(self, point: Any) -> int | None:
+        """A count that changes at special points only, as of multipliers outside the unit circle; None where it has none."""
+        return None
+
     def distinct(self, found: list[Zero]) -> list[Zero]:
         """The special points of a step, each once: one point may be the zero of two test functions."""
         return found

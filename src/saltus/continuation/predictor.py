@@ -15,10 +15,10 @@ def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
     the equations have changed since, is of second.
     """
     straight = point.place + step * point.tangent
-    if before is None or before.curve is not point.curve:
+    if before is None or not before.curve.joins(point.curve):
         return straight
     chord = point.place - before.place
-    length = _arc(before, point, chord)
+    length = arc(before, point)
     if not 0.0 < step <= STEPS.most_stretched * length:
         return straight
     u = step / length
@@ -30,15 +30,15 @@ def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
 def between(a: Point, b: Point, share: float) -> np.ndarray:
     """The place at a share of the way from a to b, on the cubic through both, or on their chord if the equations have changed."""
     chord = b.place - a.place
-    if a.curve is not b.curve:
+    if not a.curve.joins(b.curve):
         return np.asarray(a.place + share * chord)
-    length = _arc(a, b, chord)
+    length = arc(a, b)
     begin, end = length * a.tangent - chord, length * b.tangent - chord
     rest = 1.0 - share
     return np.asarray(a.place + share * chord + share * rest * (rest * begin - share * end))
 
 
-def _arc(a: Point, b: Point, chord: np.ndarray) -> float:
+def arc(a: Point, b: Point) -> float:
     """The length of the curve between two points, to the order that the cubic needs."""
     turn = float(a.curve.norm(b.tangent - a.tangent))
-    return float(a.curve.norm(chord) * (1.0 + turn**2 / 24.0))
+    return float(a.curve.norm(b.place - a.place) * (1.0 + turn**2 / 24.0))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.continuation.corrector import Corrected, Evaluation, newton
+from saltus.continuation.corrector import NEWTON, Corrected, Evaluation, newton
 from saltus.continuation.curve import Curve, P
 from saltus.continuation.predictor import predicted
 from saltus.continuation.step_length import STEPS
@@ -57,6 +57,13 @@ class EquationCurve(Curve[P]):
             return None
         return self.with_tangent(Corrected(filled(found.place), found.evaluation, found.iterations), direction)
 
+    def beside_singular(self, place: np.ndarray, direction: np.ndarray) -> P | None:
+        """The point at a place that solves the equations to rounding, with the direction of its tangent; None if it does not."""
+        evaluation = self.evaluate(place, True)
+        if evaluation is None or not np.abs(evaluation.residual).max() <= NEWTON.stalled * max(1.0, np.abs(place).max()):
+            return None
+        return self.point_at(Corrected(place, evaluation, 0), direction / self.norm(direction))
+
     def with_tangent(self, found: Corrected[Any], direction: np.ndarray) -> P | None:
         """A solution as a point, with the tangent that goes along a direction; None where the tangent is not unique."""
         matrix = np.vstack([found.evaluation.derivatives(), direction * self.weights**2])
@@ -73,11 +80,10 @@ class EquationCurve(Curve[P]):
         return self.point_at(found, tangent / self.norm(tangent))
 
     def advance(self, before: P | None, point: P, step: float) -> P | None:
-        """The point a step further; None where Newton's method does not converge or leads far away from the tangent."""
-        ahead = self.solve(predicted(before, point, step), point.tangent)
-        if ahead is None or self.norm(ahead.place - point.place - step * point.tangent) >= STEPS.far * step:
-            return None
-        return ahead
+        """The point a step further; None where Newton's method does not converge or leads away from what was predicted."""
+        guess = predicted(before, point, step)
+        ahead = self.solve(guess, point.tangent)
+        return None if ahead is None or self.norm(ahead.place - guess) >= STEPS.off * step else ahead
 
     def turn(self, a: P, b: P) -> float:
         """The angle between the tangents, rad."""

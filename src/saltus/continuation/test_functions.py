@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,47 +13,138 @@ from saltus.continuation.zero import Evidence, Zero
 
 
 @dataclass(frozen=True)
+class LocationSettings:
+    """How a zero of a test function is bracketed."""
+
+    most_points: int = 80  # Points that are solved for: bisection alone needs 50 for a width of rounding.
+    slow: int = 3  # After so many points that have not halved the bracket the next one is its middle.
+    overshoot: float = 0.5  # Share of the wanted width by which a point is put beyond the zero, so that it closes the bracket.
+    nodes: int = 4  # Nearest points through which the inverse interpolation goes.
+    apart: float = 0.5  # Share of the distance of an end to a singular zero at which a further point is solved for.
+    near: float = 0.3  # Share of the distance of its neighbours by which a point may lie off the cubic through them.
+
+
+SETTINGS = LocationSettings()
+
+
+@dataclass(frozen=True)
 class TestFunction:
     """A function of the points of a curve whose zeros are special points of one kind."""
 
     kind: str
     value: Callable[[Any], float]
     width: float = 1e-11  # of the bracket of the zero, as a share of the step; the best point found in it is nearer still
+    guides: bool = False  # whether it is smooth, so that a step is taken again, shorter, in which it changes unexpectedly
+    singular: bool = False  # whether the equations are singular at its zeros, so that points beside them cannot be solved for
 
 
-def located(test: TestFunction, a: Any, b: Any) -> Zero | None:
-    """The point between a and b at which a test function goes through zero; None if the curve cannot be followed between."""
-    from scipy.optimize import brentq
+@dataclass(frozen=True)
+class KnownPlace:
+    """A point between two others of a curve."""
 
-    chord = b.place - a.place
-    direction = chord / a.curve.norm(chord)
-    known = {0.0: (a, test.value(a)), 1.0: (b, test.value(b))}
+    share: float  # of the chord between them
+    point: Any
+    value: float  # of the test function
 
-    def value_at(share: float) -> float:
-        if share not in known:
-            point = a.curve.solve(between(a, b, share), direction)
-            known[share] = (point, np.nan if point is None else test.value(point))
-            if not np.isfinite(known[share][1]):
-                raise ArithmeticError
-        return known[share][1]
 
-    before, after = value_at(0.0), value_at(1.0)
+def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero | None:
+    """The point between a and b at which a test function goes through zero; None if the curve cannot be followed between.
+
+    `singular` says that the equations are, somewhere between, where another curve crosses.
+    """
+    known = [KnownPlace(0.0, a, test.value(a)), KnownPlace(1.0, b, test.value(b))]
+    before, after = known[0].value, known[-1].value
     if before * after > 0.0 or not np.isfinite([before, after]).all():
         return None
-    try:
-        brentq(value_at, 0.0, 1.0, xtol=test.width, rtol=1e-15)
-    except (ArithmeticError, RuntimeError):
+    widths = [1.0]
+    at_share = _interpolated(test, known) if singular else lambda share: _solved(known, share)
+    while (share := _next_share(known, before, test.width, widths)) is not None:
+        point = at_share(share)
+        if point is None or not np.isfinite(value := test.value(point)):
+            return None
+        known.append(KnownPlace(share, point, value))
+        known.sort(key=lambda place: place.share)
+    best = min(known, key=lambda place: abs(place.value))
+    evidence = Evidence(best.point.residual, _brackets(best.point, before, known), before, after, best.value)
+    return best.point.zero_type(test.kind, best.point, evidence)
+
+
+def _bracket(known: list[KnownPlace], before: float) -> int:
+    """The index of the last place before the first change of sign."""
+    return next(i for i, place in enumerate(known[1:]) if (place.value > 0.0) != (before > 0.0))
+
+
+def _next_share(known: list[KnownPlace], before: float, width: float, widths: list[float]) -> float | None:
+    """Where to look next for the zero, or None when it is bracketed: by inverse interpolation, or halfway if that is slow."""
+    i = _bracket(known, before) if before != 0.0 else 0
+    low, high = known[i].share, known[i + 1].share
+    widths.append(high - low)
+    if high - low <= width or 0.0 in (known[i].value, known[i + 1].value) or len(widths) > SETTINGS.most_points:
         return None
-    point, value = min(known.values(), key=lambda pair: abs(pair[1]))
-    return point.zero_type(
-        test.kind, point, Evidence(point.residual, _brackets(point, before, known.values()), before, after, value)
-    )
+    middle = 0.5 * (low + high)
+    if len(widths) > SETTINGS.slow + 1 and widths[-1] > 0.5 * widths[-1 - SETTINGS.slow]:
+        return middle if low < middle < high else None
+    near = sorted(known, key=lambda place: abs(place.share - middle))[: SETTINGS.nodes]
+    guess = _inverse([place.share for place in near], [place.value for place in near])
+    if not low < guess < high:
+        guess = _inverse([low, high], [known[i].value, known[i + 1].value])
+    beyond = SETTINGS.overshoot * width
+    guess += beyond if guess - low < high - guess else -beyond  # towards the farther end, so that it is drawn near as well
+    guess = min(max(guess, low + beyond), high - beyond)
+    return guess if low < guess < high else middle if low < middle < high else None
 
 
-def _brackets(point: Any, before: float, known: Iterable[tuple[Any, float]]) -> tuple[float, ...]:
+def _inverse(shares: list[float], values: list[float]) -> float:
+    """The share at the value 0 on the polynomial of the shares in the values; nan where two values are equal."""
+    shares = list(shares)
+    for order in range(1, len(shares)):
+        for i in range(len(shares) - order):
+            apart = values[i + order] - values[i]
+            if apart == 0.0:
+                return np.nan
+            shares[i] = (values[i + order] * shares[i] - values[i] * shares[i + 1]) / apart
+    return shares[0]
+
+
+def _solved(known: list[KnownPlace], share: float) -> Any:
+    """The point at a share of the chord, near the cubic through its neighbours; None where it cannot be solved for."""
+    i = next(i for i, place in enumerate(known[1:]) if place.share > share)
+    low, high, first, last = known[i], known[i + 1], known[0].point, known[-1].point
+    curve, chord = first.curve, last.place - first.place
+    direction = chord / curve.norm(chord)
+    guess = between(low.point, high.point, (share - low.share) / (high.share - low.share))
+    guess = guess + (share * chord - ((guess - first.place) @ (curve.weights**2 * direction)) * direction)
+    point = curve.solve(guess, direction)
+    near = SETTINGS.near * curve.norm(high.point.place - low.point.place)
+    return point if point is not None and curve.norm(point.place - guess) <= near else None
+
+
+def _interpolated(test: TestFunction, known: list[KnownPlace]) -> Callable[[float], Any]:
+    """The points of the chord on the polynomial through points away from the zero, with their tangents: it is added two of them.
+
+    Where two curves cross, Newton's method does not tell them apart, and the more so the nearer it is.
+    """
+    from scipy.interpolate import KroghInterpolator
+
+    first, last = known[0].point, known[-1].point
+    curve, chord = first.curve, last.place - first.place
+    zero = known[0].value / (known[0].value - known[-1].value)
+    for share in (SETTINGS.apart * zero, 1.0 - SETTINGS.apart * (1.0 - zero)):
+        point = _solved(known, share)
+        if point is not None:
+            known.append(KnownPlace(share, point, test.value(point)))
+            known.sort(key=lambda place: place.share)
+    along = curve.weights**2 * chord / curve.norm(chord) ** 2
+    shares = np.repeat([place.share for place in known], 2)
+    rows = [row for place in known for row in (place.point.place, place.point.tangent / (place.point.tangent @ along))]
+    polynomial = KroghInterpolator(shares, np.array(rows))
+    return lambda share: curve.beside_singular(polynomial(share), polynomial.derivative(share))
+
+
+def _brackets(point: Any, before: float, known: list[KnownPlace]) -> tuple[float, ...]:
     """How near to a zero the test function is known to have either sign, in each parameter."""
     sides: dict[bool, list[np.ndarray]] = {True: [], False: []}
-    for other, value in known:
-        sides[(value > 0) == (before > 0)].append(np.abs(other.parameters - point.parameters))
+    for place in known:
+        sides[(place.value > 0) == (before > 0)].append(np.abs(place.point.parameters - point.parameters))
     widths = np.max([np.min(side, axis=0) for side in sides.values() if side], axis=0)
     return tuple(map(float, widths))

@@ -73,8 +73,9 @@ def touching(point: OrbitPoint) -> float:
 NEAREST = 1.0  # upper limit of the distance of an orbit from a grazing, which would be infinite for one that never turns
 
 
-FLIP = {symmetric: Test(SpecialKind.BPC if symmetric else SpecialKind.PD, flip) for symmetric in (True, False)}
-FOLD, CROSSING, TORUS = Test(SpecialKind.LP, fold), Test(SpecialKind.BPC, crossing), Test(SpecialKind.NS, torus)
+FLIP = {symmetric: Test(SpecialKind.BPC if symmetric else SpecialKind.PD, flip, guides=True) for symmetric in (True, False)}
+FOLD, CROSSING = Test(SpecialKind.LP, fold, guides=True), Test(SpecialKind.BPC, crossing, guides=True, singular=True)
+TORUS = Test(SpecialKind.NS, torus)
 TOUCHING = Test(SpecialKind.GR, touching)
 GRAZING = Test(SpecialKind.GR, grazing, 1e-15)  # narrower than others: beside a grazing motions part by the square root
 

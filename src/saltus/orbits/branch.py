@@ -57,6 +57,6 @@ class Branch(Course):
     def __repr__(self) -> str:
         kinds = ", ".join(f"{p.kind} {p.parameter:.6g}" for p in self.special)
         span = f"{self.path} from {self.parameters.min():.6g} to {self.parameters.max():.6g}" if len(self.points) else self.path
-        missed = f"; not located: {', '.join(self.missed)}" if self.missed else ""
+        missed = f"; not located: {', '.join(map(str, self.missed))}" if self.missed else ""
         ends = f"ends: {self.ends[0]} | {self.ends[1]}"
         return f"Branch({span}, {len(self.points)} points, special: {kinds or 'none'}; {ends}{missed})"

@@ -39,7 +39,7 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
         "end_kinds": [str(end.kind) for end in branch.ends],
         "origin": str(branch.origin),
         "closed": int(branch.closed),
-        "missed": "; ".join(branch.missed),
+        "missed": "; ".join(map(str, branch.missed)),
     }
     return xarray.Dataset(data, attrs=provenance(problem.system, tol=problem.tol, **attributes))
 

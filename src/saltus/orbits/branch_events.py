@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.continuation import Continuation, Cut, End, Events, Zero, located
+from saltus.continuation import Continuation, Cut, End, Events, Missed, Zero, located
 from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, grazing, never_torus, torus
 from saltus.orbits.grazing import other_side
 from saltus.orbits.images import asymmetry, falls_onto_image, halves_of, nearest, passes_image, repetition
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.signature import Signature
-from saltus.orbits.special_point import OrbitEnd, SpecialKind, UserFunction
+from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
 from saltus.orbits.tolerances import TOLERANCES
 
 Run = Continuation
@@ -90,6 +90,10 @@ class BranchEvents(OrbitEvents):
         """All test functions but that of grazings."""
         return branch_tests(point, self.functions)
 
+    def outside(self, point: OrbitPoint) -> int | None:
+        """How many multipliers are outside the unit circle; None at a grazing."""
+        return None if point.orbit.grazes else int(np.count_nonzero(np.abs(point.orbit.multipliers) > 1.0))
+
     def distinct(self, found: list[Zero]) -> list[Zero]:
         """Special points without the crossings of branches that are folds, and without pairs of multipliers on the unit circle
         by rounding, where areas never grow."""
@@ -111,10 +115,8 @@ class BranchEvents(OrbitEvents):
     def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
         """The end of an orbit that has shrunk to rest, or has lost its stability."""
         if torus(ahead) > SETTINGS.impossible_pair and never_torus(ahead.orbit):
-            run.missed.append(
-                f"NS near {ahead.parameter:.9g}: a complex pair of multipliers has the modulus {1.0 + torus(ahead):.9g}, "
-                "although areas of states never grow (errata 22), so the multipliers are wrong there"
-            )
+            where, modulus = ahead.parameters, f"{1.0 + torus(ahead):.9g}"
+            run.missed.append(Missed(OrbitMissed.IMPOSSIBLE_PAIR, SpecialKind.NS, where, where, modulus))
         if self.while_stable and cut is None and not ahead.orbit.stable:
             return super().ended(run, ahead, cut) or End(OrbitEnd.UNSTABLE, ahead.parameter)
         return super().ended(run, ahead, cut)

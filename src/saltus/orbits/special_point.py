@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import StrEnum
 
-from saltus.continuation import EndReason, Zero
+from saltus.continuation import EndReason, MissedReason, Zero
 from saltus.orbits.orbit import PeriodicOrbit
 
 UserFunction = Callable[[PeriodicOrbit], float]
@@ -80,6 +80,15 @@ class OrbitEnd(EndReason):
     RELEASE_BORN = "at {parameter:.10g} a release is born: find_orbit finds the orbit beyond"
     OTHER_RESTS = "beyond {parameter:.10g} no orbit with these rests follows from the release at {detail}"
     NO_ORBIT = "beyond {parameter:.10g} there is no such motion: {detail}"
+
+
+class OrbitMissed(MissedReason):
+    """What may be wrong along a branch of orbits, besides what may be missed along any curve."""
+
+    IMPOSSIBLE_PAIR = (
+        "{kind} near {first}: a complex pair of multipliers has the modulus {detail}, although areas of states never grow "
+        "(errata 22), so the multipliers are wrong there"
+    )
 
 
 class SpecialPoint(Zero):

@@ -1,0 +1,39 @@
+"""What was not located along a curve, as data whose text is a sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+
+class MissedReason(Enum):
+    """Why something is missing between two points. Its value is the text, in which a `Missed` fills in its numbers."""
+
+    @property
+    def code(self) -> str:
+        """The reason as a word for files."""
+        return self.name.lower()
+
+
+class CurveMissed(MissedReason):
+    """The reasons that any curve may have."""
+
+    NOT_LOCATED = "{kind} between {first} and {last}"
+    STABILITY = "a change of stability between {first} and {last}"
+
+
+@dataclass(frozen=True, eq=False)
+class Missed:
+    """Something special between two neighbouring points of a curve that was not located."""
+
+    reason: MissedReason
+    kind: str  # of the test function that changes its sign, if it is one
+    first: np.ndarray  # the parameters at both points
+    last: np.ndarray
+    detail: str = ""  # what else the text names
+
+    def __str__(self) -> str:
+        first, last = (", ".join(f"{value:.9g}" for value in values) for values in (self.first, self.last))
+        return str(self.reason.value.format(kind=self.kind, first=first, last=last, detail=self.detail))

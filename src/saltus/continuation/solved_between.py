@@ -1,0 +1,85 @@
+"""Points of a curve between two others at which one number of their places has a given value, and no points of another curve."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from saltus.continuation.predictor import between
+from saltus.continuation.step_length import STEPS
+from saltus.continuation.test_functions import TestFunction, located
+
+
+def solved_between(a: Any, b: Any, index: int, value: float) -> list[Any]:
+    """The points from a up to before b at which the number at an index of the place has a value, solved there.
+
+    Each lies near the cubic through both: where the equations alone, at that value, lead to another solution, the curve is
+    followed to the value first.
+    """
+    found = []
+    for first, last in _rising_parts(a, b, index):
+        start, end = first.place[index] - value, last.place[index] - value
+        if end == 0.0 or start * end > 0.0:
+            continue
+        point = first if start == 0.0 else _solved(first, last, index, value)
+        found += [] if point is None else [point]
+    return found
+
+
+def _rising_parts(a: Any, b: Any, index: int) -> list[tuple[Any, Any]]:
+    """The way from a to b, divided where the number at an index turns."""
+    turn = turning_point(a, b, index)
+    return [(a, b)] if turn is None else [(a, turn), (turn, b)]
+
+
+def turning_point(a: Any, b: Any, index: int) -> Any:
+    """The point near which a number of the place turns between a and b; None if it does not."""
+    if not a.tangent[index] * b.tangent[index] < 0.0:
+        return None
+    shares = np.linspace(0.0, 1.0, 33)
+    values = np.array([between(a, b, share)[index] for share in shares])
+    place = int(np.argmax(values) if a.tangent[index] > 0.0 else np.argmin(values))
+    return None if place in (0, len(shares) - 1) else _at_share(a, b, float(shares[place]))
+
+
+def _solved(a: Any, b: Any, index: int, value: float) -> Any:
+    """The point between a and b at which a number that rises or falls all the way has a value; None if it cannot be found."""
+    share = _share(a, b, index, value)
+    point = _near(a, b, between(a, b, share), index, value)
+    if point is not None:
+        return point
+    zero = located(TestFunction("value", lambda other: other.place[index] - value), a, b)
+    if zero is None:
+        return None
+    return _near(a, b, zero.point.place, index, value)
+
+
+def _near(a: Any, b: Any, guess: np.ndarray, index: int, value: float) -> Any:
+    """The solution at a value that is near to a guess and goes on in its direction; None if that is another one."""
+    guess = guess.copy()
+    guess[index] = value
+    chord = b.place - a.place
+    point, length = a.curve.solve_at(guess, chord, index), a.curve.norm(chord)
+    if point is None or a.curve.norm(point.place - guess) > STEPS.beside * length:
+        return None
+    return point if max(a.curve.turn(a, point), a.curve.turn(point, b)) < STEPS.most else None
+
+
+def _at_share(a: Any, b: Any, share: float) -> Any:
+    """The point at a share of the way."""
+    chord = b.place - a.place
+    return a.curve.solve(between(a, b, share), chord / a.curve.norm(chord))
+
+
+def _share(a: Any, b: Any, index: int, value: float) -> float:
+    """The share of the way at which the cubic has the value, by bisection."""
+    low, high = 0.0, 1.0
+    below = a.place[index] < value
+    while high - low > 1e-9:
+        middle = 0.5 * (low + high)
+        if (between(a, b, middle)[index] < value) == below:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)

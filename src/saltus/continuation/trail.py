@@ -1,0 +1,173 @@
+"""The test functions along a curve: what they do between two points, and where one has to look so that no zero is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.continuation.events import Events
+from saltus.continuation.predictor import arc, between
+
+
+@dataclass(frozen=True)
+class TrailSettings:
+    """How closely the test functions are looked at between two points of a curve."""
+
+    most_looks: int = 40  # Points solved for within one step at most: more are needed only where a function is all but 0.
+    narrowest: float = 1e-6  # An interval narrower than this share of its step is not divided: two zeros in it are one.
+    # A step is taken again where a value differs from the parabola through the last three by more than this share of them.
+    unexpected: float = 0.5
+    doubt: float = 1.0  # The uncertainty of the cubic through four points, in units of its own term of third order.
+    grid: int = 17  # Places in an interval at which the cubic and its uncertainty are compared with 0.
+    inner: float = 0.1  # Shares of an interval nearer to its ends than this are not looked at, as little would be gained.
+
+
+SETTINGS = TrailSettings()
+GRID = np.linspace(0.0, 1.0, SETTINGS.grid)
+HUMP = GRID * (1.0 - GRID)
+
+
+@dataclass(frozen=True, eq=False)
+class TrailPoint:
+    """A point of a curve with the values of all test functions."""
+
+    point: Any
+    arc: float  # the length of the curve up to it
+    values: np.ndarray  # that of the barrier first if there is one
+
+
+class Trail:
+    """The last points of a curve, with the values of its test functions.
+
+    Between two points a test function is taken to be the cubic through them and the two nearest ones. Its uncertainty is its own
+    term of third order, so a function that turns by more than the points before explain is uncertain. Where the cubic, within
+    its uncertainty, has more zeros than its ends tell, there the curve is solved for, until it has not.
+    """
+
+    def __init__(self, events: Events, first: Any) -> None:
+        self.events = events
+        self.begin(first)
+
+    def begin(self, point: Any) -> None:
+        """Begin anew at a point, where the equations have changed."""
+        self.barrier = self.events.barrier()
+        self.tests = [*([] if self.barrier is None else [self.barrier]), *self.events.tests(point)]
+        self.guides = np.array([test.guides for test in self.tests], dtype=bool)
+        self.latest = TrailPoint(point, 0.0, self._values(point))
+        self.last = [self.latest]
+
+    def explains(self, ahead: Any) -> bool:
+        """Whether the smooth test functions at a point ahead are about what their last three values let expect."""
+        if len(self.last) < 3 or not self.guides.any():
+            return True
+        (a, b, c), point = self.last, self._sample(ahead)
+        x, values = point.arc, np.array([sample.values[self.guides] for sample in self.last])
+        expected = (
+            (x - b.arc) * (x - c.arc) / ((a.arc - b.arc) * (a.arc - c.arc)) * values[0]
+            + (x - a.arc) * (x - c.arc) / ((b.arc - a.arc) * (b.arc - c.arc)) * values[1]
+            + (x - a.arc) * (x - b.arc) / ((c.arc - a.arc) * (c.arc - b.arc)) * values[2]
+        )
+        found = point.values[self.guides]
+        size = np.maximum(np.abs(values).max(axis=0), np.abs(found))
+        return bool((np.abs(found - expected) <= SETTINGS.unexpected * size).all())
+
+    def go_on(self, samples: list[TrailPoint]) -> None:
+        """Take the points of a step, which begins with the last one."""
+        self.last = [*self.last[:-1], *samples][-3:]
+
+    def to_barrier(self, ahead: Any) -> list[TrailPoint]:
+        """The points of a step up to the first one at which the barrier is below 0."""
+        samples = self.up_to([], ahead)
+        if self.barrier is None or samples[-1].values[0] < 0.0 or len(self.last) == 1:  # a curve may begin on the barrier
+            return samples
+        samples = self.examined(samples, slice(1))
+        beyond = next((i for i, sample in enumerate(samples) if i and sample.values[0] < 0.0), len(samples))
+        return samples[: beyond + 1]
+
+    def up_to(self, samples: list[TrailPoint], ahead: Any) -> list[TrailPoint]:
+        """The points of a step that ends at a point, given those of a longer one."""
+        if samples and samples[-1].point is ahead:
+            return samples
+        before, last = self.last[-1], self._sample(ahead)
+        return [*(sample for sample in samples[:-1] or [before] if sample.arc < last.arc), last]
+
+    def examined(self, samples: list[TrailPoint], rows: slice = slice(None)) -> list[TrailPoint]:
+        """The points of a step with as many more between as are needed to see every zero of the test functions in `rows`."""
+        looks, i, known = 0, 0, self.last[:-1]
+        narrowest = SETTINGS.narrowest * (samples[-1].arc - samples[0].arc)
+        while i + 1 < len(samples) and looks < SETTINGS.most_looks:
+            a, b = samples[i : i + 2]
+            near = sorted(
+                [*[*known, *samples[:i]][-2:], *samples[i + 2 : i + 4]], key=lambda s: max(a.arc - s.arc, s.arc - b.arc)
+            )
+            share = _where_to_look(a, b, near[:2], rows) if b.arc - a.arc > narrowest else None
+            middle = None if share is None else self._middle(a, b, share)
+            if middle is None:
+                i += 1
+            else:
+                samples, looks = [*samples[: i + 1], middle, *samples[i + 1 :]], looks + 1
+        return samples
+
+    def _middle(self, a: TrailPoint, b: TrailPoint, share: float) -> TrailPoint | None:
+        """The sample at a share of the way between two, or None where the curve cannot be solved for."""
+        chord = b.point.place - a.point.place
+        curve = a.point.curve
+        point = curve.solve(between(a.point, b.point, share), chord / curve.norm(chord))
+        if point is None:
+            return None
+        first, second = arc(a.point, point), arc(point, b.point)
+        return TrailPoint(point, a.arc + (b.arc - a.arc) * first / (first + second), self._values(point))
+
+    def _sample(self, ahead: Any) -> TrailPoint:
+        """A point ahead of the last one."""
+        if self.latest.point is not ahead:
+            before = self.last[-1]
+            self.latest = TrailPoint(ahead, before.arc + arc(before.point, ahead), self._values(ahead))
+        return self.latest
+
+    def _values(self, point: Any) -> np.ndarray:
+        return np.array([test.value(point) for test in self.tests])
+
+
+def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint], rows: slice) -> float | None:
+    """The share of the way from a to b at which a test function may have zeros that its values at both ends do not tell."""
+    begin, end = a.values[rows], b.values[rows]
+    with np.errstate(all="ignore"):
+        rise = end - begin
+        bend, twist, unsure, lever = _higher(a, b, near, rows)
+        signs = np.sign(begin) * np.sign(end)
+        room = np.where(signs > 0, 4.0 * np.minimum(np.abs(begin), np.abs(end)), np.abs(rise))
+        swing = np.abs(bend) + 1.25 * np.abs(lever).max() * (np.abs(twist) + unsure)
+        doubtful = (room <= swing) & (signs != 0) & np.isfinite(swing)
+    worst, place = 0.0, None
+    for row in np.flatnonzero(doubtful):
+        cubic = begin[row] + rise[row] * GRID - HUMP * (bend[row] + twist[row] * lever)
+        margin = SETTINGS.doubt * HUMP * unsure[row] * np.abs(lever)
+        if signs[row] > 0:
+            least = np.sign(begin[row]) * cubic - margin
+            k = int(np.argmin(least))
+            depth = -least[k] / max(abs(begin[row]), abs(end[row]))
+            if depth > worst:
+                worst, place = depth, float(np.clip(GRID[k], SETTINGS.inner, 1.0 - SETTINGS.inner))
+        elif any(np.count_nonzero(np.diff(np.sign(side))) > 1 for side in (cubic - margin, cubic + margin)):
+            worst, place = max(worst, 1.0), place or 0.5
+    return place
+
+
+def _higher(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint], rows: slice) -> tuple[np.ndarray, ...]:
+    """The coefficients of second and third order, the uncertainty of either, and the lever of the last two over the grid.
+
+    Without two points near it is the last term known that is uncertain: of the straight line half of its rise.
+    """
+    begin, end, length = a.values[rows], b.values[rows], b.arc - a.arc
+    slope, nothing, everywhere = (end - begin) / length, np.zeros(len(begin)), np.ones(GRID.size)
+    seconds = [((end - c.values[rows]) / (b.arc - c.arc) - slope) / (c.arc - a.arc) for c in near]
+    if len(near) < 2:
+        bend = length**2 * seconds[0] if near else nothing
+        return bend, nothing, np.abs(bend if near else end - begin), everywhere
+    third = (seconds[1] - seconds[0]) / (near[1].arc - near[0].arc)
+    twist = length**2 * third
+    return length**2 * seconds[0], twist, np.abs(twist), a.arc + length * GRID - near[0].arc

@@ -1,0 +1,107 @@
+"""Branches at random parameters of all models: special points and ends do not depend on the length of the steps."""
+
+import functools
+
+import numpy as np
+import pytest
+from random_branches import FREQUENCY, MODELS, random_branch
+from shared_systems import forced
+
+from saltus import ParameterError, continue_orbit, find_orbit
+from saltus.continuation import CurveEnd
+from saltus.orbits import RestingOrbit
+
+STEP = 0.1  # that of `continue_orbit`
+FEW = (4, 7, 9, 14, 19, 24, 29, 35, 36, 166, 306, 346)  # among them branches that cross others, and one that nearly meets one
+MANY = range(400, 600)
+
+
+@functools.cache
+def followed(seed, step):
+    """A branch at random parameters, followed with steps up to a length."""
+    orbit, path, bounds = random_branch(MODELS[seed % len(MODELS)], seed)
+    return continue_orbit(orbit, path, bounds, step=step)
+
+
+def same_specials(seed):
+    """That the special points and the ends of a branch are those that steps of a tenth of the length give."""
+    usual, fine = followed(seed, STEP), followed(seed, 0.1 * STEP)
+    kinds, parameters = ([[getattr(s, name) for s in b.special] for b in (usual, fine)] for name in ("kind", "parameter"))
+    assert kinds[0] == kinds[1], seed
+    assert parameters[0] == pytest.approx(parameters[1], rel=1e-8, abs=1e-8), seed
+    assert [end.reason for end in usual.ends] == [end.reason for end in fine.ends], seed
+    assert not usual.missed, seed
+    assert not fine.missed, seed
+
+
+def between_specials(seed):
+    """That the number of multipliers outside the unit circle changes at special points only."""
+    branch = followed(seed, STEP)
+    special = {id(zero.point.place) for zero in branch.special}  # the points may be turned the other way
+    count = None
+    for point in branch.points:
+        if id(point.place) in special or point.orbit.grazes:
+            count = None
+            continue
+        outside = np.count_nonzero(np.abs(point.orbit.multipliers) > 1.0)
+        assert count in (None, outside), seed
+        count = outside
+
+
+def ends_on_its_bounds(seed):
+    """That a branch within narrower bounds is a part of it: its ends are orbits of the wider one."""
+    whole, rng = followed(seed, STEP), np.random.default_rng(seed)
+    orbit, path, bounds = random_branch(MODELS[seed % len(MODELS)], seed)
+    value = orbit.system.get(path)
+    for _ in range(3):
+        low, high = bounds[0] + (value - bounds[0]) * rng.random(), value + (bounds[1] - value) * rng.random()
+        part = continue_orbit(orbit, path, (low, high))
+        for end, point in zip(part.ends, (part.points[0], part.points[-1]), strict=True):
+            if end.reason is CurveEnd.BOUND:
+                assert point.parameter in (low, high)
+                amplitudes = [other.amplitude for other in whole.at(point.parameter)]
+                assert min(abs(a - point.orbit.amplitude) for a in amplitudes) < 1e-8, seed
+
+
+@pytest.mark.parametrize("seed", FEW)
+def test_special_points_and_ends_do_not_depend_on_the_step(seed):
+    same_specials(seed)
+
+
+@pytest.mark.parametrize("seed", FEW)
+def test_stability_changes_at_special_points_only(seed):
+    between_specials(seed)
+
+
+@pytest.mark.parametrize("seed", FEW[:6])
+def test_ends_on_bounds_are_orbits_of_the_branch(seed):
+    ends_on_its_bounds(seed)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", MANY)
+def test_special_points_stability_and_ends_of_many_branches(seed):
+    if not isinstance(followed(seed, STEP).orbits[0], RestingOrbit):
+        same_specials(seed)
+    between_specials(seed)
+    ends_on_its_bounds(seed)
+
+
+def test_three_pairs_of_special_points_that_lie_within_one_step_each():
+    """On the main branch at Hhat = 0.2 two symmetry breakings each at 14 and at 10 impacts, and the two folds of the peak."""
+    orbit = find_orbit(forced(0.2), theta=0.3, parameters=(FREQUENCY,))
+    usual, fine = (continue_orbit(orbit, FREQUENCY, (0.1, 3.0), step=step) for step in (STEP, 0.1 * STEP))
+    assert [s.kind for s in usual.special] == [s.kind for s in fine.special]
+    assert len(usual.special) == 34
+    assert [s.parameter for s in usual.special] == pytest.approx([s.parameter for s in fine.special], rel=1e-9)
+    assert not usual.missed
+    found = {(s.kind, round(s.parameter, 6)) for s in usual.special}
+    by_a_third = {("BPC", 0.114447), ("BPC", 0.117331), ("BPC", 0.186265), ("BPC", 0.193136), ("LP", 0.832053), ("LP", 0.832054)}
+    assert by_a_third <= found  # as version 0.1 located them with steps of 0.03
+
+
+@pytest.mark.parametrize("step", [0.0, -0.1, float("nan"), float("inf"), 1e6, 1e-12, "0.1", None])
+def test_steps_that_lead_nowhere_are_refused(step):
+    orbit = find_orbit(forced(), theta=0.3, parameters=(FREQUENCY,))
+    with pytest.raises(ParameterError, match=r"^step must .*\[1e-06, 1\]"):
+        continue_orbit(orbit, FREQUENCY, (0.9, 1.1), step=step)
