@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from saltus.attractors import Unsettled
 from saltus.flow import find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, is_symmetric
-from saltus.studies.diagram.bands import Bands, Edge, EdgeKind
+from saltus.studies.diagram.bands import Band, Bands, Edge, EdgeKind
 from saltus.studies.diagram.chaos_search import Seed
 from saltus.systems import System
 
@@ -22,9 +23,14 @@ class EdgeSettings:
     beside: float = 1e-4
     # Largest distance, as a share of the range, of the period doubling of an orbit from the edge at which its cascade ends.
     cascade: float = 0.05
-    # Largest distance of the attractor from an unstable orbit that it touches, as a share of its size: chaos comes as near as its
-    # states are dense there.
+    # Largest distance of the attractor from an unstable orbit that it touches, as a share of its size: chaos comes as near as
+    # its states are dense. Within the band the distance is to be `grown` times that at the edge, at a depth of this share of the
+    # range or the middle of the band: the orbits within the attractor are near to it everywhere.
     touch: float = 0.02
+    grown: float = 3.0
+    depth: float = 0.005
+    longest_period: int = 3  # The longest period of unstable orbits that are compared, in forcing periods.
+    same_place: float = 1e-9  # Largest relative distance in the parameter at which an orbit is that of a special point.
     periods: int = 400  # Forcing periods for which motions of the chaos are followed to know its states.
 
 
@@ -35,12 +41,12 @@ def explained(system: System, chaos: Bands, branches: Sequence[Branch]) -> Bands
     """The bands with what happens at each edge, as far as the branches of the same diagram show it.
 
     A fold or a grazing at which motions lose their stability, in the bracket of the edge, is what happens there. A cascade ends
-    where motions beyond have 2^k times, k > 0, the period of an orbit whose doubling lies on that side. Where neither is, and
-    motions leave the attractor beyond, the distance of its states to the nearest unstable orbit at the inner value, at phase 0,
-    tells a crisis.
+    where motions beyond have 2^k times, k > 0, the period of an orbit whose doubling lies on that side. At a crisis motions leave
+    the attractor beyond the edge, and the attractor, which is away from an unstable orbit within the band, touches it there: the
+    distance is that of its states at phase 0.
     """
     look = _Evidence(system, chaos, branches)
-    bands = [replace(band, lower=look.of(band.lower), upper=look.of(band.upper)) for band in chaos.bands]
+    bands = [replace(band, lower=look.of(band, band.lower), upper=look.of(band, band.upper)) for band in chaos.bands]
     return replace(chaos, bands=tuple(bands))
 
 
@@ -52,18 +58,20 @@ class _Evidence:
         self.span = float(np.ptp(chaos.tried.values))
         self.special = turning_points(branches)
 
-    def of(self, edge: Edge) -> Edge:
+    def of(self, band: Band, edge: Edge) -> Edge:
         """The edge with its kind and the evidence for it."""
         if edge.kind is EdgeKind.BOUND:
             return edge
         special, kind = self._special(edge)
         if special is not None:
             return replace(edge, kind=kind, special=special.parameter)
-        if edge.kind is EdgeKind.UNDECIDED:
+        if self._verdict(edge.outer) is not Unsettled.TRANSIENT:
             return edge
-        distance = self._distance(edge)
-        kind = EdgeKind.CRISIS if distance <= SETTINGS.touch else EdgeKind.UNKNOWN
-        return replace(edge, kind=kind, distance=distance)
+        distance = self._touched(band, edge)
+        return replace(edge, distance=distance, kind=EdgeKind.CRISIS if distance <= SETTINGS.touch else edge.kind)
+
+    def _verdict(self, value: float) -> Unsettled:
+        return Unsettled(self.chaos.tried.verdict[np.searchsorted(self.chaos.tried.values, value)])
 
     def _special(self, edge: Edge) -> tuple[SpecialPoint | None, EdgeKind]:
         """The special point that shows what happens at an edge, with what that is."""
@@ -85,37 +93,64 @@ class _Evidence:
         return nearest, EdgeKind.CASCADE
 
     def _period_beyond(self, edge: Edge) -> int:
-        """The longest period that motions have at the first value beyond an edge."""
-        tried = self.chaos.tried
-        return int(tried.period[np.searchsorted(tried.values, edge.outer)])
+        """The longest period that motions have at the first value beyond an edge at which there is a verdict."""
+        tried, i = self.chaos.tried, int(np.searchsorted(self.chaos.tried.values, edge.outer))
+        step = 1 if edge.outer > edge.inner else -1
+        while 0 <= i < len(tried.values) and abs(tried.values[i] - edge.inner) <= 10.0 * SETTINGS.beside * self.span:
+            if tried.verdict[i] == Unsettled.PERIODIC:
+                return int(tried.period[i])
+            i += step
+        return 0
 
-    def _distance(self, edge: Edge) -> float:
-        """The distance of the chaos at the inner value from the nearest unstable orbit, by its size; nan where there is none."""
+    def _touched(self, band: Band, edge: Edge) -> float:
+        """The distance of the attractor to the unstable orbit that it touches at an edge, and not within; nan without such."""
+        tried, span = self.chaos.tried, band.high - band.low
+        toward = np.sign(edge.inner - edge.outer) * min(SETTINGS.depth * self.span, 0.5 * span)
+        inside = np.flatnonzero(tried.chaotic & (tried.values >= band.low) & (tried.values <= band.high))
+        within = float(tried.values[inside[np.abs(tried.values[inside] - edge.inner - toward).argmin()]])
+        here, there = self._attractor(edge.inner), self._attractor(within)
+        best = float("nan")
+        for branch in self.branches:
+            distance = _distance(here, branch, edge.inner)
+            if distance <= SETTINGS.touch and _distance(there, branch, within) >= SETTINGS.grown * distance:
+                best = float(np.fmin(best, distance))
+        return best
+
+    def _attractor(self, value: float) -> np.ndarray:
+        """States of the chaos at a value that was tried, at phase 0, (n, 2)."""
         tried = self.chaos.tried
-        begin = tried.states[np.searchsorted(tried.values, edge.inner)]
+        begin = tried.states[np.searchsorted(tried.values, value)]
         begin = begin[np.isfinite(begin).all(axis=1)]
-        parameters = {self.chaos.path: np.full(len(begin), edge.inner)}
+        parameters = {self.chaos.path: np.full(len(begin), value)}
         states = find_recurrence(self.system, begin, SETTINGS.periods, parameters=parameters).states.reshape(-1, 2)
-        states = states[np.isfinite(states).all(axis=1)]
-        orbits = [orbit for branch in self.branches for orbit in _unstable_at(branch, edge.inner)]
-        if not orbits:
-            return float("nan")
-        points = np.concatenate([_section(orbit) for orbit in orbits])
-        size = np.ptp(states, axis=0)
-        return float(min(np.linalg.norm((states - point) / size, axis=1).min() for point in points))
+        return np.asarray(states[np.isfinite(states).all(axis=1)])
+
+
+def _distance(states: np.ndarray, branch: Branch, value: float) -> float:
+    """The least distance, by the size of the attractor, of its states to the unstable orbits of a branch; inf without these."""
+    orbits = _unstable_at(branch, value)
+    if not orbits:
+        return np.inf
+    points = np.concatenate([_section(orbit) for orbit in orbits])
+    size = np.ptp(states, axis=0)
+    return float(min(np.linalg.norm((states - point) / size, axis=1).min() for point in points))
 
 
 def turning_points(branches: Sequence[Branch]) -> list[SpecialPoint]:
-    """The special points at which motions lose their stability or end."""
-    found = []
-    for branch in branches:
-        places = {id(point): i for i, point in enumerate(branch.points)}
-        for special in branch.special:
-            i = places.get(id(special.point))
-            beside = [] if i is None else [branch.points[j].orbit.stable for j in (i - 1, i + 1) if 0 <= j < len(branch.points)]
-            if any(beside) and not (len(beside) == 2 and all(beside)):
-                found.append(special)
-    return found
+    """The special points at which motions lose their stability or end: beside them some orbits are stable, not all."""
+    return [special for branch in branches for special in branch.special if _turns(branch, special)]
+
+
+def _turns(branch: Branch, special: SpecialPoint) -> bool:
+    """Whether stability changes, or ends with the branch, at a special point; orbits at the point itself do not count."""
+    away = np.abs(branch.parameters - special.parameter)
+    apart = away + np.abs(branch.amplitudes - special.amplitude)
+    nearest = int(apart.argmin())
+    there = away > SETTINGS.same_place * max(1.0, abs(special.parameter))
+    below = np.flatnonzero(there[:nearest])[-1:]
+    above = nearest + np.flatnonzero(there[nearest:])[:1]
+    beside = branch.stable[np.concatenate([below, above])]
+    return bool(beside.any()) and not (len(beside) == 2 and bool(beside.all()))
 
 
 def seeds_of(branches: Sequence[Branch]) -> list[Seed]:
@@ -131,7 +166,8 @@ def _is_doubled(period: int, base: int) -> bool:
 
 def _unstable_at(branch: Branch, value: float) -> list[PeriodicOrbit]:
     """The unstable orbits of a branch at a value, where it has any."""
-    if not branch.parameters.min() <= value <= branch.parameters.max() or branch.stable.all():
+    unseen = not branch.parameters.min() <= value <= branch.parameters.max() or branch.stable.all()
+    if unseen or branch.points[0].orbit.period > SETTINGS.longest_period:
         return []
     return [orbit for orbit in branch.at(value) if orbit.admissible and not orbit.stable]
 

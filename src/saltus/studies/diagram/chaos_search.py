@@ -26,6 +26,9 @@ class ChaosSettings:
 
     settling: int = 300  # Forcing periods that a motion is given to come to rest or to repeat itself.
     step: float = 1e-3  # Share of the range to which intervals are halved in which something changes, or with chaos at an end.
+    # The same where motions have longer periods than this: cascades and narrow bands are near.
+    fine_step: float = 3e-4
+    long_period: int = 6
     edge: float = 1e-4  # Share of the range to which the bracket of an edge is halved.
     # States of the chaos at one end of an interval, and motions that have settled there, from which motions are begun within.
     seeds: int = 2
@@ -34,14 +37,17 @@ class ChaosSettings:
     # Shares of the range beside a special point at which motions from its orbit are begun: narrow bands begin there.
     beside: tuple[float, ...] = (-4e-4, -1.5e-4, 1.5e-4, 4e-4)
     # Judgements of rising care. The first one is made at all values, and excludes lives below 660 forcing periods; the second one
-    # at edges and at some values between them (6600). The third one is made where companions settled at any of these (60 000).
+    # at edges and at some values between them (6600). The third one is made at these where companions settled at one of a band,
+    # and at edges beside which transients are long (33 000).
     judgements: tuple[JudgementSettings, ...] = (
         replace(JUDGEMENT, companions=8, exposure=2000, round_periods=500, rounds=2),
         replace(JUDGEMENT, companions=16, exposure=20_000),
-        replace(JUDGEMENT, exposure=180_000, rounds=9),
+        replace(JUDGEMENT, exposure=100_000, rounds=8),
     )
     every: float = 0.02  # Share of the range in which each band has a value that is judged with care.
-    near: float = 0.003  # Share of the range about a value that fails the careful judgement in which all others are judged so.
+    # Share of the range about a value that fails a careful judgement in which all others are judged so; it doubles every round.
+    near: float = 0.003
+    lasting: float = 1000.0  # Mean life, in forcing periods, from which transients beside a band are long.
     confirmations: int = 20  # The largest number of rounds in which edges are located and confirmed.
 
 
@@ -107,7 +113,8 @@ def chaotic_bands(
     """
     values, area = np.linspace(*bounds, count), check_window(window, system)
     states = starts_at(system, values, starts, area, seed).reshape(-1, 2)
-    begun = simulate_from(system, path, np.repeat(values, starts), states, SETTINGS.settling, part_of(progress, 0.0, 0.2))
+    first = part_of(progress, 0.0, 0.2, "looking for chaos")
+    begun = simulate_from(system, path, np.repeat(values, starts), states, SETTINGS.settling, first)
     return resolve_bands(system, path, bounds, begun, special, progress=part_of(progress, 0.2, 1.0))[0]
 
 
@@ -165,6 +172,11 @@ class _Place:
     def kinds(self) -> set[tuple[int, int]]:
         """Period and impacts of the motions that have settled."""
         return {orbit[:2] for orbit in self.orbits}
+
+    @property
+    def longest(self) -> int:
+        """The longest period of what settles, in forcing periods."""
+        return max(self.period, *(orbit[0] for orbit in self.orbits), 0)
 
     def judge(self, judged: Judged, row: int, care: int) -> None:
         """Take an answer about what is unsettled here; a more careful one replaces what was thought before."""
@@ -267,19 +279,22 @@ class _BandSearch:
 
     def refine(self) -> None:
         """Halve intervals in which something changes, or in which there is chaos, as long as they are wide."""
-        widest = self.settings.step * self.span
         while True:
-            pairs = [(a, b) for a, b in pairwise(self.places) if b.value - a.value > widest and self._is_of_interest(a, b)]
+            pairs = [(a, b) for a, b in pairwise(self.places) if self._is_of_interest(a, b)]
             if not pairs:
                 return
             self._begin_between(pairs)
             self.spread()
 
     def _is_of_interest(self, a: _Place, b: _Place) -> bool:
-        """Whether chaos may begin, end or pause between two neighbouring values."""
+        """Whether chaos may begin, end or pause between two neighbouring values, and they are not near to one another yet."""
+        width = (b.value - a.value) / self.span
+        if width <= self.settings.step:
+            near_chaos = not (a.chaotic and b.chaotic) and max(a.longest, b.longest) > self.settings.long_period
+            return near_chaos and width > self.settings.fine_step
         inside = bisect_left(self.special, a.value, key=lambda seed: seed.value)
         special = inside < len(self.special) and self.special[inside].value <= b.value
-        return special or a.kinds != b.kinds or {a.verdict, b.verdict} != {Unsettled.PERIODIC}
+        return special or a.kinds != b.kinds or bool(len(a.chaos) + len(b.chaos))
 
     def _begin_between(self, pairs: Sequence[tuple[_Place, _Place]], care: int = 0) -> None:
         """Motions at the middles of intervals, begun on those at both ends."""
@@ -291,19 +306,19 @@ class _BandSearch:
 
     def locate_edges(self) -> None:
         """Halve the brackets of all edges and judge their chaotic sides with care; where these are none, those near them, too."""
-        for _ in range(self.settings.confirmations):
+        for i in range(self.settings.confirmations):
             self._halve()
             runs = [(run, self._some_of(run)) for run in self._runs()]
             failed = self._confirm((place for _, some in runs for place in some), 1)
-            leaving = [some for _, some in runs if any(place.settled for place in some if place.chaotic)]
-            failed += self._confirm((place for some in leaving for place in some), 2)
+            leaving = [a for a, b in self._edges() if b.life >= self.settings.lasting]
+            leaving += [place for _, some in runs if any(p.settled for p in some if p.chaotic) for place in some]
+            failed += self._confirm(leaving, 2)
             if not failed:
                 return
-            self._confirm_near(failed)
+            self._confirm_near(failed, self.settings.near * self.span * 2.0**i)
 
-    def _confirm_near(self, failed: list[_Place]) -> None:
+    def _confirm_near(self, failed: list[_Place], reach: float) -> None:
         """Judge all chaos near values that have turned out to have none as these were judged."""
-        reach = self.settings.near * self.span
         for care in {place.care for place in failed}:
             values = np.array([place.value for place in failed if place.care == care])
             self._confirm((place for place in self.places if np.abs(values - place.value).min() <= reach), care)
@@ -357,7 +372,7 @@ class _BandSearch:
             exponent=np.array([place.exponent for place in self.places]),
             error=np.array([place.error for place in self.places]),
             life=np.array([place.life for place in self.places]),
-            period=np.array([max((orbit[0] for orbit in place.orbits), default=place.period) for place in self.places]),
+            period=np.array([place.longest for place in self.places]),
             states=states,
         )
 
