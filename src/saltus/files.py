@@ -19,6 +19,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
+from saltus.checks import check_memory
 from saltus.errors import ParameterError
 
 PART = ".part"
@@ -129,9 +130,13 @@ def read_dataset(path: Path | str) -> Any:
     content = checked_content(path)
     try:
         with xarray.open_datatree(io.BytesIO(content), engine="h5netcdf") as tree:
-            for node in tree.subtree:  # not `tree.load()`, which leaves a variable lazy that has the name of a child of the root
-                for variable in node.variables.values():
-                    variable.load()
+            variables = [variable for node in tree.subtree for variable in node.variables.values()]
+            size = float(sum(variable.nbytes for variable in variables))
+            check_memory(str(path), size, "its arrays")  # which may be larger than the file
+            for variable in variables:  # not `tree.load()`, which leaves one lazy that has the name of a child of the root
+                variable.load()
+    except ParameterError:
+        raise
     except Exception as error:  # h5netcdf, HDF5 and xarray have many ways to say so
         with _without_unraisable():
             traceback.clear_frames(error.__traceback__)

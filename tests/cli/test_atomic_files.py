@@ -191,6 +191,18 @@ def test_a_folder_without_permission_is_refused(tmp_path, monkeypatch):
         check_writable(tmp_path / "a")
 
 
+def test_a_size_that_a_file_claims_is_not_allocated(tmp_path):
+    """A file of a few kilobytes whose array has never been written, and is of 8 TB if one believes it."""
+    import h5netcdf
+
+    with h5netcdf.File(tmp_path / "vast.nc", "w") as file:
+        file.dimensions = {"x": 10**6, "y": 10**6}
+        file.create_variable("wave", ("x", "y"), "f8", chunks=(1000, 1000))
+    assert (tmp_path / "vast.nc").stat().st_size < 100_000
+    with pytest.raises(ParameterError, match=r"vast\.nc is too large: its arrays need about 8e\+03 GB of memory, and"):
+        read_dataset(tmp_path / "vast.nc")
+
+
 def test_what_has_no_end_is_not_read(tmp_path):
     with pytest.raises(ParameterError, match="/dev/zero is no file that can be read"):
         read_dataset("/dev/zero")

@@ -1,5 +1,7 @@
 """Bad studies: one sentence with the file, the line and the key, what was wrong and what would be right."""
 
+import os
+
 import pytest
 
 from saltus.config import load_study
@@ -58,7 +60,11 @@ CASES = {
     "huge": (MODEL + f"damping = {10**400}\n", ", line 4", "model.damping must be a finite number, got a very large number"),
     "smoothing": (MODEL + "smoothing = 100\nmass_ratio = 1\n", ", line 4", "model.smoothing is for symmetric layers only"),
     "e": (MODEL + '[impact]\ntype = "VelocityReduction"\ne = 1.2\n', ", line 6", "impact.e must lie in [0, 1], got 1.2"),
-    "impact_type": (MODEL + '[impact]\ntype = "Newton"\n', ", line 5", "EnergyRestitution, InelasticImpact, VelocityReduction"),
+    "impact_type": (
+        MODEL + '[impact]\ntype = "Hertz"\n',
+        ", line 5",
+        "EnergyRestitution, InelasticImpact, NewtonImpact, VelocityReduction",
+    ),
     "channel": (MODEL + "[load]\nvertcal = 1\n", ", line 5", "Metainterface does not read load.vertcal; did you mean 'vertical'"),
     "channel_dunder": (MODEL + "[load]\n__class__ = 1\n", ", line 5", 'load has no channel "__class__"'),
     "channel_dotted": (
@@ -112,6 +118,18 @@ def test_a_bad_study_is_refused_in_one_sentence(tmp_path, name):
     message = refusal(tmp_path, text)
     assert message.startswith(f"{place}: ")
     assert problem in message
+
+
+def test_what_is_no_study_is_not_read(tmp_path):
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "large.toml").write_bytes(b"#" * 10_000_001)
+    for path, problem in (
+        ("/dev/zero", "is no file"),
+        (tmp_path / "pipe.toml", "is no file"),
+        (tmp_path / "large.toml", "10000001 bytes"),
+    ):
+        with pytest.raises(ParameterError, match=problem):
+            load_study(path)
 
 
 RECORDS = {

@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import random
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from saltus.taylor import cache
 from saltus.taylor.cache import cache_directory, load_module
+from saltus.taylor.private_numba import _sound
 
 SOURCE = """
 from numba import types
@@ -114,6 +116,22 @@ def test_damaged_compiled_code_is_made_again_with_a_remark(home, change):
         assert f"{path} is damaged" in remarks
     assert run(home) == (6.0, "")
     assert not (home / "planted").exists()
+
+
+def test_any_flipped_bit_of_compiled_code_is_noticed(home, caplog):
+    """2000 bits of compiled code and of its index, each alone."""
+    load_module("safety", SOURCE)
+    rng = random.Random(0)
+    for path in [*cache_directory().rglob("*.nbc"), *cache_directory().rglob("*.nbi")]:
+        content = path.read_bytes()
+        assert _sound(str(path))
+        for _ in range(1000):
+            place, flipped = rng.randrange(8 * len(content)), bytearray(content)
+            flipped[place // 8] ^= 1 << place % 8
+            path.write_bytes(flipped)
+            assert not _sound(str(path))
+            assert not path.exists()
+    del sys.modules[cache.module_name("safety", SOURCE)]
 
 
 class Planted:

@@ -82,10 +82,12 @@ def open_result(path: Path) -> Any:
 
 def _open_store(path: Path) -> Any:
     """The dataset of a complete sweep."""
+    from saltus.checks import check_memory
     from saltus.sweep import open_store, read_plan
 
     read_plan(path)
     data = open_store(path)
+    check_memory(str(path), float(data.nbytes), "its arrays")
     if kind_of(data) == "basin_cells":
         raise ParameterError(f"{path} keeps the cells of basins alone; plot {path.with_suffix('.nc').name} beside it")
     return data

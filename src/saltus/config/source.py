@@ -13,6 +13,8 @@ from saltus.errors import ParameterError
 
 Keys = tuple[str, ...]
 
+LARGEST = 10_000_000  # bytes of a study: a file that is larger is another one
+
 BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 BARE = re.compile(r"[^\s,\]\}#=.\"']+")
 SCALAR = re.compile(r"[^\n,\]\}#]+")
@@ -52,7 +54,15 @@ def read_source(path: Path) -> tuple[Source, dict[str, Any]]:
     """
     source = Source(path)
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):  # a device or a pipe may have no end
+            source.refuse((), "is no file; give the path of a study in TOML")
+        if path.is_file() and path.stat().st_size > LARGEST:
+            source.refuse(
+                (), f"has {path.stat().st_size} bytes; a study has at most {LARGEST}, long records have files of their own"
+            )
         text = path.read_text(encoding="utf-8-sig")
+    except ParameterError:
+        raise
     except FileNotFoundError:
         source.refuse((), "there is no such file; give the path of a study in TOML")
     except IsADirectoryError:

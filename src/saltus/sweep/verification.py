@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from saltus.checks import LIMITS, free_memory
 from saltus.sweep import store_files as files
 from saltus.sweep.chunk_grid import ChunkGrid, Index
+
+AT_ONCE = 256e6  # bytes that are read together, which is faster than chunk by chunk
 
 
 def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, int]) -> Iterator[tuple[str, Index]]:
@@ -22,7 +26,7 @@ def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, 
     for name, count in extra.items():
         for row in range(chunks.grid[0]):
             rows = chunks.slices((row, *(0 for _ in chunks.grid[1:])))[0]
-            if _can_be_read(arrays[name], (rows,)):
+            if _row_size(arrays[name], rows) < AT_ONCE and _can_be_read(arrays[name], (rows,)):
                 continue
             for index in chunks.indices():
                 there = index[0] == row and files.chunk_file(path, name, index, count).exists()
@@ -30,7 +34,14 @@ def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, 
                     yield name, index
 
 
+def _row_size(array: Any, rows: slice) -> float:
+    """The bytes of some rows, by what the array says of itself."""
+    return float(rows.stop - rows.start) * math.prod(map(float, array.shape[1:])) * array.dtype.itemsize
+
+
 def _can_be_read(array: Any, cut: tuple[slice, ...]) -> bool:
+    if math.prod(map(float, array.chunks)) * array.dtype.itemsize > LIMITS.memory * free_memory():
+        return False  # what a file says of itself is not a size to allocate
     try:
         array[cut]
     except Exception:  # what is wrong is said by Zarr, by its codecs or by the system
