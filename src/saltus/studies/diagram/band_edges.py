@@ -23,6 +23,7 @@ class EdgeSettings:
     beside: float = 1e-4
     # Largest distance, as a share of the range, of the period doubling of an orbit from the edge at which its cascade ends.
     cascade: float = 0.05
+    nearest: int = 4  # Number of the values next to an edge of which the first one with regular motion gives their period.
     # Largest distance of the attractor from an unstable orbit that it touches, as a share of its size: chaos comes as near as
     # its states are dense. Within the band the distance is to be `grown` times that at the edge, at a depth of this share of the
     # range or the middle of the band: the orbits within the attractor are near to it everywhere.
@@ -93,14 +94,11 @@ class _Evidence:
         return nearest, EdgeKind.CASCADE
 
     def _period_beyond(self, edge: Edge) -> int:
-        """The longest period that motions have at the first value beyond an edge at which there is a verdict."""
-        tried, i = self.chaos.tried, int(np.searchsorted(self.chaos.tried.values, edge.outer))
+        """The longest period of motions at the first of the nearest values beyond an edge at which they are regular."""
+        tried, first = self.chaos.tried, int(np.searchsorted(self.chaos.tried.values, edge.outer))
         step = 1 if edge.outer > edge.inner else -1
-        while 0 <= i < len(tried.values) and abs(tried.values[i] - edge.inner) <= 10.0 * SETTINGS.beside * self.span:
-            if tried.verdict[i] == Unsettled.PERIODIC:
-                return int(tried.period[i])
-            i += step
-        return 0
+        nearest = [i for i in range(first, first + SETTINGS.nearest * step, step) if 0 <= i < len(tried.values)]
+        return next((int(tried.period[i]) for i in nearest if tried.verdict[i] == Unsettled.PERIODIC and tried.period[i] > 0), 0)
 
     def _touched(self, band: Band, edge: Edge) -> float:
         """The distance of the attractor to the unstable orbit that it touches at an edge, and not within; nan without such."""
