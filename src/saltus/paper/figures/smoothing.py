@@ -311,7 +311,24 @@ def _draw_work(ax: Any, work: Any) -> None:
 
 def measure(data: Any) -> dict[str, Measured]:
     """What the paper says of the smoothing, and what it changes."""
-    return {**_accuracy(data["features"], data["confirmed"]), **_kinds(data), **_cost(data["work"])}
+    found = {**_accuracy(data["features"], data["confirmed"]), **_kinds(data), **_cost(data["work"])}
+    return found | {"abstract-branch-point": _branch_point(data["exact"], data["broken"])}
+
+
+def _branch_point(exact: Any, broken: Any) -> Measured:
+    """A symmetry breaking at which the stability of the symmetric orbits changes, with unsymmetric stable ones beside it."""
+    here = exact["kind"].values == "BPC"
+    place = float(exact["special_parameter"].values[here][0]) if here.any() else math.nan
+    near = abs(exact["parameter"].values - place)
+    first, second = (exact["stable"].values[np.where(side, near, np.inf).argmin()] for side in _sides(exact, place))
+    uneven = np.where(broken["stable"].values, abs(broken["highest"].values + broken["lowest"].values), 0.0)
+    apart = float(uneven.max())
+    return measured(bool(first != second and apart > 1e-3), place=place, apart=apart)
+
+
+def _sides(branch: Any, place: float) -> tuple[np.ndarray, np.ndarray]:
+    frequency = branch["parameter"].values
+    return frequency < place, frequency > place
 
 
 def _accuracy(features: Any, confirmed: Any) -> dict[str, Measured]:
