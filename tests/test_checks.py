@@ -1,9 +1,13 @@
 """Refusals that many functions share name the function, the argument, and what would be right."""
 
 import inspect
+import math
 import pickle
+from decimal import Decimal
 from enum import StrEnum
+from fractions import Fraction
 
+import numpy as np
 import pytest
 
 import saltus
@@ -139,3 +143,48 @@ def test_memory_and_work_are_estimated(monkeypatch):
 
 def test_the_free_memory_is_told():
     assert 1e6 < free_memory() < 1e15
+
+
+# --- one argument that does not fit, the others as they should be ------------------------------------------------------------
+
+UNFIT = (
+    *(None, "x", "", b"x", -1, 0.5, math.nan, math.inf, 10**30, 1j, [], {}, (), [1, 2, 3], ["a"], [[]], [None], {"a": 1}, {1.0}),
+    *(np.array([]), np.zeros((2, 2)), np.array(["a"]), np.array(0.3), object(), len, int, Fraction(1, 3), Decimal(1), range(3)),
+)
+FORCED = SYSTEM.with_({"load.horizontal": saltus.Harmonic(0.3), "load.vertical": -0.5, "model.damping": 0.1})
+
+
+def methods():
+    """Public methods, classes and functions with arguments that fit, by what is called."""
+    motion, orbit = saltus.simulate(FORCED, theta=0.3, periods=2), saltus.find_orbit(FORCED, theta=0.1)
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.99, 1.01))
+    return {
+        "System.with_": (FORCED.with_, {"changes": {"load.frequency": 1.0}}),
+        "System.get": (FORCED.get, {"path": "load.frequency"}),
+        "System": (saltus.System, {"model": FORCED.model, "load": FORCED.load, "impact": FORCED.impact}),
+        "Record": (saltus.Record, {"time": [0.0, 1.0], "value": [0.0, 1.0], "quantity": "force", "scale": 1.0, "source": ""}),
+        "Harmonic": (saltus.Harmonic, {"amplitude": 0.1, "mean": 0.0, "phase": 0.0, "order": 1}),
+        "Load": (saltus.Load, {"frequency": 1.0, "horizontal": 0.1}),
+        "Motion.at": (lambda times: motion.at(times), {"times": 1.0}),
+        "Motion.to_xarray": (motion.to_xarray, {"times": [1.0]}),
+        "Branch.at": (branch.at, {"value": 1.0}),
+        "is_symmetric": (saltus.orbits.is_symmetric, {"system": FORCED}),
+        "load_releases": (saltus.flow.load_releases, {"system": FORCED}),
+        "defects": (saltus.orbits.defects, {"orbits": [orbit]}),
+        "simulate": (saltus.simulate, {"system": FORCED, "theta": 0.3, "periods": 1, "stop_at": (), "tol": 1e-10}),
+        "sensitivities": (saltus.sensitivities, {"system": FORCED, "theta": 0.3, "periods": 1, "parameters": ()}),
+    }
+
+
+def test_one_argument_that_does_not_fit_is_answered_by_a_sentence_or_meant():
+    wrong = []
+    for name, (function, fitting) in methods().items():
+        for argument in fitting:
+            for unfit in UNFIT:
+                try:
+                    function(**{**fitting, argument: unfit})
+                except SaltusError as refusal:
+                    wrong += [] if len(str(refusal)) < 400 else [(name, argument, unfit, "a long sentence")]
+                except Exception as error:
+                    wrong.append((name, argument, unfit, repr(error)))
+    assert not wrong

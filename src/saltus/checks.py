@@ -296,6 +296,36 @@ def check_window(window: Any, system: System) -> Window:
     return Window(*map(tuple, bounds.tolist()))
 
 
+def check_names(name: str, values: Any, meaning: str) -> tuple[str, ...]:
+    """The texts of a list, or a single one.
+
+    Raises:
+        ParameterError: with the name, for what is neither; `meaning` says of what they are the names.
+    """
+    try:
+        texts = (values,) if isinstance(values, str) else tuple(values)
+    except TypeError:
+        texts = (None,)
+    if not all(isinstance(text, str) for text in texts):
+        raise ParameterError(f"{name} must be the names of {meaning}, got {shown(values)}", name)
+    return texts
+
+
+def instants(times: Any) -> np.ndarray:
+    """A time or a list of times as an array (n,).
+
+    Raises:
+        ParameterError: what is neither.
+    """
+    try:
+        asked = np.atleast_1d(np.asarray(times, dtype=float))
+    except (TypeError, ValueError):
+        raise ParameterError(f"times must be a number or an array of numbers, got {shown(times)}", "times") from None
+    if asked.ndim > 1:
+        raise ParameterError(f"times must be a number or a list of numbers, got an array of shape {asked.shape}", "times")
+    return asked
+
+
 def check_states(name: str, states: Any) -> np.ndarray:
     """States (coordinate, velocity) as an array (n, 2).
 

@@ -153,6 +153,8 @@ def fits(value: Any, hint: Any) -> bool:
             isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu"
         )
     if origin in (Iterable, np.ndarray, list, tuple) or hint is np.ndarray:
+        if isinstance(value, np.ndarray) and value.ndim == 0 and origin in (Iterable, list, tuple):
+            return False
         numeric = hint is np.ndarray or origin is np.ndarray or (parts[:1] == (float,))
         return not isinstance(value, (str, bytes)) and isinstance(value, Iterable) and not (numeric and not _is_numeric(value))
     if isinstance(origin, type) or isinstance(hint, type):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.systems import System
+from saltus.systems import System, check_system
 
 RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: the contact acceleration has no narrower peak
 
@@ -39,6 +39,7 @@ def load_releases(system: System) -> tuple[Release, ...]:
     For load (i) of the metainterface with equal layers those of side +1 are at sin(Omega t) = Hcr / Hhat, with
     Hcr = abs(V / tan(beta0)), and those of side -1 half a period later.
     """
+    check_system(system, "load_releases")
     if system.load.period is None:
         return ()
     found = [release for side in system.model.sides for release in _of_side(system, side)]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
 
+from saltus.checks import instants
 from saltus.errors import ParameterError
 from saltus.flow.dense_output import DenseOutput
 from saltus.flow.stops import Stop
@@ -176,13 +177,7 @@ class Motion:
         Raises:
             ParameterError: a time outside the motion, or a motion computed with dense=False.
         """
-        try:
-            asked = np.atleast_1d(np.asarray(times, dtype=float))
-        except (TypeError, ValueError):
-            raise ParameterError(f"times must be a number or an array of numbers, got {times!r}", "times") from None
-        if asked.ndim > 1:
-            raise ParameterError(f"times must be a number or a list of numbers, got an array of shape {asked.shape}", "times")
-        position, velocity, _ = self._states(asked)
+        position, velocity, _ = self._states(instants(times))
         if len(self.system.model.coordinates) == 1:
             position, velocity = position[0], velocity[0]
         if np.ndim(times) == 0:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import instants
 from saltus.provenance import provenance
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
     if times is None and motion.samples is not None:
         times, position, velocity, side = (getattr(motion.samples, n) for n in ("time", "position", "velocity", "side"))
     else:
-        times = _default_times(motion, period) if times is None else np.atleast_1d(np.asarray(times, dtype=float))
+        times = _default_times(motion, period) if times is None else instants(times)
         position, velocity, side = motion._states(times)
     names = motion.system.model.coordinates
     dataset = xarray.Dataset(coords={"time": ("time", times, {"units": "1", "long_name": "dimensionless time tau"})})

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError
+from saltus.checks import check_names
 from saltus.flow.kernel_layout import GrazingDetail
 from saltus.flow.memory_layout import RestDetail
 from saltus.flow.motion import EventKind, Motion
@@ -119,12 +119,7 @@ def sensitivities(
 def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
     """The parameters to differentiate to, of a system whose motion has derivatives here."""
     check_system(system, "sensitivities")
-    try:
-        return (parameters,) if isinstance(parameters, str) else tuple(parameters)
-    except TypeError:
-        raise ParameterError(
-            f"parameters must be dotted paths, such as ['load.frequency'], got {parameters!r}", "parameters"
-        ) from None
+    return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
 
 
 def _end_shift(followed: Followed, paths: tuple[str, ...], periods: float | None) -> np.ndarray:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_names
 from saltus.errors import ParameterError
 from saltus.flow.compiled import Structure, load_structure
 from saltus.systems import Record, System, children, is_number, numbers
@@ -87,12 +88,7 @@ def _outside(cls: type) -> tuple[tuple[Mapping[str, Any], str], ...]:
 
 def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
     """The margins that end a motion: the model's own stops and those asked for."""
-    try:
-        return tuple(dict.fromkeys((*system.model.stops, *([stop_at] if isinstance(stop_at, str) else stop_at))))
-    except TypeError:
-        raise ParameterError(
-            f"stop_at must be the names of margins, such as ['kinematic_limit'], got {stop_at!r}", "stop_at"
-        ) from None
+    return tuple(dict.fromkeys((*system.model.stops, *check_names("stop_at", stop_at, "margins, such as ['kinematic_limit']"))))
 
 
 def taylor_order(tol: float) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from saltus.checks import check_number
 from saltus.continuation import Course, End
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.special_point import OrbitEnd
@@ -45,7 +46,12 @@ class Branch(Course):
         return np.array([point.orbit.stable for point in self.points])
 
     def at(self, value: float) -> list[PeriodicOrbit]:
-        """All orbits of the branch at a value of the parameter, solved there."""
+        """All orbits of the branch at a value of the parameter, solved there.
+
+        Raises:
+            ParameterError: what is no finite number.
+        """
+        check_number("value", value)
         return [point.orbit for point in self.solved_at(value)]
 
     def to_xarray(self) -> xarray.Dataset:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_count, check_path
+from saltus.checks import check_count, check_names, check_path
 from saltus.errors import MotionError, ParameterError, near, shown
 from saltus.flow import (
     RECURRENCE,
@@ -101,7 +101,7 @@ def _check(system: System, parameters: Iterable[str], coordinates: Mapping[str, 
         if name not in names:
             hint = near(name, names, ("velocity", "parameters", *counts))
             raise ParameterError(f"{type(system.model).__name__} has no coordinate {shown(name)}; {hint}", name)
-    for path in parameters:
+    for path in check_names("parameters", parameters, "parameters, such as ('load.frequency',)"):
         check_path(system, path, "parameters")
 
 

@@ -96,10 +96,14 @@ def search_orbits(
     """
     check_system(system, "search_orbits", coordinates=1)
     check_count("max_period", max_period, 1)
+    if repelling is not None:
+        check_count("repelling", repelling, 0)
     check_starts(starts)
     check_count("seed", seed, 0)
     check_path(system, path)
-    area, grid = check_window(window, system), np.atleast_1d(np.asarray(list(values), dtype=float))
+    area = check_window(window, system)
+    listed = list(values) if isinstance(values, Iterable) and not isinstance(values, np.ndarray) else values
+    grid = np.atleast_1d(np.asarray(listed, dtype=float))
     if not grid.size or not np.isfinite(grid).all():
         raise ParameterError(f"values must be numbers of {path} at which to search, got {grid.tolist()}", "values")
     early, late = _follow(system, path, grid, initial_states(system, starts, area, seed), max_period)

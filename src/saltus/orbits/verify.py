@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_count, check_kind
 from saltus.flow import simulate_many
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.tolerances import TOLERANCES
+from saltus.public_functions import answered
 
 
 def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> bool:
@@ -24,15 +26,19 @@ def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> boo
     return bool(np.abs(np.sort(a.speeds) - np.sort(b.speeds)).max() < TOLERANCES.same_orbit)
 
 
+@answered
 def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) -> np.ndarray:
     """The distance of each orbit's state from itself after so many of its periods, by the event-driven flow, (n,).
 
-    All must belong to one system but for its parameters along their common path. A motion that starts after its first impact
-    ends with that impact, before or after it as rounding decides: the nearer counts.
+    All must belong to one system but for its parameters along their common path, if they have one. A motion that starts after its
+    first impact ends with that impact, before or after it as rounding decides: the nearer counts.
 
     Raises:
-        ValueError: orbits of different paths.
+        ParameterError: what is no orbit.
     """
+    for orbit in orbits:
+        check_kind("orbits", orbit, PeriodicOrbit, source="find_orbit or search_orbits")
+    check_count("rounds", rounds, 1)
     result = np.full(len(orbits), np.inf)
     groups: dict[int, list[int]] = {}
     for i, orbit in enumerate(orbits):
@@ -44,17 +50,15 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
 
 def _defects(orbits: list[PeriodicOrbit], periods: int, tol: float) -> np.ndarray:
     problem = orbits[0].problem
-    system, (path, *_) = problem.system, problem.paths
+    system, values = problem.system, np.array([orbit.solution.values for orbit in orbits])
     names = system.model.coordinates
     starts = [orbit.start() for orbit in orbits]
-    values = np.array([orbit.solution.values[0] for orbit in orbits])
     begin: dict[str, Any] = {name: np.array([start[name] for start in starts], dtype=float) for name in names}
     velocity: Any = np.array([start["velocity"] for start in starts], dtype=float)
     times = np.array([start.get("time", 0.0) for start in starts])
     columns = velocity if velocity.ndim == 1 else tuple(velocity.T)
-    result = simulate_many(
-        system, **begin, velocity=columns, time=times, parameters={path: values}, periods=periods, sample=(), tol=tol
-    )
+    varied = dict(zip(problem.paths[:1], values.T, strict=False))
+    result = simulate_many(system, **begin, velocity=columns, time=times, parameters=varied, periods=periods, sample=(), tol=tol)
     apart = np.max([np.abs(result[name].values - begin[name]) for name in names], axis=0)
     after = result["velocity"].values if velocity.ndim == 1 else None
     if after is None:

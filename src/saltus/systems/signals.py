@@ -128,10 +128,10 @@ class Record(Signal):
     source: str = field(default="", compare=False)  # the file it came from
 
     def __post_init__(self) -> None:
-        if self.quantity not in QUANTITIES:
+        if not isinstance(self.quantity, str) or self.quantity not in QUANTITIES:
             raise ParameterError(f"quantity must be one of {', '.join(QUANTITIES)}, got {self.quantity!r}", "quantity")
         settle_numbers(self, "scale")
-        where = f"record {self.source!r}" if self.source else "record"
+        where = f"record {self.source!r}" if isinstance(self.source, str) and self.source else "record"
         try:
             time, value = (np.array(a, dtype=float) for a in (self.time, self.value))
         except (TypeError, ValueError):

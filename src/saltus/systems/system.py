@@ -10,6 +10,7 @@ from typing import Any
 
 from saltus.checks import check_kind
 from saltus.errors import ParameterError, near, shown
+from saltus.public_functions import answered
 from saltus.systems.contact import check_contacts
 from saltus.systems.impact import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
@@ -52,6 +53,7 @@ class System:
                 f"this {type(self.model).__name__} has no impacts, so {self.impact!r} cannot act; leave it out", "impact"
             )
 
+    @answered
     def with_(self, changes: Mapping[str, Any] | None = None, **more: Any) -> System:
         """A copy with the parts at the given dotted paths replaced: `system.with_({"load.frequency": 1.1})`.
 
