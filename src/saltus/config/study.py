@@ -12,7 +12,7 @@ from saltus.config.settings import Settings, read_settings
 from saltus.config.signals import read_load
 from saltus.config.source import Source, read_source
 from saltus.config.types import read_part
-from saltus.errors import MotionError, ParameterError, SweepError, TraceError, near
+from saltus.errors import MotionError, ParameterError, SweepError, TraceError, near, shown
 from saltus.systems import System
 
 PARTS = ("model", "load", "impact", "simulate", *QUESTIONS)
@@ -83,7 +83,7 @@ def load_study(path: Path | str, *, questions: bool = True) -> Study:
     source, tables = read_source(Path(path))
     for name in tables:
         if name not in PARTS:
-            source.refuse((name,), f"unknown key {name!r}; {near(name, PARTS)}")
+            source.refuse((name,), f"unknown key {shown(name)}; {near(name, PARTS)}")
     if "model" not in tables:
         source.refuse((), 'has no [model]; begin with [model] type = "Metainterface", beta0 = "80 deg"')
     parts: dict[str, Any] = {name: read_part(source, name, tables[name]) for name in ("model", "impact") if name in tables}

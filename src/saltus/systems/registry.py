@@ -51,6 +51,6 @@ def find(kind: str, name: str) -> type[Model] | type[ImpactLaw]:
     """The class called `name`, of the `kind` "model" or "impact"."""
     known: dict[str, Any] = MODELS if kind == "model" else IMPACTS
     if name not in known:
-        raise ParameterError(f"{kind}.type {name!r} is not known; {near(name, known)}", f"{kind}.type")
+        raise ParameterError(f"{kind}.type {shown(name)} is not known; {near(name, known)}", f"{kind}.type")
     found: type[Model] | type[ImpactLaw] = known[name]
     return found

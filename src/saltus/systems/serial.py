@@ -65,7 +65,7 @@ def build(cls: type, fields: dict[str, Any], where: str) -> Any:
     known = {f.name: f for f in dataclasses.fields(cls)}
     for name in fields:
         if name not in known:
-            raise ParameterError(f"unknown key {where}.{name}; {near(name, known)}", f"{where}.{name}")
+            raise ParameterError(f"unknown key {where}.{name:.60}; {near(name, known)}", f"{where}.{name}")
     for name, f in known.items():
         needed = f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
         if needed and name not in fields:
