@@ -339,6 +339,7 @@ class _BandSearch:
 
     def _confirm(self, places: Iterable[_Place], care: int) -> list[_Place]:
         """Judge chaos with more care where that has not been done; returns where there is none after all."""
+        care = min(care, len(self.settings.judgements) - 1)
         doubtful = list({place.value: place for place in places if place.chaotic and place.care < care}.values())
         for size in {len(place.chaos) for place in doubtful}:
             alike = [place for place in doubtful if len(place.chaos) == size]

@@ -180,7 +180,9 @@ class DiagramSearch:
         special, motions = seeds_of(self.branches.branches), self.found.motions
         kept = np.unique(motions.value, return_index=True)[1], self.found.rows, np.flatnonzero(motions.unsettled)
         begun = motions.only(np.unique(np.concatenate(kept)))  # each attractor once, and every value
-        self.chaos, further = resolve_bands(self.system, self.path, self.bounds, begun, special, progress=progress)
+        self.chaos, further = resolve_bands(
+            self.system, self.path, self.bounds, begun, special, settings=self.effort.chaos, progress=progress
+        )
         self.found.add(further)
         self.follow(silent)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 from saltus.errors import ParameterError, near
+from saltus.studies.diagram.chaos_search import SETTINGS as CHAOS
+from saltus.studies.diagram.chaos_search import ChaosSettings
 
 
 class Effort(StrEnum):
@@ -30,17 +32,34 @@ class EffortSettings:
     sample: int  # Motions of the sample that tells what share of the states ends on something that the diagram has not.
     # Samples at most: what one shows to be missing is followed, and the next one begins anew, until one shows nothing missing.
     samples: int
+    chaos: ChaosSettings = CHAOS  # How finely bands of chaos are resolved, and how surely they are none of transients.
 
 
 EFFORTS = {
     Effort.QUICK: EffortSettings(
-        values=61, starts=8, periods=200, repelling_values=13, branches=20, jumps=0, sample=300, samples=1
+        values=61,
+        starts=8,
+        periods=200,
+        repelling_values=13,
+        branches=20,
+        jumps=0,
+        sample=300,
+        samples=1,
+        chaos=replace(CHAOS, step=4e-3, fine_step=2e-3, edge=1e-3, judgements=CHAOS.judgements[:1]),
     ),
     Effort.STANDARD: EffortSettings(
         values=201, starts=24, periods=400, repelling_values=25, branches=30, jumps=0, sample=1000, samples=3
     ),
     Effort.THOROUGH: EffortSettings(
-        values=801, starts=64, periods=1000, repelling_values=49, branches=60, jumps=2, sample=5000, samples=5
+        values=801,
+        starts=64,
+        periods=1000,
+        repelling_values=49,
+        branches=60,
+        jumps=2,
+        sample=5000,
+        samples=5,
+        chaos=replace(CHAOS, step=5e-4, fine_step=1.5e-4, edge=5e-5, judgements=CHAOS.judgements[1:]),
     ),
 }
 
