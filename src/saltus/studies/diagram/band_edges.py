@@ -22,7 +22,7 @@ class EdgeSettings:
     # Largest distance of a fold or a grazing from the bracket of an edge, as a share of the range: half of the bracket's width.
     beside: float = 1e-4
     # Largest distance, as a share of the range, of the period doubling of an orbit from the edge at which its cascade ends.
-    cascade: float = 0.02
+    cascade: float = 0.03
     nearest: int = 4  # Number of the values next to an edge of which the first one with regular motion gives their period.
     # Largest distance of the attractor from an unstable orbit that it touches, as a share of its size: chaos comes as near as
     # its states are dense. Within the band the distance is to be `grown` times that at the edge, at a depth of this share of the
