@@ -140,3 +140,15 @@ def test_equivalent_angle_moves_the_mass_by_the_ground_amplitude():
 def test_refuses_what_is_out_of_range(call, message):
     with pytest.raises(ParameterError, match=message):
         call()
+
+
+def test_erratum_35_an_ellipse_of_loads_leaves_the_domain_before_the_printed_amplitude():
+    tau = np.linspace(0, 2 * np.pi, 200_001)
+    swing, critical = 0.25, critical_horizontal(BETA, -0.5, 0.25)
+    assert critical == pytest.approx(0.07635, abs=5e-6)
+    for amplitude, inside in ((critical * (1 - 1e-6), True), (critical * (1 + 1e-6), False)):
+        vertical, horizontal = -0.5 + swing * np.cos(tau), amplitude * np.sin(tau)
+        assert bool((vertical * math.cos(BETA) < -np.abs(horizontal) * math.sin(BETA)).all()) is inside
+    assert critical_horizontal(BETA, -0.5, 0.0) == pytest.approx(0.5 / math.tan(BETA), rel=1e-15)
+    with pytest.raises(ParameterError, match="swing must be at most"):
+        critical_horizontal(BETA, -0.5, 0.6)

@@ -177,6 +177,25 @@ def draw_zoom(
     return inset
 
 
+def draw_beside(
+    ax: Any,
+    main: Any,
+    spectrum: Any,
+    window: tuple[float, float, float, float],
+    quantity: str = "amplitude",
+    scale: float = 1.0,
+) -> None:
+    """In the axes `ax` the part `window` (x from, to, y from, to) of a diagram, framed in its axes `main`."""
+    ax.set_xlim(window[:2])
+    ax.set_ylim(window[2:])
+    ax.locator_params(axis="x", nbins=4)
+    draw_response(ax, spectrum, quantity, scale, SETTINGS.inset_weight)
+    box = main.indicate_inset(
+        bounds=(window[0], window[2], window[1] - window[0], window[3] - window[2]), edgecolor=INK, alpha=1.0
+    )
+    box.set_linewidth(0.5)
+
+
 def free_place(
     ax: Any, spectrum: Any, size: tuple[float, float], quantity: str = "amplitude", scale: float = 1.0
 ) -> tuple[float, float, float, float]:
@@ -189,12 +208,15 @@ def free_place(
     points = np.concatenate(marks)
     margin = SETTINGS.inset_margin
     lines = [(line.get_ydata()[0] - low) / (high - low) for line in ax.get_lines() if len(set(line.get_ydata())) == 1]
+    table = spectrum["bands"]
+    bands = (np.stack([table["low"].values, table["high"].values], axis=1) - left) / (right - left)
     best, least = (0.1, 0.1), np.inf
     for y in np.linspace(0.07, 0.96 - size[1], SETTINGS.inset_places):
         for x in np.linspace(0.07, 0.98 - size[0], SETTINGS.inset_places):
             inside = (np.abs(points - np.array([x + size[0] / 2, y + size[1] / 2])) < np.array(size) / 2 + margin).all(axis=1)
             crossed = sum(y - margin < line < y + size[1] + margin for line in lines)
-            cost = inside.sum() + 0.5 * crossed - 1e-3 * y  # rather a line than a branch, and rather above
+            hidden = int(((bands[:, 0] < x + size[0]) & (bands[:, 1] > x)).sum())
+            cost = inside.sum() + 0.5 * (crossed + hidden) - 1e-3 * y  # rather a line or band than a branch, and rather above
             if cost < least:
                 best, least = (x, y), cost
     return (*best, *size)

@@ -14,16 +14,25 @@ from saltus.theory.layer import open_layer
 from saltus.theory.loaded_equilibria import zeros_of_slope
 
 
-def critical_horizontal(beta0: float, vertical: Any) -> Any:
-    """Hcr = abs(V / tan(beta0)), where the undeformed state is lost (the paper's QSB line), any shape of V.
+def critical_horizontal(beta0: float, vertical: Any, swing: float = 0.0) -> Any:
+    """Hcr = abs(cot(beta0)) sqrt(V^2 - swing^2), the least amplitude at which the undeformed state is lost, any shape of V.
+
+    Without a swing this is the paper's QSB line, abs(V / tan(beta0)). Under load (iii), where V + swing cos(tau) goes with
+    Hhat sin(tau), it is the ellipse that touches the border V cos(beta0) = -abs(H) sin(beta0) (errata 35): the largest of
+    tan(beta0) Hhat sin(tau) + swing cos(tau) is sqrt((tan(beta0) Hhat)^2 + swing^2), which must reach abs(V).
 
     Raises:
-        ParameterError: V cos(beta0) > 0, where the undeformed state is unstable for every H.
+        ParameterError: V cos(beta0) > 0, where the undeformed state is unstable for every H; a swing larger than V.
     """
     _check_angle(beta0)
     if np.any(np.asarray(vertical) * math.cos(beta0) > 0):
         raise ParameterError(f"V cos(beta0) must not be above 0, or theta = 0 is unstable for every H; got V = {vertical!r}")
-    return np.abs(np.asarray(vertical, dtype=float) / math.tan(beta0))[()]
+    least = np.asarray(vertical, dtype=float) ** 2 - swing**2
+    if np.any(least < 0):
+        raise ParameterError(
+            f"swing must be at most abs(V), or theta = 0 is lost without a horizontal load; got {swing!r}", "swing"
+        )
+    return np.abs(np.sqrt(least) / math.tan(beta0))[()]
 
 
 def fold_curve(beta0: float, opening: Any) -> tuple[Any, Any]:

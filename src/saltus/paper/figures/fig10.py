@@ -15,7 +15,7 @@ from saltus.paper.figures.response_panels import spectrum
 from saltus.paper.measures import chaos_measures, response_measures
 from saltus.paper.measures.spectrum_features import main_branch
 from saltus.paper.measures.validity_measures import validity
-from saltus.plots import DOUBLE_COLUMN, draw_zoom, highest, new_figure, response_legend, styled
+from saltus.plots import DOUBLE_COLUMN, draw_beside, highest, new_figure, response_legend, styled
 
 AMPLITUDES = {"a": 0.25, "b": 0.5}  # zetahat
 FREQUENCY_RANGE = (0.1, 4.0)  # Omega: up to chaos
@@ -32,23 +32,20 @@ def _panel(amplitude: float, **options: Any) -> Any:
 
 @styled
 def draw(data: Any) -> Any:
-    """(a) and (b), a panel for each amplitude."""
+    """(a) and (b), a row for each amplitude; beside it what lies between rest and the steady motions of the main branch."""
     panels = {name: tree for name, tree in data.children.items() if name in AMPLITUDES}
-    figure = new_figure(DOUBLE_COLUMN, 95.0)
-    axes = figure.subplots(1, len(panels), squeeze=False)[0]
-    for ax, (name, tree) in zip(axes, panels.items(), strict=True):
+    figure = new_figure(DOUBLE_COLUMN, 25.0 + 70.0 * len(panels))
+    axes = figure.subplots(len(panels), 2, squeeze=False, width_ratios=[2.6, 1])
+    for (ax, beside), (name, tree) in zip(axes, panels.items(), strict=True):
         draw_panel(ax, tree, name, rf"$\widehat{{\zeta}}={AMPLITUDES[name]:g}$", r"\theta_{\rm eq}")
+        begin, scale = float(main_branch(tree)["parameter"].min()), tree.attrs["scale"]
+        low, high = 0.96 * begin, 1.26 * begin
+        draw_beside(beside, ax, tree, (low, high, 0.0, 0.6 * highest(tree, low, high) / scale), scale=scale)
+        beside.set_title("detail", pad=4)
+    for ax in axes[-1]:
         ax.set_xlabel(r"frequency $\Omega$")
-        zoom(ax, tree)
     response_legend(figure, list(panels.values()))
     return figure
-
-
-def zoom(ax: Any, tree: Any) -> None:
-    """An inset with what lies between rest and the steady motions of the main branch."""
-    begin, scale = float(main_branch(tree)["parameter"].min()), tree.attrs["scale"]
-    window = (0.96 * begin, 1.26 * begin)
-    draw_zoom(ax, tree, (0.34, 0.38), (*window, 0.0, 0.6 * highest(tree, *window) / scale), scale=scale)
 
 
 def measure(data: Any) -> dict[str, Measured | None]:

@@ -7,6 +7,7 @@ import math
 from saltus.systems import Harmonic, Load, Metainterface, System
 
 BETA0, DAMPING, VERTICAL = 80.0, 0.1, -0.5  # degrees, C, Vbar
+SWING = 0.25  # Vhat of load (iii)
 FREQUENCY, AMPLITUDE, GROUND_AMPLITUDE = "load.frequency", "load.horizontal.amplitude", "load.ground_horizontal.amplitude"
 
 
@@ -22,7 +23,7 @@ def on_ground(frequency: float = 1.0, amplitude: float = 1.0) -> System:
     return System(model=Metainterface(beta0=math.radians(BETA0), damping=DAMPING), load=load)
 
 
-def under_both(frequency: float = 1.0, amplitude: float = 1.0, swing: float = 0.25) -> System:
+def under_both(frequency: float = 1.0, amplitude: float = 1.0, swing: float = SWING) -> System:
     """Load (iii), `loadpathb`: horizontal and vertical forces; `swing` is Vhat."""
     vertical = Harmonic(mean=VERTICAL, amplitude=swing, phase=math.pi / 2)
     load = Load(frequency=frequency, horizontal=Harmonic(amplitude=amplitude), vertical=vertical)

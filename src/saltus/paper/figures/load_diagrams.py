@@ -14,10 +14,10 @@ from saltus.paper.figures.parallel_panels import each
 from saltus.paper.figures.response_panels import diagram
 from saltus.plots import (
     DOUBLE_COLUMN,
+    draw_beside,
     draw_critical,
     draw_limits,
     draw_response,
-    draw_zoom,
     highest,
     new_figure,
     panel_label,
@@ -53,11 +53,11 @@ def undeformed(system: Any, critical: float) -> Any:
 
 @styled
 def draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
-    """A panel for each frequency; an inset with what happens up to the amplitude `zoomed`, about Hcr."""
+    """A row for each frequency; beside it what happens up to the amplitude `zoomed`, about Hcr."""
     panels = {name: tree for name, tree in data.children.items() if name in frequencies}
-    figure = new_figure(DOUBLE_COLUMN, 25.0 + 80.0 * len(panels))
-    axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
-    for ax, (name, tree) in zip(axes, panels.items(), strict=True):
+    figure = new_figure(DOUBLE_COLUMN, 25.0 + 75.0 * len(panels))
+    axes = figure.subplots(len(panels), 2, squeeze=False, width_ratios=[2.6, 1])
+    for (ax, beside), (name, tree) in zip(axes, panels.items(), strict=True):
         _, high = tree.attrs["bounds"]
         ax.set_xlim(0.0, high)
         ax.set_ylim(0.0, 1.08 * highest(tree, 0.0, high))
@@ -66,8 +66,9 @@ def draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
         ax.set_title(rf"$\Omega={frequencies[name]:g}$", pad=4)
         ax.set_ylabel(r"$\max_\tau|\theta|$ (rad)")
         draw_response(ax, tree)
-        inset = draw_zoom(ax, tree, (0.24, 0.39), (0.0, zoomed, 0.0, 1.1 * highest(tree, 0.0, zoomed)))
-        draw_critical(inset, tree.attrs["critical"])
+        draw_beside(beside, ax, tree, (0.0, zoomed, 0.0, 1.1 * highest(tree, 0.0, zoomed)))
+        frame(beside, tree)
+        beside.set_title("near rest", pad=4)
     response_legend(figure, list(panels.values()), critical=True)
     return figure
 

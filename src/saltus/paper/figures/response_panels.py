@@ -23,9 +23,9 @@ def spectrum(system: System, bounds: tuple[float, float], **options: Any) -> Any
     return with_groups(tree, {"knots": knots(tree), "jumps": jumps(tree)})
 
 
-def diagram(system: System, bounds: tuple[float, float], **options: Any) -> Any:
-    """The bifurcation diagram of a system over the amplitude of the horizontal load, in radians."""
-    return _panel(bifurcation_diagram(system, AMPLITUDE, bounds, **({"window": WINDOW} | options)), scale=1.0)
+def diagram(system: System, bounds: tuple[float, float], swing: float = 0.0, **options: Any) -> Any:
+    """The bifurcation diagram of a system over the amplitude of the horizontal load, in radians; `swing` is Vhat."""
+    return _panel(bifurcation_diagram(system, AMPLITUDE, bounds, **({"window": WINDOW} | options)), scale=1.0, swing=swing)
 
 
 def static_scale(system: System) -> float:
@@ -36,8 +36,8 @@ def static_scale(system: System) -> float:
     return static_angle(beta0, system.get(AMPLITUDE), VERTICAL)
 
 
-def _panel(tree: Any, scale: float) -> Any:
+def _panel(tree: Any, scale: float, swing: float = 0.0) -> Any:
     """A study's tree with the reactions of its closed layer, and the scale of its rotations, in rad, and Hcr as attributes."""
     beta0 = math.radians(BETA0)
-    tree.attrs = {**tree.attrs, "scale": scale, "critical": float(critical_horizontal(beta0, VERTICAL))}
+    tree.attrs = {**tree.attrs, "scale": scale, "critical": float(critical_horizontal(beta0, VERTICAL, swing))}
     return with_groups(tree, {"closed_layer": closed_layer(tree)})

@@ -42,6 +42,8 @@ class ResponseCriteria:
     samples: int = 600  # The number of values, an even one, at which the stable motions of a range are counted.
     apart: float = 0.1  # Motions or amplitudes that differ by more, in rad, plainly differ.
     large_load: float = 0.5  # Detached loops are there from this Hhat on.
+    held: float = 1e-4  # A disturbance of 1e-5 rad at theta = 0 grows no larger, in rad, where rest is held.
+    left: float = 5e-4  # And larger than this where it is left in every period.
     shown_loops: int = 3  # The number of loops of a panel whose ranges the evidence names.
 
 
@@ -263,6 +265,24 @@ def coexistence(panels: Panels) -> Measured:
         more.append(most > max(early, 1))
         rows.append({"frequency": frequency, "early": early, "most": most, "place": place, "last": later[-1]})
     return measured(bool(more) and all(more), panels=rows)
+
+
+def border_of_rest(data: Any) -> Measured:
+    """As printed: theta = 0 is held up to abs(V / tan(beta0)) under load (iii). Erratum 35: while the ellipse lies inside."""
+    rest, disturbed, critical = data["undeformed"], data["disturbed"], _critical(data["a"])
+    below, above, printed = map(float, disturbed["moved"].values)
+    turns = bool(rest["held_below"]) and not bool(rest["held_above"])
+    return measured(
+        printed < CRITERIA.held,
+        turns and critical < float(disturbed.attrs["printed"]),
+        second=below < CRITERIA.held and above > CRITERIA.left and printed > CRITERIA.left,
+        printed=float(disturbed.attrs["printed"]),
+        critical=critical,
+        below=below,
+        above=above,
+        wrong=printed,
+        amplitude=float(disturbed["amplitude"].values[-1]),
+    )
 
 
 def both_diagram(spectrum: Any, mirror: Any) -> dict[str, Measured]:
