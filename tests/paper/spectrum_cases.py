@@ -39,6 +39,7 @@ def diagram(*branches, dots=(), bounds=(0.0, 3.0)):
     places = np.array(dots, float).reshape(-1, 2)
     parts = {f"branch_{i:03d}": data for i, data in enumerate(branches)}
     columns = {"parameter": places[:, 0], "amplitude": places[:, 1], "highest": places[:, 1], "lowest": -0.5 * places[:, 1]}
+    columns["placed"] = np.ones(len(places), dtype=int)
     parts["attractors"] = xr.Dataset({name: ("dot", values) for name, values in columns.items()})
     parts["bands"] = xr.Dataset({"low": ("band", [1.0]), "high": ("band", [1.5]), "kind": ("band", ["CH"])})
     parts["/"] = xr.Dataset(attrs={"bounds": list(bounds), "path": "load.frequency", "scale": 2.0})

@@ -34,6 +34,7 @@ from .response import (
     draw_zoom,
     highest,
     lowest,
+    note_missed,
     response_legend,
 )
 from .rocking import draw_errors, draw_jump, draw_periods
@@ -88,6 +89,7 @@ __all__ = [
     "label_undeformed",
     "lowest",
     "new_figure",
+    "note_missed",
     "panel_label",
     "response_legend",
     "style",

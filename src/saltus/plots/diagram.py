@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from saltus.branch_lines import branches_of
 from saltus.plots.axis_names import parameter_name, symbol, unit_in_brackets
 from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure, styled
-from saltus.plots.response import draw_bands, draw_limits, draw_response, response_legend
+from saltus.plots.response import draw_bands, draw_limits, draw_response, note_missed, response_legend
 
 POINTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
 
@@ -43,6 +43,7 @@ def draw_diagram(tree: Any) -> Figure:
     limits = [float(limit) for limit in np.atleast_1d(tree.attrs["limits"])]
     draw_response(axes[0], tree)
     draw_limits(axes[0], limits)
+    note_missed(axes[0], tree)
     if simulated:
         draw_stroboscopic_states(axes[1], tree)
         axes[1].set_ylabel(rf"${name}$ at phase 0{unit}")

@@ -127,6 +127,13 @@ def draw_attractors(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: 
         ax.plot(other["parameter"], other[quantity] / scale, zorder=4, **DOTS)
 
 
+def note_missed(ax: Any, spectrum: Any) -> None:
+    """At the right above the axes: which share of a random sample of states ends on what the diagram lacks, with its interval."""
+    share, low, high = (100 * float(spectrum.attrs.get(f"missed_{name}", np.nan)) for name in ("share", "low", "high"))
+    if np.isfinite(share):
+        ax.set_title(f"missed: {share:.2g} % ({low:.2g} to {high:.2g})", loc="right", pad=4, fontsize=7)
+
+
 def draw_bands(ax: Any, spectrum: Any) -> None:
     """Light blue where motions are quasi-periodic, light orange where they are chaotic."""
     bands = spectrum["bands"]

@@ -23,6 +23,7 @@ from saltus.plots import (
     draw_zoom,
     highest,
     new_figure,
+    note_missed,
     panel_label,
     response_legend,
     styled,
@@ -80,6 +81,7 @@ def draw_panel(ax: Any, tree: Any, name: str, title: str, unit: str) -> None:
     ax.set_title(title, pad=4)
     draw_limits(ax, tree.attrs["limits"], scale)
     draw_response(ax, tree, scale=scale)
+    note_missed(ax, tree)
 
 
 def whole_loop(ax: Any, tree: Any) -> None:

@@ -25,6 +25,7 @@ from saltus.plots import (
     highest,
     lowest,
     new_figure,
+    note_missed,
     panel_label,
     response_legend,
     styled,
@@ -95,6 +96,7 @@ def draw(data: Any) -> Any:
         draw_beside(beside, ax, tree, (0.0, ZOOMED, *_range(tree, ZOOMED, quantity)), quantity)
         frame(beside, tree)
         panel_label(ax, label)
+    note_missed(axes[0, 0], tree)
     axes[0, 1].set_title("near rest", pad=4)
     for ax in axes[0]:
         ax.set_xlabel("")

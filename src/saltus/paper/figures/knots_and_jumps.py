@@ -10,8 +10,8 @@ import numpy as np
 from saltus.branch_lines import smooth_lines
 from saltus.flow import simulate_many
 from saltus.orbits import PeriodicOrbit, orbits_of, solve
-from saltus.paper.figure_data import dataset
-from saltus.paper.measures.spectrum_features import detached, main_branch, turning
+from saltus.paper.figure_data import dataset, scalar_dataset
+from saltus.paper.measures.spectrum_features import detached, first_fold, main_branch, turning
 from saltus.systems import System
 
 
@@ -144,6 +144,16 @@ def jumps(spectrum: Any) -> Any:
         },
         what="jumps past the folds of detached loops",
     )
+
+
+def birth(spectrum: Any) -> Any:
+    """Where the main branch begins: the largest abs(theta) of its orbit at the first fold, and of its motion just below it."""
+    system, branch = System.from_json(str(spectrum.attrs["system"])), main_branch(spectrum)
+    fold, size = first_fold(branch)
+    orbit, _ = _last_stable(branch, fold) if np.isfinite(fold) else (None, 0.0)
+    value = np.array([fold * (1 - SETTINGS.beyond)])
+    after = _settled(system, str(spectrum.attrs["path"]), value, [orbit]) if orbit is not None else [np.nan]
+    return scalar_dataset({"fold": fold, "before": size, "after": float(after[0])}, what="birth of the first limit cycle")
 
 
 def _settled(system: Any, path: str, values: np.ndarray, orbits: list[Any]) -> np.ndarray:

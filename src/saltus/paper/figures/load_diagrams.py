@@ -10,6 +10,7 @@ import numpy as np
 from saltus.flow import simulate_many
 from saltus.paper.figure_data import joined, scalar_dataset, with_groups
 from saltus.paper.figures.harmonic_loads import AMPLITUDE, under_force
+from saltus.paper.figures.knots_and_jumps import birth
 from saltus.paper.figures.parallel_panels import each
 from saltus.paper.figures.response_panels import diagram
 from saltus.plots import (
@@ -20,6 +21,7 @@ from saltus.plots import (
     draw_response,
     highest,
     new_figure,
+    note_missed,
     panel_label,
     response_legend,
     styled,
@@ -38,7 +40,7 @@ def compute(frequencies: Mapping[str, float], largest: Mapping[float, float], **
 def _panel(frequency: float, largest: Mapping[float, float], **options: Any) -> Any:
     system = under_force(frequency=frequency)
     tree = diagram(system, (LEAST, largest[frequency]), **options)
-    return with_groups(tree, {"undeformed": undeformed(system, tree.attrs["critical"])})
+    return with_groups(tree, {"undeformed": undeformed(system, tree.attrs["critical"]), "birth": birth(tree)})
 
 
 def undeformed(system: Any, critical: float) -> Any:
@@ -66,6 +68,7 @@ def draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
         ax.set_title(rf"$\Omega={frequencies[name]:g}$", pad=4)
         ax.set_ylabel(r"$\max_\tau|\theta|$ (rad)")
         draw_response(ax, tree)
+        note_missed(ax, tree)
         draw_beside(beside, ax, tree, (0.0, zoomed, 0.0, 1.1 * highest(tree, 0.0, zoomed)))
         frame(beside, tree)
         beside.set_title("near rest", pad=4)

@@ -15,7 +15,7 @@ from saltus.attractors import excludes_tori
 from saltus.branch_lines import branches_of
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.measures.response_measures import Panels
-from saltus.paper.measures.spectrum_features import count, stable_motions
+from saltus.paper.measures.spectrum_features import amplitudes_at, count, stable_motions
 from saltus.systems import System
 
 
@@ -25,6 +25,9 @@ class ChaosCriteria:
 
     inner: int = 200  # The number of values within a band at which stable motions are counted.
     high: float = 1.0  # Frequencies above this one are beyond the primary resonance.
+    resonant: tuple[float, float] = (1.0, 2.0)  # The frequencies at which the paper sees chaos in Fig. 9, approximately.
+    apart: float = 0.05  # Bands whose gap is a larger share of the range are in different regions of chaos.
+    large_motion: float = 0.5  # Motions of more than this share of the largest stable amplitude of a diagram are large.
     low: float = 0.5  # Superharmonic resonances are below this frequency.
     large_load: float = 2.0  # The paper sees chaos in the panels from this Hhat on.
 
@@ -55,7 +58,7 @@ def force_spectra(panels: Panels) -> dict[str, Measured]:
     return {
         "fig09-quasi-periodic": _quasi_periodic(panels[smallest], CRITERIA.low),
         "fig09-chaos": _widening(panels),
-        "fig09-chaos-range": _around_resonance(panels[largest], largest),
+        "fig09-chaos-range": _around_resonance(panels),
         "fig09-pierced": pierced(panels[largest], load=largest),
     }
 
@@ -68,10 +71,18 @@ def _widening(panels: Panels) -> Measured:
     return measured(grows, panels=rows)
 
 
-def _around_resonance(spectrum: Any, load: float) -> Measured:
-    bands, width = bands_of(spectrum), _width(spectrum)
-    inside = sum(max(0.0, min(band["high"], 2.0) - max(band["low"], 1.0)) for band in bands)
-    return measured(width > 0.0 and inside > 0.75 * width, load=load, inside=inside, width=width, bands=bands)
+def _around_resonance(panels: Panels) -> Measured:
+    """As printed: chaos lies at Omega = 1 to 2. Erratum 37: some of it does not, though most of the bands' width does."""
+    rows, within, most = [], [], []
+    low, high = CRITERIA.resonant
+    for load, tree in panels.items():
+        bands, width = bands_of(tree), _width(tree)
+        if load >= CRITERIA.large_load:
+            inside = sum(max(0.0, min(band["high"], high) - max(band["low"], low)) for band in bands)
+            within.append(width > 0.0 and all(0.9 * low <= band["low"] and band["high"] <= 1.05 * high for band in bands))
+            most.append(inside > 0.5 * width)
+            rows.append({"load": load, "inside": inside, "width": width, "bands": bands})
+    return measured(bool(rows) and all(within), bool(rows) and all(most), panels=rows)
 
 
 def _stable_share(spectrum: Any, low: float, high: float) -> float:
@@ -85,11 +96,13 @@ def pierced(spectrum: Any, **panel: float) -> Measured:
     return measured(any(row["share"] > 0.0 for row in rows), bands=rows, grazings=count(spectrum, "GR"), **panel)
 
 
-def ground_spectra(panels: Panels) -> dict[str, Measured]:
-    """Fig. 10, over the amplitudes of the ground motion."""
+def ground_spectra(panels: Panels, transients: Any) -> dict[str, Measured]:
+    """Fig. 10, over the amplitudes of the ground motion; `transients` holds when motions at a high frequency have settled."""
+    largest = max(panels)
     return {
-        "fig10-quasi-periodic": _quasi_periodic(panels[max(panels)], CRITERIA.high),
-        "fig10-chaos": _at_high_frequency(panels),
+        "fig10-quasi-periodic": _quasi_periodic(panels[largest], CRITERIA.high),
+        "fig10-chaos": _at_high_frequency(panels, transients),
+        "fig10-pierced": pierced(panels[largest], load=largest),
     }
 
 
@@ -100,17 +113,26 @@ def _wandering(spectrum: Any) -> np.ndarray:
     return np.asarray(table["value"].values[positive])
 
 
-def _at_high_frequency(panels: Panels) -> Measured:
-    """Erratum 31: what looks like chaos there is a transient."""
+def _at_high_frequency(panels: Panels, transients: Any) -> Measured:
+    """As printed: what wanders there is chaos that lasts, and more of it as the load grows. Erratum 31: most of it is a transient."""
+    seen = [_wandering(tree) for tree in panels.values()]
+    seen = [values[values > CRITERIA.high] for values in seen]
+    bands = [[band for band in bands_of(tree) if band["low"] > CRITERIA.high] for tree in panels.values()]
     lasting = [
-        sum(band["high"] - band["low"] for band in bands_of(tree) if band["low"] > CRITERIA.high) for tree in panels.values()
+        int(sum(any(band["low"] <= value <= band["high"] for band in own) for value in values))
+        for values, own in zip(seen, bands, strict=True)
     ]
-    seen = [int((_wandering(tree) > CRITERIA.high).sum()) for tree in panels.values()]
+    counts, settled = [values.size for values in seen], transients["settled"].values
+    grows = counts[-1] > 0 and bool((np.diff(counts) > 0).all())
+    falls = bool((np.diff(settled) > 0).all()) and int(transients["returned"]) == 0
     return measured(
-        lasting[-1] > 0.0 and bool((np.diff(lasting) > 0).all()),
-        seen[-1] > 0 and bool((np.diff(seen) > 0).all()),
-        panels=[{"load": load, "values": values} for load, values in zip(panels, seen, strict=True)],
-        widths=[{"width": width} for width in lasting],
+        grows and 2 * lasting[-1] >= counts[-1],
+        grows and 2 * lasting[-1] < counts[-1],
+        second=falls,
+        panels=[{"load": load, "values": n, "lasting": m} for load, n, m in zip(panels, counts, lasting, strict=True)],
+        bands=bands[-1],
+        motions=int(transients["motions"]),
+        settled=[{"settled": int(n), "periods": int(p)} for n, p in zip(settled, transients["periods"].values, strict=True)],
     )
 
 
@@ -140,19 +162,46 @@ def _route(panels: Panels) -> Measured:
 
 
 def two_regions(panels: Panels) -> Measured:
-    """Whether in every panel two bands of chaos have stable motions between them."""
-    two = []
-    for tree in panels.values():
-        gaps = [(one["high"], next_one["low"]) for one, next_one in pairwise(bands_of(tree))]
-        two.append(any(_stable_share(tree, *gap) > 0.5 for gap in gaps))
-    return measured(bool(two) and all(two), panels=[{"frequency": w, "bands": bands_of(tree)} for w, tree in panels.items()])
+    """As printed: two regions of chaos, large stable motions between them. Erratum 37: at least two, not everywhere two."""
+    rows, between = [], []
+    for frequency, tree in panels.items():
+        regions = _regions(tree)
+        gaps = [(one["high"], another["low"]) for one, another in pairwise(regions)]
+        between.append(bool(gaps) and any(_large_between(tree, *gap) for gap in gaps))
+        rows.append({"frequency": frequency, "regions": regions, "number": len(regions)})
+    holds = bool(between) and all(between)
+    return measured(holds and all(row["number"] == 2 for row in rows), holds, panels=rows)
+
+
+def _regions(spectrum: Any) -> list[dict[str, float]]:
+    """The bands of chaos, those that are closer together than `CRITERIA.apart` of the range joined."""
+    low, high = (float(bound) for bound in spectrum.attrs["bounds"])
+    regions: list[dict[str, float]] = []
+    for band in sorted(bands_of(spectrum), key=lambda band: band["low"]):
+        if regions and band["low"] - regions[-1]["high"] <= CRITERIA.apart * (high - low):
+            regions[-1] = {"low": regions[-1]["low"], "high": max(band["high"], regions[-1]["high"])}
+        else:
+            regions.append({"low": band["low"], "high": band["high"]})
+    return regions
+
+
+def _large_between(spectrum: Any, low: float, high: float) -> bool:
+    """Whether over most of a range a stable motion is there, and a large one in its middle."""
+    branches = [branch for _, branch in branches_of(spectrum)]
+    middle = np.concatenate([amplitudes_at(branch, (low + high) / 2, stable=True) for branch in branches])
+    largest = max(float(np.max(branch["amplitude"].values[branch["stable"].values == 1], initial=0.0)) for branch in branches)
+    return _stable_share(spectrum, low, high) > 0.5 and float(middle.max(initial=0.0)) > CRITERIA.large_motion * largest
 
 
 def shifts(panels: Panels) -> Measured | None:
-    """As printed: for all frequencies. Erratum 32: above the primary resonance. None where there is only one frequency."""
+    """Where chaos that lasts begins, over the frequencies; undecided where there is none. None where there is one frequency."""
     if len(panels) < 2:
         return None
-    least = np.array([float(_wandering(tree).min(initial=np.inf)) for tree in panels.values()])
-    falls = min(panels) < CRITERIA.high and bool(np.isfinite(least).all()) and bool((np.diff(least) < 0).all())
-    rows = [{"frequency": frequency, "load": load} for frequency, load in zip(panels, least, strict=True)]
-    return measured(bool((np.diff(least) > 0).all()), falls, panels=rows)
+    least = {frequency: min((band["low"] for band in bands_of(tree)), default=np.inf) for frequency, tree in panels.items()}
+    onsets = np.array(list(least.values()))
+    known = bool(np.isfinite(onsets).all())
+    return measured(
+        bool((np.diff(onsets) > 0).all()) if known else None,
+        panels=[{"frequency": frequency, "load": load} for frequency, load in least.items() if np.isfinite(load)],
+        missing=[{"frequency": frequency} for frequency, load in least.items() if not np.isfinite(load)],
+    )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,6 @@ from saltus.paper.measures.spectrum_features import (
     main_branch,
     passing,
     range_counts,
-    stable_motions,
     superharmonic,
 )
 
@@ -44,6 +44,10 @@ class ResponseCriteria:
     large_load: float = 0.5  # Detached loops are there from this Hhat on.
     held: float = 1e-4  # A disturbance of 1e-5 rad at theta = 0 grows no larger, in rad, where rest is held.
     left: float = 5e-4  # And larger than this where it is left in every period.
+    supercritical: float = 0.01  # A cycle that leaves rest begins with less than this share of its amplitude at Hcr.
+    past_fold: float = 1e-3  # The relative distance past a fold at which the cycle's unstable companion is looked for.
+    quarters: int = 4  # The number of parts of a range over which the number of stable motions is averaged.
+    shared: float = 0.25  # Motions coexist over more than this share of a range.
     shown_loops: int = 3  # The number of loops of a panel whose ranges the evidence names.
 
 
@@ -53,21 +57,23 @@ LOADS = np.array([1.0, 2.0, 5.0, 15.0])  # of Hcr, at which the amplitudes of tw
 
 def confirmed(spectra: Iterable[Any]) -> Measured:
     """The paper's own check, made of everything drawn: stable motions are those of the non-smooth equation."""
-    kept, off, orbits, attractors = 0.0, 0.0, 0, 0
+    kept, off, orbits, attractors, unplaced = 0.0, 0.0, 0, 0, 0
     for spectrum in spectra:
         for _, branch in branches_of(spectrum):
             stable = branch["stable"].values.astype(bool)
             kept = max(kept, float(np.max(branch["kept"].values[stable], initial=0.0)))
             orbits += int(stable.sum())
         places, lines = spectrum["attractors"], [line for _, branch in branches_of(spectrum) for line in smooth_lines(branch)]
-        for value, amplitude in zip(places["parameter"].values, places["amplitude"].values, strict=True):
+        placed = places["placed"].values == 1
+        unplaced += int((~placed).sum())
+        for value, amplitude in zip(places["parameter"].values[placed], places["amplitude"].values[placed], strict=True):
             # on both sides: a branch found at this very value may begin, or close, exactly there
             known = np.concatenate(
                 [passing(lines, float(value) * (1 + side), stable=True) for side in (-CRITERIA.beside, CRITERIA.beside)]
             )
             off, attractors = max(off, float(np.abs(known - amplitude).min(initial=np.inf))), attractors + 1
     holds = orbits > 0 and attractors > 0 and kept < CRITERIA.confirmed and off < CRITERIA.on_branch
-    return measured(holds, orbits=orbits, kept=kept, attractors=attractors, off=off)
+    return measured(holds, orbits=orbits, kept=kept, attractors=attractors, off=off, unplaced=unplaced)
 
 
 def force_spectra(panels: Panels) -> dict[str, Measured]:
@@ -206,14 +212,27 @@ def _undeformed(panels: Panels) -> Measured:
 
 
 def _anticipated(panels: Panels) -> Measured:
-    stable, rows = [], []
+    """As printed: a supercritical cycle below Hcr. Erratum 36: stable, but born at a fold, with an amplitude of its own."""
+    early, small, sudden, lost, rows = [], [], [], [], []
     for frequency, tree in panels.items():
-        branch, critical = main_branch(tree), _critical(tree)
-        fold, _ = first_fold(branch)
-        stable.append(fold < critical and amplitudes_at(branch, (fold + critical) / 2, stable=True).size > 0)
-        rows.append({"frequency": frequency, "fold": fold})
+        branch, critical, birth = main_branch(tree), _critical(tree), tree["birth"]
+        fold, size = first_fold(branch)
+        cycle = float(np.max(amplitudes_at(branch, critical, stable=True), initial=0.0))
+        early.append(fold < critical and amplitudes_at(branch, (fold + critical) / 2, stable=True).size > 0)
+        small.append(size < CRITERIA.supercritical * cycle)
+        unstable = np.max(amplitudes_at(branch, fold * (1 + CRITERIA.past_fold), stable=False), initial=0.0)
+        sudden.append(not small[-1] and unstable > 0.0)
+        lost.append(float(birth["after"]) < 0.5 * float(birth["before"]))
+        rows.append({"frequency": frequency, "fold": fold, "size": size, "cycle": cycle, "after": float(birth["after"])})
     critical = _critical(next(iter(panels.values())))
-    return measured(bool(stable) and all(stable), critical=critical, panels=rows)
+    return measured(
+        bool(early) and all(early) and all(small),
+        bool(early) and all(early) and all(sudden),
+        second=bool(lost) and all(lost),
+        critical=critical,
+        panels=rows,
+        falls=[{"frequency": row["frequency"], "after": row["after"]} for row in rows],
+    )
 
 
 def _grows(panels: Panels) -> Measured:
@@ -255,16 +274,40 @@ def _flattens(panels: Panels) -> Measured:
 
 
 def coexistence(panels: Panels) -> Measured:
-    """Beyond twice Hcr there are somewhere more stable motions than there."""
-    more, rows = [], []
+    """As printed: their number grows with the load. Erratum 38: several coexist, but their mean number falls again.
+
+    The means are those over the quarters of the range beyond twice Hcr, by the branches and, independently, by the attractors on
+    which simulated motions have settled.
+    """
+    means, dots, most, rows = [], [], [], []
     for frequency, tree in panels.items():
-        start = 2 * _critical(tree)
+        start, high = 2 * _critical(tree), float(tree.attrs["bounds"][1])
+        edges = np.linspace(start, high, CRITERIA.quarters + 1)
         values, number = range_counts(tree, CRITERIA.samples)
-        early, later = int(stable_motions(tree, np.array([start]))[0]), number[values > start]
-        most, place = int(later.max()), float(values[values > start][later.argmax()])
-        more.append(most > max(early, 1))
-        rows.append({"frequency": frequency, "early": early, "most": most, "place": place, "last": later[-1]})
-    return measured(bool(more) and all(more), panels=rows)
+        means.append(_means(values, number, edges))
+        simulated = tree["search"]["searched"].values
+        reached = np.isclose(tree["attractors"]["parameter"].values[:, None], simulated, rtol=1e-12, atol=0.0).sum(axis=0)
+        dots.append(_means(simulated, reached, edges))
+        most.append(int(number[values > start].max()))
+        rows.append(
+            {
+                "frequency": frequency,
+                "most": most[-1],
+                "place": float(values[values > start][number[values > start].argmax()]),
+                "means": [{"mean": mean} for mean in means[-1]],
+                "dots": [{"mean": mean} for mean in dots[-1]],
+            }
+        )
+    grows = [bool((np.diff(one) > 0.0).all()) for one in means]
+    falls = [bool((np.diff(one) < 0.0).any() and (np.diff(other) < 0.0).any()) for one, other in zip(means, dots, strict=True)]
+    several = bool(most) and min(most) > 1
+    return measured(several and all(grows), several and not all(grows), second=any(falls), panels=rows, reached=rows)
+
+
+def _means(values: np.ndarray, number: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """The means of a number over the values between neighbouring edges; 0 where there is none."""
+    inside = [(values > low) & (values <= high) for low, high in pairwise(edges)]
+    return np.array([float(number[here].mean()) if here.any() else 0.0 for here in inside])
 
 
 def border_of_rest(data: Any) -> Measured:
@@ -293,15 +336,22 @@ def both_diagram(spectrum: Any, mirror: Any) -> dict[str, Measured]:
     uneven = np.abs(main["highest"].values + main["lowest"].values)
     kinds = {kind: count(spectrum, kind) for kind in ("LP", "PD", "GR")}
     values, number = range_counts(spectrum, CRITERIA.samples)
-    most = int(number.max())
+    most, shared = int(number.max()), float((number > 1).mean())
+    doubled = sorted({int(branch["period"][0]) for _, branch in branches_of(spectrum) if branch.attrs["end_kinds"].count("PD")})
+    fold, _ = first_fold(main)
+    same = fold < _critical(spectrum) and {2, 4} <= set(doubled) and spectrum["bands"].sizes["band"] > 0
     symmetric = max(gaps["(i)"], gaps["(ii)"]) < CRITERIA.confirmed and gaps["(iii)"] > CRITERIA.apart and not any(own)
     return {
         "fig13-symmetry": measured(
             symmetric, loads=[{"load": load, "gap": gap} for load, gap in gaps.items()], uneven=uneven.max()
         ),
         "fig13-features": measured(
-            most > 1 and all(kinds.values()),
+            same and shared > CRITERIA.shared and all(kinds.values()),
             most=most,
+            shared=shared,
+            fold=fold,
+            bands=spectrum["bands"].sizes["band"],
+            doubled=[{"period": period} for period in doubled],
             place=float(values[number.argmax()]),
             kinds=[{"kind": kind, "number": n} for kind, n in kinds.items()],
         ),
