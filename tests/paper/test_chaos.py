@@ -61,35 +61,70 @@ def test_a_band_is_pierced_by_a_stable_motion_alone(stable, verdict):
     assert verdicts({"fig09-pierced": one}) == {"fig09-pierced": verdict}
 
 
+def transients(settled=(5, 20, 60), returned=0):
+    """How many motions at a high frequency have settled after ever more periods, and how many of these wander again."""
+    columns = {"settled": ("horizon", list(settled)), "motions": ((), 96), "returned": ((), returned)}
+    return xr.Dataset(columns, {"periods": ("horizon", [500, 2000, 8000])})
+
+
 @pytest.mark.parametrize(
-    ("small", "large", "verdict"),
+    ("small", "large", "settled", "verdict"),
     [
-        (panel(), panel((2.0, 2.5)), ClaimVerdict.AS_PRINTED),
-        (panel(), panel(wandering=(2.0, 2.1)), ClaimVerdict.CORRECTED),
-        (panel(wandering=(2.0, 2.1)), panel(wandering=(2.0,)), ClaimVerdict.DISAGREES),
-        (panel(), panel(wandering=(0.4,)), ClaimVerdict.DISAGREES),  # at low frequency alone
+        (panel(), panel((2.0, 2.5)), transients(), ClaimVerdict.AS_PRINTED),
+        (panel(), panel(wandering=(2.0, 2.1)), transients(), ClaimVerdict.CORRECTED),
+        (panel(), panel((2.0, 2.05), wandering=(2.0, 2.1, 2.2, 2.3)), transients(), ClaimVerdict.CORRECTED),  # hardly any lasts
+        (panel(), panel(wandering=(2.0, 2.1)), transients((5, 5, 5)), ClaimVerdict.UNDECIDED),  # nothing settles
+        (panel(), panel(wandering=(2.0, 2.1)), transients(returned=1), ClaimVerdict.UNDECIDED),
+        (panel(wandering=(2.0, 2.1)), panel(wandering=(2.0,)), transients(), ClaimVerdict.DISAGREES),
+        (panel(), panel(wandering=(0.4,)), transients(), ClaimVerdict.DISAGREES),  # at low frequency alone
     ],
 )
-def test_chaos_at_high_frequency_lasts_or_is_a_transient_by_erratum_31(small, large, verdict):
-    assert verdicts(chaos_measures.ground_spectra({0.25: small, 0.5: large}))["fig10-chaos"] is verdict
+def test_erratum_31_chaos_at_high_frequency_lasts_or_is_a_transient(small, large, settled, verdict):
+    assert verdicts(chaos_measures.ground_spectra({0.25: small, 0.5: large}, settled))["fig10-chaos"] is verdict
 
 
 @pytest.mark.parametrize(
     ("frequencies", "first", "verdict"),
     [
         ({"a": 2.0, "b": 4.0}, (1.0, 2.0), ClaimVerdict.AS_PRINTED),
-        ({"a": 0.5, "b": 1.0}, (2.0, 1.0), ClaimVerdict.CORRECTED),
-        ({"a": 2.0, "b": 4.0}, (2.0, 1.0), ClaimVerdict.DISAGREES),  # no erratum above the resonance
+        ({"a": 2.0, "b": 4.0}, (2.0, 1.0), ClaimVerdict.DISAGREES),
+        ({"a": 2.0, "b": 4.0}, (1.0, None), ClaimVerdict.UNDECIDED),  # what does not last begins nowhere
     ],
 )
-def test_chaos_begins_at_larger_loads_for_larger_frequencies_above_the_resonance(frequencies, first, verdict):
-    panels = {frequency: panel((start, start + 0.3)) for frequency, start in zip(frequencies.values(), first, strict=True)}
+def test_chaos_begins_at_larger_loads_for_larger_frequencies(frequencies, first, verdict):
+    spans = [[] if start is None else [(start, start + 0.3)] for start in first]
+    panels = {frequency: panel(*span) for frequency, span in zip(frequencies.values(), spans, strict=True)}
     assert verdicts({"fig12-shift": chaos_measures.shifts(panels)}) == {"fig12-shift": verdict}
 
 
 @pytest.mark.parametrize(
-    ("spans", "verdict"),
-    [([(1.0, 1.2), (2.0, 2.2)], ClaimVerdict.AS_PRINTED), ([(1.0, 1.2)], ClaimVerdict.DISAGREES), ([], ClaimVerdict.DISAGREES)],
+    ("two", "three", "verdict"),
+    [
+        ([(1.0, 1.4)], [(1.0, 2.0)], ClaimVerdict.AS_PRINTED),
+        ([(0.8, 0.9), (1.0, 1.4)], [(1.0, 2.0)], ClaimVerdict.CORRECTED),  # erratum 37, and only at Hhat = 2
+        ([(0.5, 0.9)], [(1.0, 2.0)], ClaimVerdict.DISAGREES),
+    ],
 )
-def test_two_regions_of_chaos_are_parted_by_stable_motions(spans, verdict):
+def test_erratum_37_chaos_lies_at_the_printed_frequencies_in_every_panel(two, three, verdict):
+    panels = {0.2: panel(), 2.0: panel(*two), 3.0: panel(*three)}
+    assert verdicts(chaos_measures.force_spectra(panels))["fig09-chaos-range"] is verdict
+
+
+@pytest.mark.parametrize(
+    ("spans", "verdict"),
+    [
+        ([(1.0, 1.2), (2.0, 2.2)], ClaimVerdict.AS_PRINTED),
+        ([(1.0, 1.1), (1.15, 1.2), (2.0, 2.2)], ClaimVerdict.AS_PRINTED),  # a narrow window parts no regions
+        ([(0.2, 0.4), (1.0, 1.2), (2.0, 2.2)], ClaimVerdict.CORRECTED),  # erratum 37
+        ([(1.0, 1.2)], ClaimVerdict.DISAGREES),
+        ([], ClaimVerdict.DISAGREES),
+    ],
+)
+def test_erratum_37_two_regions_of_chaos_are_two_and_parted_by_stable_motions(spans, verdict):
     assert verdicts(chaos_measures.force_diagrams({1.0: panel(*spans)}))["fig11-two-regions"] is verdict
+
+
+def test_motions_between_two_regions_of_chaos_must_be_large():
+    small = panel((1.0, 1.2), (2.0, 2.2))
+    small["branch_001"] = xr.DataTree(branch([2.5, 3.0], [2.0, 2.0], [1, 1]))
+    assert verdicts(chaos_measures.force_diagrams({1.0: small}))["fig11-two-regions"] is ClaimVerdict.DISAGREES

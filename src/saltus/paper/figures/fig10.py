@@ -77,6 +77,7 @@ def measure(data: Any) -> dict[str, Measured | None]:
     drawn = {name: tree for name, tree in data.children.items() if name in AMPLITUDES}
     panels = {AMPLITUDES[name]: tree for name, tree in drawn.items()}
     found = {**response_measures.ground_spectra(panels), **chaos_measures.ground_spectra(panels, data["transients"])}
+    found |= {"fig10-equivalent": response_measures.equivalent_rotation(panels)}
     return {**found, "fig10-validity": validity("Fig. 10", drawn)}
 
 

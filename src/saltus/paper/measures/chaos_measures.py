@@ -114,7 +114,7 @@ def _wandering(spectrum: Any) -> np.ndarray:
 
 
 def _at_high_frequency(panels: Panels, transients: Any) -> Measured:
-    """As printed: what wanders there is chaos that lasts, and more of it as the load grows. Erratum 31: most of it is a transient."""
+    """As printed: what wanders there is chaos that lasts, the more the larger the load. Erratum 31: most of it is a transient."""
     seen = [_wandering(tree) for tree in panels.values()]
     seen = [values[values > CRITERIA.high] for values in seen]
     bands = [[band for band in bands_of(tree) if band["low"] > CRITERIA.high] for tree in panels.values()]
@@ -132,7 +132,7 @@ def _at_high_frequency(panels: Panels, transients: Any) -> Measured:
         panels=[{"load": load, "values": n, "lasting": m} for load, n, m in zip(panels, counts, lasting, strict=True)],
         bands=bands[-1],
         motions=int(transients["motions"]),
-        settled=[{"settled": int(n), "periods": int(p)} for n, p in zip(settled, transients["periods"].values, strict=True)],
+        settled=[{"number": int(n), "periods": int(p)} for n, p in zip(settled, transients["periods"].values, strict=True)],
     )
 
 

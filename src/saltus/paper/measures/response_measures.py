@@ -26,6 +26,7 @@ from saltus.paper.measures.spectrum_features import (
     range_counts,
     superharmonic,
 )
+from saltus.systems import System
 
 Panels = Mapping[float, Any]
 
@@ -171,6 +172,18 @@ def ground_spectra(panels: Panels) -> dict[str, Measured]:
         "fig10-loops": loops(panels),
         "fig10-confirmed": confirmed(panels.values()),
     }
+
+
+def equivalent_rotation(panels: Panels) -> Measured:
+    """The way that the mass goes sideways, the integral of sin(beta0 + theta), up to theta_eq, against zetahat."""
+    from scipy.integrate import quad
+
+    rows = []
+    for amplitude, tree in panels.items():
+        beta0 = float(System.from_json(str(tree.attrs["system"])).get("model.beta0"))
+        way, _ = quad(lambda theta, beta0=beta0: np.sin(beta0 + theta), 0.0, float(tree.attrs["scale"]), epsabs=1e-14)
+        rows.append({"load": amplitude, "angle": np.rad2deg(float(tree.attrs["scale"])), "way": way})
+    return measured(max(abs(row["way"] - row["load"]) for row in rows), panels=rows)
 
 
 def _no_superharmonics(mains: Panels) -> Measured:
