@@ -128,3 +128,18 @@ def test_motions_between_two_regions_of_chaos_must_be_large():
     small = panel((1.0, 1.2), (2.0, 2.2))
     small["branch_001"] = xr.DataTree(branch([2.5, 3.0], [2.0, 2.0], [1, 1]))
     assert verdicts(chaos_measures.force_diagrams({1.0: small}))["fig11-two-regions"] is ClaimVerdict.DISAGREES
+
+
+@pytest.mark.parametrize(
+    ("edges", "verdict"),
+    [
+        ((("cascade", "cascade"), ("grazing", "crisis")), ClaimVerdict.AS_PRINTED),
+        ((("cascade", "crisis"), ("cascade", "fold")), ClaimVerdict.DISAGREES),  # no grazing leads to chaos
+        ((("unknown", "grazing"), ("fold", "fold")), ClaimVerdict.DISAGREES),  # nor a cascade
+    ],
+)
+def test_the_route_to_chaos_is_what_happens_at_the_edges_of_bands(edges, verdict):
+    tree = panel((1.0, 1.2), (2.0, 2.2))
+    table = tree["bands"].to_dataset().assign(low_edge=("band", [e[0] for e in edges]), high_edge=("band", [e[1] for e in edges]))
+    tree["bands"] = xr.DataTree(table)
+    assert verdicts(chaos_measures.force_diagrams({1.0: tree}))["fig11-route"] is verdict

@@ -33,6 +33,7 @@ class ChaosCriteria:
 
 
 CRITERIA = ChaosCriteria()
+ROUTES = ("cascade", "grazing")  # the kinds of edges of bands by which the paper sees chaos reached
 
 
 def bands_of(spectrum: Any) -> list[dict[str, float]]:
@@ -148,17 +149,17 @@ def force_diagrams(panels: Panels) -> dict[str, Measured | None]:
 
 
 def _route(panels: Panels) -> Measured:
-    doubled: list[bool] = []
-    rows: list[dict[str, Any]] = []
+    """Whether in every panel chaos is reached at the edge of a band by a cascade, and at another by a grazing."""
+    holds, rows = [], []
     for frequency, tree in panels.items():
         born = [branch for _, branch in branches_of(tree) if "PD" in branch.attrs["end_kinds"]]
         periods = sorted({int(branch["period"][0]) for branch in born})
         edges = [str(kind) for edge in ("low_edge", "high_edge") for kind in tree["bands"][edge].values]
-        doublings, grazings = count(tree, "PD"), count(tree, "GR")
-        doubled.append(doublings > 0 and any(period % 2 == 0 for period in periods))
-        row = {"frequency": frequency, "doublings": doublings, "grazings": grazings}
-        rows.append(row | {"periods": [{"period": q} for q in periods], "edges": [{"edge": edge} for edge in edges]})
-    return measured(bool(doubled) and all(doubled) and all(row["grazings"] > 0 for row in rows), panels=rows)
+        number = {kind: edges.count(kind) for kind in ROUTES}
+        holds.append(all(number.values()))
+        others = len(edges) - sum(number.values())
+        rows.append({"frequency": frequency, "others": others, "periods": [{"period": q} for q in periods], **number})
+    return measured(bool(holds) and all(holds), bool(holds) and all(row["cascade"] for row in rows), panels=rows)
 
 
 def two_regions(panels: Panels) -> Measured:
