@@ -160,7 +160,12 @@ def _confirmed(branches: dict[float | None, Any], count: int) -> Any:
     return dataset(
         {
             "amplitude": ("motion", amplitude, "rad", "max abs(theta) of the smoothed orbit"),
-            "settled": ("motion", exact, "rad", "max abs(theta) of the exact motion from its state, after 388 periods"),
+            "settled": (
+                "motion",
+                exact,
+                "rad",
+                "max abs(theta) of the exact motion from its state in the last 12 of 400 periods",
+            ),
             "sharpness": ("motion", sharpness, "1", "B"),
             "frequency": ("motion", frequency, "1", "Omega"),
         },
