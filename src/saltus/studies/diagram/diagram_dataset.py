@@ -48,7 +48,7 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
         window=np.ravel(search.window).tolist(),
         left=search.branches.left,
         **facts,
-        **asdict(search.effort) | {"values": len(search.grid), "motions": len(search.found.motions)},
+        **_effort(search) | {"values": len(search.grid), "motions": len(search.found.motions)},
         missed_share=search.missed.share,
         missed_low=low,
         missed_high=high,
@@ -63,6 +63,13 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
     bands = {"bands": band_dataset()} if chaos is None else explained(system, chaos, branches).to_datasets()
     found = {"attractors": _attractors(search), "unplaced": _unplaced(search)}
     return xarray.DataTree.from_dict({**nodes, **found, **bands, "search": _searched(search)})
+
+
+def _effort(search: DiagramSearch) -> dict[str, Any]:
+    """How much was tried, as attributes: of the search for chaos the shares of the range to which it went."""
+    tried, chaos = asdict(search.effort), search.effort.chaos
+    del tried["chaos"]
+    return tried | {"chaos_step": chaos.step, "chaos_edge": chaos.edge}
 
 
 def _limits(system: System, path: str, bounds: tuple[float, float]) -> list[float]:
