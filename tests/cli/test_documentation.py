@@ -59,7 +59,10 @@ def test_the_impact_laws_are_all_named():
 
 @pytest.mark.parametrize(
     "name",
-    ["README.md", *(f"docs/{page}.md" for page in ("attractors", "contacts", "ensembles", "models", "orbits", "smoothing"))],
+    [
+        "README.md",
+        *(f"docs/{page}.md" for page in ("attractors", "contacts", "ensembles", "models", "orbits", "smoothing", "validity")),
+    ],
 )
 def test_every_snippet_runs(name, monkeypatch):
     text = (ROOT / name).read_text(encoding="utf-8")
