@@ -51,6 +51,7 @@ def find(kind: str, name: str) -> type[Model] | type[ImpactLaw]:
     """The class called `name`, of the `kind` "model" or "impact"."""
     known: dict[str, Any] = MODELS if kind == "model" else IMPACTS
     if name not in known:
-        raise ParameterError(f"{kind}.type {shown(name)} is not known; {near(name, known)}", f"{kind}.type")
+        hint = f"{near(name, known)} (one of your own is made known by saltus.register)"
+        raise ParameterError(f"{kind}.type {shown(name)} is not known; {hint}", f"{kind}.type")
     found: type[Model] | type[ImpactLaw] = known[name]
     return found
