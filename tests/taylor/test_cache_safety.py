@@ -49,9 +49,19 @@ def kept(home):
     return {path: path.read_bytes() for path in (home / "cache").rglob("*") if path.is_file()}
 
 
-def test_a_new_folder_is_the_user_s_alone(home):
-    assert cache_directory() == home / "cache" / "kernels"
-    assert cache_directory().stat().st_mode & 0o777 == 0o700
+@pytest.mark.parametrize("umask", [0o022, 0o002, 0o000])
+def test_a_new_folder_is_the_user_s_alone(home, umask):
+    """Whatever the user lets his group do elsewhere; and it is used again."""
+    before = os.umask(umask)
+    try:
+        for _ in range(2):
+            assert cache_directory() == home / "cache" / "kernels"
+            assert load_module("safety", SOURCE).doubled(3.0) == 6.0
+        for folder in (cache_directory(), cache_directory() / "__pycache__"):
+            assert folder.stat().st_mode & 0o777 == 0o700
+    finally:
+        os.umask(before)
+        del sys.modules[cache.module_name("safety", SOURCE)]
 
 
 def link(path):

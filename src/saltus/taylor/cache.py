@@ -66,13 +66,12 @@ def _problem(folder: Path) -> str | None:
     """Why a folder is not one to keep code in, or None; it is made as needed."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with contextlib.suppress(FileExistsError):
-            folder.mkdir(mode=0o700)
-        for part in (folder, folder / "__pycache__"):  # the second is numba's
-            if part == folder or part.exists() or part.is_symlink():
-                found = _shared(part.lstat())
-                if found:
-                    return found
+        for part in (folder, folder / "__pycache__"):  # the second is numba's, which would let the user's group write to it
+            with contextlib.suppress(FileExistsError):
+                part.mkdir(mode=0o700)
+            found = _shared(part.lstat())
+            if found:
+                return found
     except OSError as error:
         return f"it cannot be made ({(error.strerror or str(error)).lower()})"
     return None if os.access(folder, os.W_OK) else "it cannot be written to"
