@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from saltus.checks import check_along, check_bounds, check_kind, check_path, check_step
@@ -33,6 +34,7 @@ def continue_orbit(
     *,
     functions: dict[str, UserFunction] | None = None,
     step: float = STEP,
+    while_stable: bool = False,
     progress: Progress = silent,
 ) -> Branch:
     """The branch of an orbit along a parameter, both ways, until it closes, reaches a bound, shrinks to rest or cannot go on.
@@ -44,6 +46,7 @@ def continue_orbit(
         functions: further functions of an orbit whose zeros are special points, by name. Those of the model's margins are
             found anyway.
         step: the longest step, in the norm of `OrbitCurve`.
+        while_stable: whether to end just beyond the loss of stability; an orbit that rests never loses it.
         progress: called with the share of the range that has been seen and the value of the parameter.
 
     Raises:
@@ -59,7 +62,8 @@ def continue_orbit(
     if isinstance(orbit, RestingOrbit):
         first, events, steps = first_point(orbit, path, (low, high)), RestingEvents, resting_steps(step)
     else:
-        first, events, steps = start(*along(orbit, path), scale=(high - low) / 3.0), BranchEvents, replace(STEPS, longest=step)
+        first, steps = start(*along(orbit, path), scale=(high - low) / 3.0), replace(STEPS, longest=step)
+        events = partial(BranchEvents, while_stable=while_stable)
     course = both_ways(first, lambda: events(functions or {}), {path: (low, high)}, steps, progress)
     return Branch(**vars(course), path=path)
 

@@ -45,19 +45,23 @@ class BranchSet:
     most: int  # with this number of branches, no more are followed that are born on others
     placed: list[PlacedBranch] = field(default_factory=list)
     grown: set[int] = field(default_factory=set)  # the branches on which all that is born was followed
+    partial: set[int] = field(default_factory=set)  # the branches that were followed only while they are stable
     left: int = 0  # special points at which a family is born that is not followed
 
-    def follow(self, orbit: PeriodicOrbit) -> bool:
-        """Follow an orbit, then the parents on whose special points its branch ends, unless it lies on a known branch."""
-        waiting, known = [orbit], len(self.placed)
+    def follow(self, orbit: PeriodicOrbit, while_stable: bool = False) -> None:
+        """Follow an orbit that lies on no known branch: only while it is stable, or all the way with the parents on whose
+        special points its branch ends."""
+        if while_stable and not self.knows(orbit):
+            self.placed.append(PlacedBranch(self._continued(orbit, while_stable=True)))
+            self.partial.add(id(self.placed[-1]))
+        waiting = [] if while_stable else [orbit]
         while waiting:
             waiting += self._follow(waiting.pop(0))
-        return len(self.placed) > known
 
     def grow(self, progress: Progress) -> None:
         """Follow what is born on the branches, on the widest first."""
         while self.switch:
-            widest = max((b for b in self.branches if id(b) not in self.grown), key=self._width, default=None)
+            widest = max((b for b in self._whole if id(b) not in self.grown), key=self._width, default=None)
             if widest is None:
                 return
             self.grown.add(id(widest))
@@ -66,14 +70,28 @@ class BranchSet:
 
     @property
     def branches(self) -> list[Branch]:
-        """The branches, in the order in which they were followed."""
-        return [placed.branch for placed in self.placed]
+        """The branches, in the order in which they were followed, without parts of others that were found later."""
+        return [placed.branch for placed in self.placed if not (id(placed) in self.partial and self._is_part(placed.branch))]
+
+    @property
+    def _whole(self) -> list[Branch]:
+        """Those that were followed all the way."""
+        return [placed.branch for placed in self.placed if id(placed) not in self.partial]
+
+    def _is_part(self, branch: Branch) -> bool:
+        """Whether a branch that was followed only while it is stable is a part of one that was followed all the way."""
+        inner = branch.points[len(branch.points) // 2].orbit
+        value = float(inner.solution.values[0])
+        return any(other.holds(inner, value) for other in self.placed if id(other) not in self.partial)
+
+    def _continued(self, orbit: PeriodicOrbit, while_stable: bool = False) -> Branch:
+        return continue_orbit(orbit, self.path, self._range(orbit.period), step=self.step, while_stable=while_stable)
 
     def _follow(self, orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
         """Follow an orbit unless it lies on a known branch; returns orbits of the branches on which its own ends."""
         if self.knows(orbit):
             return []
-        branch = continue_orbit(orbit, self.path, self._range(orbit.period), step=self.step)
+        branch = self._continued(orbit)
         self.placed.append(PlacedBranch(branch))
         specials = filter(self._is_branching, branch.special) if self.switch else ()
         return [beside for special in specials if _is_parent(special, branch) for beside in _beside(special)]
@@ -112,7 +130,7 @@ class BranchSet:
 
     def _is_followed(self, special: SpecialPoint) -> bool:
         """Whether a branch of the orbits that are born at a special point begins or ends there."""
-        for branch in self.branches:
+        for branch in self._whole:
             for place, inner, end in zip((0, -1), (1, -2), branch.ends, strict=True):
                 last = branch.points[place].orbit
                 family = branch.points[inner].orbit if len(branch.points) > 2 else last

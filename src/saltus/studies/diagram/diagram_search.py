@@ -27,6 +27,9 @@ from saltus.systems import System
 class DiagramSearchSettings:
     """How the search of a diagram goes on from what it has found."""
 
+    # Motions that simulation shows to be stable in less than this share of the range are followed only while they are stable:
+    # there is no end of them in chaos, and each has long unstable parts.
+    narrow: float = 0.02
     rounds: int = 100  # Rounds of starts from neighbours: each adds what the one before has found a value further.
     transient: int = 24  # Forcing periods at the beginning of motions in which near returns are looked for.
     # Where a stable part of a branch ends, motions are started from its last orbit, these shares of the range further on both
@@ -103,7 +106,7 @@ class DiagramSearch:
             for run in self.found.families(rows):
                 row = int(run[len(run) // 2])
                 if not self._is_placed(row, self.branches.placed[self.found.looked[row] :]):
-                    self.found.place[row] = self._follow(row)
+                    self.found.place[row] = self._follow(row, while_stable=self._is_narrow(run))
                 known = len(self.branches.placed)
                 progress(known / (known + len(rows)), f"following, {known} branches")
 
@@ -120,7 +123,12 @@ class DiagramSearch:
     def _is_placed(self, row: int, branches: list[PlacedBranch]) -> bool:
         return bool(placed(self.found.motions.only([row]), branches, self.mirrored)[0])
 
-    def _follow(self, row: int) -> Place:
+    def _is_narrow(self, run: np.ndarray) -> bool:
+        """Whether motions of a run are stable in a small part of the range alone, as far as simulated values show."""
+        span, gap = np.ptp(self.found.motions.value[run]), np.diff([self.bounds[0], *self.grid, self.bounds[1]]).max()
+        return bool(span + 2.0 * gap < SETTINGS.narrow * (self.bounds[1] - self.bounds[0]))
+
+    def _follow(self, row: int, while_stable: bool) -> Place:
         """Follow a simulated motion; returns where it then stands."""
         motions = self.found.motions
         system = self.system.with_({self.path: float(motions.value[row])})
@@ -128,7 +136,7 @@ class DiagramSearch:
         if orbit is None:
             return Place.NO_ORBIT
         known = len(self.branches.placed)
-        self.branches.follow(orbit)
+        self.branches.follow(orbit, while_stable and orbit.stable)
         if self._is_placed(row, self.branches.placed[known:]):
             return Place.ON_BRANCH
         return Place.ELSEWHERE if orbit.stable else Place.UNSTABLE
