@@ -48,7 +48,7 @@ EFFORTS = {
         chaos=replace(CHAOS, step=4e-3, fine_step=2e-3, edge=1e-3, judgements=CHAOS.judgements[:1]),
     ),
     Effort.STANDARD: EffortSettings(
-        values=201, starts=24, periods=400, repelling_values=25, branches=30, jumps=0, sample=1000, samples=3
+        values=201, starts=24, periods=400, repelling_values=25, branches=30, jumps=2, sample=1000, samples=3
     ),
     Effort.THOROUGH: EffortSettings(
         values=801,
