@@ -170,3 +170,14 @@ def test_a_pair_beyond_the_circle_where_areas_never_grow_is_reported_as_missed(m
     branch = saltus.continue_orbit(saltus.find_orbit(system, x=0.0), "load.force.amplitude", (0.04, 0.06))
     assert branch.missed
     assert all(str(one).startswith("NS near 0.0") and "areas of states never grow" in str(one) for one in branch.missed)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.02, 0.01])
+def test_the_instant_of_a_passage_may_go_through_phase_0(step):
+    """With a damper the state at phase 0 has a corner there, at 0.43782756, on which steps shrank to nothing."""
+    numbers = {"stop": 40.0, "damper": 0.3, "edge": 0.0659496, "damping": 0.1315172, "amplitude": 0.2826206}
+    orbit = saltus.find_orbit(soft_stop(**numbers, frequency=0.4811265), x=-0.234)
+    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.42, 0.5), step=step)
+    assert sorted(end.parameter for end in branch.ends) == [0.42, 0.5]
+    sides = {point.orbit.state[0] > 0.0659496 for point in branch.points}
+    assert sides == {True, False}

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from saltus.continuation import Corrected, EquationCurve, Point
+from saltus.continuation import STEPS, Corrected, EquationCurve, Point
+from saltus.flow import segments as at
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Equations, Problem
@@ -68,6 +69,23 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
     def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> OrbitPoint:
         return OrbitPoint(self, found.place, tangent, found.iterations, found.evaluation)
 
+    def advance(self, before: OrbitPoint | None, point: OrbitPoint, step: float) -> OrbitPoint | None:
+        """The point a step further; a short step may go round the corner at which the state of phase 0 passes the contact."""
+        ahead = super().advance(before, point, step)
+        if ahead is not None or step > STEPS.restart or not self.problem.passes_contact:
+            return ahead
+        ahead = self.solve(point.place + step * point.tangent, point.tangent)
+        if ahead is None or self.norm(ahead.place - point.place) > 2.0 * step:
+            return None
+        return ahead if self.norm(_seen_from(point, ahead).tangent - point.tangent) < STEPS.off else None
+
+    def turn(self, a: OrbitPoint, b: OrbitPoint) -> float:
+        """The angle between the tangents, without that of such a corner."""
+        angle = super().turn(a, b)
+        if not self.problem.passes_contact or self.norm(b.place - a.place) > 2.0 * STEPS.restart:
+            return angle
+        return min(angle, super().turn(a, _seen_from(a, b)))
+
     def with_problem(self, problem: Problem) -> OrbitCurve:
         """The curve of another problem of the same system."""
         return OrbitCurve(problem, self.scales, self.symmetric)
@@ -77,6 +95,21 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
         place = np.concatenate([unknowns, values])
         equations = self.evaluate(place, thorough=True)
         return None if equations is None else Corrected(place, equations, 0)
+
+
+def _seen_from(a: OrbitPoint, b: OrbitPoint) -> OrbitPoint:
+    """A point with its tangent as it would be if the contact were passed before phase 0 as at a point beside it.
+
+    Where an orbit passes the contact at phase 0 its state there has a corner, if the acceleration jumps with the velocity, as by
+    a damper: the instant moves by -dx/v, and the velocity by that times the jump. Nothing else of the orbit has one.
+    """
+    own = a.curve.problem.own
+    first, second = (point.equations.ends[0, at.KINDS + 3 * own :] for point in (a, b))
+    if own > 1 or second[1] == 0.0:
+        return b
+    tangent = b.tangent.copy()
+    tangent[1] -= (second[2] - first[2]) / second[1] * tangent[0]
+    return replace(b, tangent=tangent / b.curve.norm(tangent))
 
 
 def start(orbit: PeriodicOrbit, symmetric: bool, scale: float) -> OrbitPoint:
