@@ -9,22 +9,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.branch_lines import smooth_lines
 from saltus.flow import simulate, simulate_many
 from saltus.orbits import continue_orbit, find_orbit, switch_branch
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import dataset, joined
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.harmonic_loads import BETA0, DAMPING, FREQUENCY, VERTICAL, under_force
-from saltus.plots import DOUBLE_COLUMN, FAINT, INK, STABLE, STABLE_LINE, UNSTABLE_LINE, new_figure, panel_label, styled
+from saltus.paper.figures.smoothing_panels import BOUNDS, REGULAR, draw
 from saltus.systems import System
 
 AMPLITUDE = 0.5  # Hhat
-BOUNDS = (0.2, 1.0)  # Omega
 SHARPNESS = (20.0, 50.0, 100.0, 200.0, 400.0, 1000.0, 2000.0)  # B of the branches
-SHOWN = (50.0, 200.0, 1000.0)  # B that are drawn
-WINDOW = (0.2655, 0.2875)  # Omega of the superharmonic resonance that is drawn, with its grazings
-REGULAR = 0.6  # Omega of an orbit without a special point nearby
 FEATURES = {  # kind and frequency near which a special point is looked for, and how far away it may be
     "fold of the primary resonance (upper)": ("LP", 0.9088, 1e-3),
     "fold of the primary resonance (lower)": ("LP", 0.8485, 1e-3),
@@ -36,9 +31,6 @@ KNOT = (0.8486, 0.8492)  # Omega between which the amplitude curve crosses itsel
 CONFIRMED = 1e-3  # rad by which the amplitudes of a confirmed motion may differ
 LONGEST_STEP = 1e-4  # the paper's Maximum Time Step
 ENOUGH = 400.0  # B from which all stable motions must be confirmed
-SHADES = {50.0: "#e08a1e", 200.0: "#8e5ea2", 1000.0: "#4f8f5b", 5000.0: "#7a7a7a", 20000.0: "#1a1a1a"}  # by B
-MARKERS = {"LP": "o", "BPC": "s", "GR": "D"}
-KIND_NAMES = {"LP": "fold", "BPC": "symmetry breaking", "GR": "grazing"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -215,103 +207,6 @@ def _integrated(sharpness: float, rtol: float) -> tuple[int, float, float]:
         count, time = count + int(piece.nfev), float(piece.t[-1])
         state, side = [0.0 if piece.status == 1 else float(piece.y[0, -1]), float(piece.y[1, -1])], -side
     return count, state[0], state[1]
-
-
-@styled
-def draw(data: Any) -> Any:
-    """(a) the spectrum, (b) its superharmonic resonance, (c) errors over B, (d) errors over the work."""
-    figure = new_figure(DOUBLE_COLUMN, 150.0)
-    axes = figure.subplots(2, 2)
-    _draw_branches(axes[0, 0], data, SHOWN[:1])
-    _draw_branches(axes[0, 1], data, SHOWN)
-    _draw_settled(axes[0, 1], data["confirmed"])
-    _draw_errors(axes[1, 0], data["features"])
-    _draw_work(axes[1, 1], data["work"])
-    axes[0, 0].set_xlim(*BOUNDS)
-    axes[0, 0].set_ylim(bottom=0.0)
-    axes[0, 1].set_xlim(*WINDOW)
-    axes[0, 1].set_ylim(0.985, 1.085)
-    axes[0, 1].set_xticks([0.27, 0.275, 0.28, 0.285])
-    for ax, label in zip(axes.flat, "abcd", strict=True):
-        panel_label(ax, label)
-    return figure
-
-
-def _draw_branches(ax: Any, data: Any, shown: tuple[float, ...]) -> None:
-    """The exact branch in the conventions of all spectra, and smoothed ones in shades, dashed where they are unstable."""
-    for name in ("exact", "broken"):
-        _draw_branch(ax, data[name].to_dataset(), {"linewidth": 1.6, "zorder": 3}, "exact" if name == "exact" else None)
-    for b in shown:
-        look = {"color": SHADES[b], "linewidth": 0.9, "zorder": 4}
-        _draw_branch(ax, data[f"B{b:g}"].to_dataset(), look, rf"$\mathcal{{B}}={b:g}$")
-    exact = data["exact"].to_dataset()
-    for kind, marker in MARKERS.items():
-        here = exact["kind"].values == kind
-        ax.plot(
-            exact["special_parameter"].values[here], exact["special_amplitude"].values[here],
-            linestyle="none", marker=marker, markersize=4.0, markerfacecolor="white", color=INK, zorder=5, label=KIND_NAMES[kind],
-        )  # fmt: skip
-    ax.set_xlabel(r"frequency $\Omega$")
-    ax.set_ylabel(r"$\max|\theta|$ (rad)")
-    ax.legend(loc="upper left")
-
-
-def _draw_branch(ax: Any, branch: Any, look: dict[str, Any], label: str | None) -> None:
-    for i, part in enumerate(smooth_lines(branch)):
-        kind = STABLE_LINE if part.stable else UNSTABLE_LINE
-        ax.plot(*part.places.T, **kind | look, label=None if i else label)
-
-
-def _draw_settled(ax: Any, confirmed: Any) -> None:
-    """On what exact motions from the states of smoothed orbits settle, as dots."""
-    here = confirmed["sharpness"].values == SHOWN[0]
-    ax.plot(
-        confirmed["frequency"].values[here], confirmed["settled"].values[here],
-        linestyle="none", marker="o", markersize=2.6, color=STABLE, zorder=4, label=r"exact motion from there",
-    )  # fmt: skip
-    ax.legend(loc="upper left", ncols=2, columnspacing=1.0)
-
-
-def _draw_errors(ax: Any, features: Any) -> None:
-    """How far each special point, the knot and an ordinary amplitude are from the exact ones."""
-    sharpness, looks = features["sharpness"].values[1:], iter(("o-", "s-", "^-", "v-", "D-", "x--", "+--"))
-    rows = {str(name): features["frequency"].values[:, i] for i, name in enumerate(features["feature"].values)}
-    rows |= {
-        "knot of the primary resonance": features["knot"].values,
-        rf"$\max|\theta|$ at $\Omega={REGULAR:g}$": features["regular"].values,
-    }
-    for name, values in rows.items():
-        ax.loglog(
-            sharpness,
-            abs(values[1:] - values[0]),
-            next(looks),
-            markersize=3.0,
-            linewidth=0.8,
-            markerfacecolor="white",
-            label=name,
-        )
-    guide = np.array([40.0, 1000.0])
-    ax.loglog(guide, 3e-4 / guide**2, color=FAINT, linewidth=0.8, zorder=1)
-    ax.annotate(r"$\mathcal{B}^{-2}$", (guide[0], 3e-4 / guide[0] ** 2), textcoords="offset points", xytext=(-14, -2), color=INK)
-    ax.set_xlabel(r"$\mathcal{B}$")
-    ax.set_ylabel("distance from the exact value")
-    ax.set_ylim(1e-15, 0.1)
-    ax.legend(loc="lower left", fontsize=7.0)
-
-
-def _draw_work(ax: Any, work: Any) -> None:
-    """Errors over evaluations: one line for each B, and the exact equation from impact to impact."""
-    for sharpness, evaluations, error in zip(
-        work["sharpness"].values, work["evaluations"].values, work["error"].values, strict=True
-    ):
-        exact = math.isinf(sharpness)
-        label = "exact, impact by impact" if exact else rf"$\mathcal{{B}}={sharpness:g}$"
-        colour = STABLE if exact else SHADES[sharpness]
-        ax.loglog(evaluations, error, "o-", color=colour, markersize=3.0, linewidth=1.4 if exact else 0.9, label=label)
-    ax.set_xlabel("evaluations of the right-hand side in 20 periods")
-    ax.set_ylabel("error of the last state")
-    ax.set_ylim(top=0.5)
-    ax.legend(loc="upper right", ncols=2, columnspacing=1.0)
 
 
 def measure(data: Any) -> dict[str, Measured]:
