@@ -26,12 +26,14 @@ def _chart(data: Any) -> Iterator[str]:
         yield from _chart(data["chart"].to_dataset())
         yield from _borders(data)
         return
-    moving, wild = int((data["count"] > 0).sum()), int((data["unsettled"] > 0).sum())
-    unit = data["amplitude"].attrs["units"].replace("1", "")
+    moving, unit = int((data["count"] > 0).sum()), data["amplitude"].attrs["units"].replace("1", "")
     text = f"Stable motions beside rest in {moving} of {data['count'].size} cells"
     yield text + (f", the largest amplitude is {float(data['amplitude'].max()):.4g} {unit}".rstrip() + "." if moving else ".")
-    if wild:
-        yield f"In {wild} cells some motion does not settle."
+    outcome = data["outcome"]
+    for value, name in zip(outcome.attrs["flag_values"], outcome.attrs["flag_meanings"].split(), strict=True):
+        number = int((outcome == value).sum())
+        if number and name in ("chaos", "motions_and_chaos", "long", "undecided"):
+            yield f"{name.replace('_', ' ').capitalize()} in {number} cells."
 
 
 def _borders(tree: Any) -> Iterator[str]:
@@ -40,16 +42,14 @@ def _borders(tree: Any) -> Iterator[str]:
 
     left, kinds = tree["disagreements"].to_dataset(), [str(curve.attrs["kind"]) for curve in border_curves(tree)]
     curves = ", ".join(f"{kinds.count(kind)} {kind}" for kind in sorted(set(kinds))) or "none"
-    total, looked = int(left.attrs["changes"]), int(left["looked_into"].sum())
-    on, harmless, unexplained = int(left.attrs["on_curves"]), int(left.attrs["harmless"]), left.sizes["change"]
+    total, located, harmless = (int(left.attrs[name]) for name in ("changes", "located", "harmless"))
     added = int(tree["chart"].attrs["added_by_continuation"])
     yield (
-        f"Exact borders: {curves} as curves. Of {total} ends of motions between neighbouring cells "
-        f"{on} lie on them, {total - on - harmless - unexplained} at other special points, {harmless} are none, as the same "
-        f"motion goes on, {looked} are not explained and {unexplained - looked} were not looked into."
+        f"Exact borders: {curves} as curves. Of {total} ends of motions between neighbouring cells {located} are located between "
+        f"them, {harmless} are none, as the same motion goes on, and {left.sizes['change']} are not explained."
     )
     if added:
-        yield f"{added} motions of cells, to which no start leads, are known from their neighbours by continuation."
+        yield f"{added} motions of cells, to which no start leads, are known from their neighbours."
 
 
 def _diagram(tree: Any) -> Iterator[str]:

@@ -17,6 +17,7 @@ from saltus.errors import ParameterError
 if TYPE_CHECKING:
     from saltus.sweep import StoreStatus
 
+PARTS = "parts"  # the folder of a store in which further work on its result is kept
 BAR_WIDTH = 40  # columns of the bar
 FAILURES_NAMED = 5  # failed chunks that are named
 
@@ -43,7 +44,7 @@ def print_status(path: Path, verify: bool = False) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
-    for head, text in rows(found):
+    for head, text in (*rows(found), *parts(path)):
         table.add_row(head, Text(text))
     console.print(table)
     if found.damaged:
@@ -96,6 +97,17 @@ def rows(found: StoreStatus) -> Iterator[tuple[str, str]]:
         yield "", str(failure)
     if found.failed > FAILURES_NAMED:
         yield "", f"and {found.failed - FAILURES_NAMED} more"
+
+
+def parts(path: Path) -> Iterator[tuple[str, str]]:
+    """The lines of the further work whose stores are kept within a store, such as that on the borders of a chart."""
+    from saltus.sweep import status
+
+    folder = path / PARTS
+    for part in sorted(folder.iterdir()) if folder.is_dir() else ():
+        if (part / "zarr.json").is_file():
+            found = status(part)
+            yield f"{part.name.split('_')[0]} of borders", f"{found.done} of {found.total} chunks done"
 
 
 def ending(found: StoreStatus) -> str:

@@ -18,12 +18,22 @@ from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, new_fi
 from saltus.plots.marks import cell_edges
 
 COLOURS = "viridis_r"  # large amplitudes dark, beside the white of rest small ones light
-AMPLITUDE_LEVELS = 12  # number of steps of the colours of the amplitude
-CHAOS = "#c9c9c9"
-HATCH = "......"  # over cells with several motions
+# Steps of the colours of the amplitude, as shares of a round number: finer where amplitudes are small.
+LEVELS = np.array([0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0])
+# What is in a cell beside or instead of one motion: fill (None is the colour of its amplitude), hatch, its colour, and in words.
+# Hatches tell them apart without colours.
+FILLINGS: dict[str, tuple[str | None, str, str, str]] = {
+    "several_motions": (None, "......", "white", "several motions"),
+    "motions_and_chaos": (None, "//////", INK, "chaos beside motions"),
+    "chaos": ("#8c8c8c", "//////", "white", "chaos alone"),
+    "long": ("#dedede", "------", INK, "long period, or slow"),
+    "undecided": ("#dedede", "xxxxxx", INK, "undecided"),
+}
 BORDERS: dict[str, Any] = {"LP": "-", "PD": (0, (5, 1.5)), "BPC": (0, (5, 1.2, 1, 1.2)), "GR": (0, (1, 1.1))}
 BORDER_NAMES = {"LP": "fold", "PD": "period doubling", "BPC": "symmetry breaking", "GR": "grazing"}
-WHITE_GROUND = [Stroke(linewidth=1.5, foreground="white"), Normal()]  # so that a line is seen on every colour
+BESIDE_REST: dict[str, Any] = {"color": INK, "lw": 1.7}  # the border of the region with rest alone
+INSIDE: dict[str, Any] = {"color": "#333333", "lw": 0.4}  # where one motion among others begins or ends
+WHITE_GROUND = [Stroke(linewidth=2.9, foreground="white"), Normal()]  # so that a line is seen on every colour
 STATIC_LINE: dict[str, Any] = {"color": UNSTABLE, "lw": 1.4}
 PRINTED_LINE: dict[str, Any] = {"color": UNSTABLE, "lw": 1.0, "ls": (0, (1, 1.2))}  # the paper's border where it is not true
 LINE_LIMIT: dict[str, Any] = {"color": LIMIT, "lw": 0.9}
@@ -44,7 +54,7 @@ def draw_stability_chart(data: Any) -> Any:
     ax.set_ylabel(parameter_name(path[1]))
     if cells is not None:
         peak = rf"$\max_\tau|{symbol(chart.attrs['coordinate'])}|${unit_in_brackets(chart['amplitude'])}"
-        figure.colorbar(cells, ax=ax, label=f"largest amplitude {peak}", ticks=cells.norm.boundaries[::2], format="%.2g")
+        figure.colorbar(cells, ax=ax, label=f"largest amplitude {peak}", ticks=cells.norm.boundaries, format="%g")
     handles = _cell_handles(chart)
     if chart is not data:
         dots = draw_lines(ax, data)
@@ -61,36 +71,58 @@ def data_is_tree(data: Any) -> bool:
 
 
 def draw_lines(ax: Any, tree: Any) -> int:
-    """All borders of a tree that holds a chart; returns how many dots there are."""
+    """All borders of a tree that holds a chart, those beside rest alone as heavy lines; returns how many dots there are."""
+    chart = tree["chart"].to_dataset()
     for curve in border_curves(tree):
-        line = {"color": INK, "lw": 0.7, "ls": BORDERS[str(curve.attrs["kind"])]}
-        ax.plot(curve["horizontal"], curve["vertical"], path_effects=WHITE_GROUND, zorder=5, **line)
+        x, y, style = curve["horizontal"].values, curve["vertical"].values, BORDERS[str(curve.attrs["kind"])]
+        beside = _is_beside_rest(chart, x, y)
+        ax.plot(x, y, **INSIDE, ls=style, zorder=4)
+        heavy = np.where(beside, x, np.nan)
+        ax.plot(heavy, np.where(beside, y, np.nan), **BESIDE_REST, ls=style, path_effects=WHITE_GROUND, zorder=5)
     if "static" in tree.children:
         draw_static(ax, tree["static"])
-    return draw_ends(ax, tree["chart"].to_dataset(), tree["borders"]["ends"].to_dataset())
+    return draw_ends(ax, chart, tree["borders"]["ends"].to_dataset())
+
+
+def _is_beside_rest(chart: Any, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Whether there is a cell with rest alone among the four about each of these points, and one with something else."""
+    resting = _resting(chart)
+    columns, rows = (
+        np.interp(values, chart[name].values, np.arange(chart.sizes[name]))
+        for values, name in ((x, "horizontal"), (y, "vertical"))
+    )
+    corners = [
+        resting[np.clip(side(rows).astype(int), 0, len(resting) - 1), np.clip(end(columns).astype(int), 0, resting.shape[1] - 1)]
+        for side in (np.floor, np.ceil)
+        for end in (np.floor, np.ceil)
+    ]
+    return np.asarray(np.any(corners, axis=0) & ~np.all(corners, axis=0))
+
+
+def _resting(chart: Any) -> np.ndarray:
+    """Where every motion comes to rest, (vertical, horizontal)."""
+    return np.asarray(((chart["count"] == 0) & (chart["unsettled"] == 0)).transpose("vertical", "horizontal").values)
 
 
 def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:
-    """The cells: coloured by the largest amplitude, dotted where there are several motions, grey where none settles, white where
-    there is nothing but rest; crosses where the largest goes beyond the kinematic limit.
+    """The cells: coloured by the largest amplitude, filled and hatched where there is something else (`FILLINGS`), white where
+    there is nothing but rest; crosses where the largest motion goes beyond the kinematic limit.
 
     Returns what a colour bar needs, or None.
     """
     x, y = chart["horizontal"].values, chart["vertical"].values
-    names = ("amplitude", "count", "unsettled", "beyond_line", "beyond_kinematic")
+    names = ("amplitude", "beyond_line", "beyond_kinematic")
     of = {name: chart[name].transpose("vertical", "horizontal").values for name in names if name in chart}
     edges = cell_edges(x), cell_edges(y)
     ax.set_xlim(*((x[0], x[-1]) if len(x) > 1 else edges[0]))
     ax.set_ylim(*((y[0], y[-1]) if len(y) > 1 else edges[1]))
-    unsettled = np.where((of["count"] == 0) & (of["unsettled"] > 0), 1.0, np.nan)
-    ax.pcolormesh(*edges, unsettled, cmap=mpl.colors.ListedColormap([CHAOS]), rasterized=True, zorder=1)
-    if not np.isfinite(of["amplitude"]).any():
-        return None
-    highest = float(np.nanmax(of["amplitude"])) if top is None else top
-    levels = highest * np.linspace(0.0, 1.0, AMPLITUDE_LEVELS + 1) ** 2  # finer where amplitudes are small
-    norm = mpl.colors.BoundaryNorm(levels, 256)
-    cells = ax.pcolormesh(*edges, of["amplitude"], cmap=COLOURS, norm=norm, rasterized=True, zorder=1)
-    _hatch(ax, x, y, of["count"] >= 2)
+    cells = _amplitudes(ax, edges, of["amplitude"], top)
+    for name, (fill, hatch, colour, _) in FILLINGS.items():
+        where = with_outcome(chart, name)
+        if fill is not None:
+            only = mpl.colors.ListedColormap([fill])
+            ax.pcolormesh(*edges, np.where(where, 1.0, np.nan), cmap=only, rasterized=True, zorder=1)
+        _hatch(ax, x, y, where, hatch, colour)
     if "beyond_kinematic" in of:
         rows, columns = np.nonzero(of["beyond_kinematic"])
         ax.plot(x[columns], y[rows], **CROSS, markersize=1.5, markeredgewidth=0.3, zorder=3)
@@ -99,12 +131,34 @@ def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:
     return cells
 
 
-def _hatch(ax: Any, x: np.ndarray, y: np.ndarray, where: np.ndarray) -> None:
-    """Dots over the cells, without a line about them."""
+def with_outcome(chart: Any, name: str) -> np.ndarray:
+    """The cells of a chart in which there is what one of `flag_meanings` says, (vertical, horizontal)."""
+    outcome = chart["outcome"].transpose("vertical", "horizontal")
+    number = dict(zip(outcome.attrs["flag_meanings"].split(), np.ravel(outcome.attrs["flag_values"]), strict=True))[name]
+    return np.asarray(outcome.values == number)
+
+
+def _amplitudes(ax: Any, edges: tuple[np.ndarray, np.ndarray], amplitude: np.ndarray, top: float | None) -> Any:
+    """The cells in the colours of their amplitudes; None without any."""
+    if not np.isfinite(amplitude).any():
+        return None
+    levels = LEVELS * _round(float(np.nanmax(amplitude)) if top is None else top)
+    norm = mpl.colors.BoundaryNorm(levels, 256)
+    return ax.pcolormesh(*edges, amplitude, cmap=COLOURS, norm=norm, rasterized=True, zorder=1)
+
+
+def _round(value: float) -> float:
+    """The least number not below a value that has one digit other than 0."""
+    unit = 10.0 ** np.floor(np.log10(value))
+    return float(f"{np.ceil(value / unit - 1e-9) * unit:.1g}")
+
+
+def _hatch(ax: Any, x: np.ndarray, y: np.ndarray, where: np.ndarray, hatch: str, colour: str) -> None:
+    """A hatch over the cells, without a line about them."""
     if min(where.shape) < 2 or not where.any():
         return
-    with mpl.rc_context({"hatch.linewidth": 0.3, "hatch.color": "white"}):
-        ax.contourf(x, y, where.astype(float), levels=[0.5, 1.5], colors="none", hatches=[HATCH], zorder=2)
+    with mpl.rc_context({"hatch.linewidth": 0.3, "hatch.color": colour}):
+        ax.contourf(x, y, where.astype(float), levels=[0.5, 1.5], colors="none", hatches=[hatch], zorder=2)
 
 
 def _outline(ax: Any, x: np.ndarray, y: np.ndarray, where: np.ndarray) -> None:
@@ -128,8 +182,7 @@ def draw_static(ax: Any, static: Any) -> None:
 def draw_ends(ax: Any, chart: Any, ends: Any) -> int:
     """The exact places at which a motion ends beside nothing but rest and no curve was followed, as dots; returns how many."""
     known, target = np.isfinite(ends["horizontal"].values), ends["key"].values[:, 3:]
-    resting = ((chart["count"] == 0) & (chart["unsettled"] == 0)).transpose("vertical", "horizontal").values
-    shown = known & resting[target[:, 0], target[:, 1]]
+    shown = known & _resting(chart)[target[:, 0], target[:, 1]]
     ax.plot(ends["horizontal"].values[shown], ends["vertical"].values[shown], **DOT, zorder=5)
     return int(shown.sum())
 
@@ -139,18 +192,23 @@ def draw_closed_form(ax: Any, horizontal: np.ndarray, vertical: np.ndarray) -> N
     ax.plot(horizontal, vertical, ms=2.2, mew=0.6, zorder=7, **CLOSED_FORM)
 
 
-def _several() -> Patch:
-    with mpl.rc_context({"hatch.linewidth": 0.3}):
-        return Patch(facecolor="#7fb8a8", edgecolor="white", hatch=HATCH, label="several motions")
+def _filling(name: str) -> Patch:
+    """A patch of a legend with the filling of cells."""
+    fill, hatch, colour, words = FILLINGS[name]
+    with mpl.rc_context({"hatch.linewidth": 0.3, "hatch.color": colour}):
+        return Patch(facecolor=fill or "#7fb8a8", edgecolor=colour, linewidth=0.0, hatch=hatch, label=words)
+
+
+def _fillings(charts: Sequence[Any]) -> list[Patch]:
+    """What the fillings of cells mean, those that are in any of the charts."""
+    return [_filling(name) for name in FILLINGS if any(with_outcome(chart, name).any() for chart in charts)]
 
 
 def _cell_handles(chart: Any) -> list[Any]:
     """What the marks in the cells of a chart mean, those that are there."""
-    count, unsettled = chart["count"], chart["unsettled"]
     handles: list[tuple[Any, Any]] = [
-        ((count == 0) & (unsettled == 0), Patch(facecolor="white", edgecolor=INK, linewidth=0.4, label="rest alone")),
-        (count >= 2, _several()),
-        ((count == 0) & (unsettled > 0), Patch(facecolor=CHAOS, label="none settles")),
+        (_resting(chart), Patch(facecolor="white", edgecolor=INK, linewidth=0.4, label="rest alone")),
+        *((with_outcome(chart, name), _filling(name)) for name in FILLINGS),
     ]
     if "beyond_line" in chart:
         handles.append((chart["beyond_line"] > 0, Line2D([], [], **LINE_LIMIT, label=r"$\max_\tau|\theta|=\pi-\beta_0$")))
@@ -167,15 +225,16 @@ def _line_handles(curves: Iterable[Any], static: bool) -> list[Any]:
         Line2D([], [], **STATIC_LINE, label="quasi-static border"),
         Line2D([], [], **PRINTED_LINE, label=r"$\widehat{\mathcal{H}}_{cr}^{QS}$ where it is not"),
     ]
-    exact = [Line2D([], [], color=INK, lw=0.8, ls=BORDERS[kind], label=BORDER_NAMES[kind]) for kind in BORDERS if kind in kinds]
-    return (handles if static else []) + exact
+    exact = [Line2D([], [], color=INK, lw=0.7, ls=BORDERS[kind], label=BORDER_NAMES[kind]) for kind in BORDERS if kind in kinds]
+    heavy = [Line2D([], [], **BESIDE_REST, label="beside rest alone")] if exact else []
+    return (handles if static else []) + heavy + exact
 
 
-def chart_legend(figure: Any, curves: Sequence[Any], closed_form: bool = False) -> None:
+def chart_legend(figure: Any, charts: Sequence[Any], curves: Sequence[Any], closed_form: bool = False) -> None:
     """What the lines and fillings mean, below all panels."""
     handles = _line_handles(curves, static=True)
     handles.append(Line2D([], [], **LINE_LIMIT, label=r"max$|\theta|=\pi-\beta_0$"))
-    handles += [_several(), Patch(facecolor=CHAOS, label="none settles")]
+    handles += _fillings(charts)
     if closed_form:
         handles.append(Line2D([], [], ms=3, label="closed form, high frequency", **CLOSED_FORM))
     figure.legend(handles=handles, loc="outside lower center", ncols=4)

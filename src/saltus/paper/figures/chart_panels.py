@@ -70,9 +70,12 @@ def draw(data: Any, columns: int, height: float) -> Any:
     for ax in axes[len(panels) :]:
         ax.remove()
     if cells is not None:
-        bar = figure.colorbar(cells, ax=axes[: len(panels)].tolist(), fraction=0.03, pad=0.01, format="%.2g")
+        bar = figure.colorbar(
+            cells, ax=axes[: len(panels)].tolist(), fraction=0.03, pad=0.01, ticks=cells.norm.boundaries, format="%g"
+        )
         bar.set_label(r"largest $\max_\tau|\theta|$ of the stable motions (rad)")
-    chart_legend(figure, [curve for _, tree in panels for curve in border_curves(tree)], fast)
+    charts = [tree["chart"].to_dataset() for _, tree in panels]
+    chart_legend(figure, charts, [curve for _, tree in panels for curve in border_curves(tree)], fast)
     return figure
 
 

@@ -10,15 +10,12 @@ from saltus.paper.figures import chart_panels
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.measures.chart_measures import over_frequency
 
+CURVES = 8  # border curves of a panel: more would bury the border beside rest
 PANELS: dict[str, dict[str, Any]] = {
-    name: {"beta0": 80.0, "damping": 0.1, "frequency": frequency, "widest": widest, "curves": curves}
-    for name, frequency, widest, curves in (
-        *(
-            ("a", 0.1, chart_panels.WIDEST, 2),
-            ("b", 0.5, chart_panels.WIDEST, 8),
-        ),  # slow loads: chaos, and orbits of many impacts
-        *(("c", 0.75, chart_panels.WIDEST, 12), ("d", 1.0, chart_panels.WIDEST, 20), ("e", 1.5, chart_panels.WIDEST, 16)),
-        ("f", 4.0, 0.2, 20),  # all borders are at small Hhat
+    name: {"beta0": 80.0, "damping": 0.1, "frequency": frequency, "widest": widest, "curves": CURVES}
+    for name, frequency, widest in (
+        *((name, frequency, chart_panels.WIDEST) for name, frequency in zip("abcde", (0.1, 0.5, 0.75, 1.0, 1.5), strict=True)),
+        ("f", 4.0, 0.2),  # all borders are at small Hhat
     )
 }
 

@@ -61,6 +61,12 @@ def gained(panel: Any) -> float:
     return float((~cells.static & cells.only_rest).sum() / max(cells.static.sum(), 1))
 
 
+def outside(panel: Any) -> float:
+    """The same cells as a share of the cells outside of the domain."""
+    cells = chart_cells(panel)
+    return float((~cells.static & cells.only_rest).sum() / max((~cells.static).sum(), 1))
+
+
 def onset(panel: Any, vertical: np.ndarray) -> np.ndarray:
     """The least Hhat at V on the folds of the first motion, from the exact curves; NaN without one."""
     least = np.full(len(vertical), np.nan)

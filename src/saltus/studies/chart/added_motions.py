@@ -1,16 +1,16 @@
-"""A stability chart with motions that continuation has led to, and no initial state."""
+"""A stability chart with motions to which no initial state has led, but a motion of a neighbouring cell."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from saltus.orbits import PeriodicOrbit
-from saltus.studies.chart.cells import beyond_limits
-from saltus.studies.chart.motions import KEPT, MOTION, by_cell, is_same, read_motions, table
-from saltus.systems import System
+from saltus.studies.chart.cell_outcomes import outcomes
+from saltus.studies.chart.cells import beyond_limits, spread
+from saltus.studies.chart.changes import ChartMotions
+from saltus.studies.chart.motions import ALIKE, KEPT, MOTION, by_cell, distinct, has_alike, read_motions, table
+from saltus.studies.chart.request import ChartRequest
 
 if TYPE_CHECKING:
     import xarray
@@ -18,30 +18,39 @@ if TYPE_CHECKING:
 ADDED = "added_by_continuation"  # an attribute of the chart: how many
 
 
-def with_motions(chart: xarray.Dataset, system: System, orbits: Sequence[tuple[int, int, PeriodicOrbit]]) -> xarray.Dataset:
-    """The chart with stable orbits, given by row and column, as motions of their cells where these have them not yet."""
+def with_motions(chart: xarray.Dataset, request: ChartRequest, cells: np.ndarray, found: np.ndarray) -> xarray.Dataset:
+    """The chart with motions in these cells, (n, 2) rows and columns, of dtype WAY, where these have them not yet, and with what
+    further motions starts from these lead to."""
     made = chart.transpose("vertical", "horizontal", ...).copy(deep=True).load()  # its arrays are written to
-    shape, motions = made["count"].shape, read_motions(made)
-    added = 0
-    for row, column, orbit in orbits:
-        motion = _motion(int(np.ravel_multi_index((row, column), shape)), orbit)
-        here = motions[motions["cell"] == motion["cell"]]
-        if len(here) < KEPT and not is_same(here, motion).any():
-            motions = np.concatenate([motion, motions])
-            added += 1
-    columns = table(by_cell(motions), made["count"].size, chart.attrs["coordinate"])
+    shape, known = made["count"].shape, read_motions(made)
+    new = _as_motions(np.ravel_multi_index(tuple(cells.T), shape), found)
+    new = distinct(new[~has_alike(known, new["cell"], new, ALIKE.same)])
+    if not len(new):
+        return made
+    motions = by_cell(spread(request, new, distinct(np.concatenate([known, new]))))
+    columns = table(motions, made["count"].size, chart.attrs["coordinate"])
     complete = made["count"].values <= KEPT  # of other cells not all motions are kept, and none are added
+    before = int(made["count"].sum())
     for name, values in columns.items():
         made[name].values[complete] = values.reshape(*shape, *values.shape[1:])[complete]
-    vertical, horizontal = np.meshgrid(made["vertical"], made["horizontal"], indexing="ij")
-    paths = made.attrs["path"]
-    for name, flag in beyond_limits(system, {paths[0]: horizontal, paths[1]: vertical}, made["amplitude"].values).items():
+    parameters = {path: values.reshape(shape) for path, values in request.parameters.items()}
+    for name, flag in beyond_limits(request.system, parameters, made["amplitude"].values).items():
         made[name].values[:] = flag
-    made.attrs[ADDED] = int(chart.attrs[ADDED]) + added
+    made["outcome"].values[:] = outcomes(*(made[name].values for name in ("count", "unsettled", "verdict")))
+    made.attrs[ADDED] = int(chart.attrs[ADDED]) + int(made["count"].sum()) - before
     return made
 
 
-def _motion(cell: int, orbit: PeriodicOrbit) -> np.ndarray:
-    """An orbit as a motion of a cell, an array of one record."""
-    other = min(orbit.highest, -orbit.lowest)
-    return np.array([(cell, 0, orbit.period, len(orbit.impact_times), orbit.amplitude, other, orbit.state)], MOTION)
+def has_motion(chart: ChartMotions, cell: np.ndarray, amplitude: float) -> bool:
+    """Whether a cell, its row and column, has a motion of about this amplitude."""
+    there = chart.motions["amplitude"][(chart.place == cell).all(axis=1)]
+    return bool(np.abs(there - amplitude).min(initial=np.inf) < ALIKE.followed * amplitude)
+
+
+def _as_motions(cells: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Motions on the way, of dtype WAY, as motions of cells."""
+    motions = np.zeros(len(found), MOTION)
+    motions["cell"] = cells
+    for name in ("state", "period", "impact_count", "amplitude", "other"):
+        motions[name] = found[name]
+    return by_cell(motions)

@@ -1,24 +1,27 @@
 """The exact borders of a stability chart: where its motions are born or lose their stability.
 
-Every change between neighbouring cells is looked into: the orbit is followed across it to the special point at which it ends, and
-the points of the widest families are followed as curves through the plane. What neither explains is listed.
+What becomes of every motion that a neighbouring cell has not is found by simulation between the two cells. From the ends of
+motions that lie on the widest borders orbits are solved for, and their special points are followed as curves through the plane.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.checks import check_count
-from saltus.errors import MotionError, ParameterError
-from saltus.orbits import PeriodicOrbit, SpecialPoint, continue_special
-from saltus.progress import Progress, silent
-from saltus.studies.chart.added_motions import ADDED, with_motions
-from saltus.studies.chart.border_curves import curve_dataset, explained, passes_through
-from saltus.studies.chart.changes import Changes, changes_of, keys_of, read_chart
-from saltus.studies.chart.follow import ChangeOutcome, Ending, Follower
+from saltus.progress import Progress, part_of, silent
+from saltus.studies.chart.added_motions import ADDED, has_motion, with_motions
+from saltus.studies.chart.border_curves import explained, passes_through
+from saltus.studies.chart.border_starts import border_starts, places
+from saltus.studies.chart.border_work import Workshop
+from saltus.studies.chart.cell_outcomes import flags
+from saltus.studies.chart.changes import Changes, ChartMotions, changes_of, keys_of, read_chart
+from saltus.studies.chart.endings import ENDING, ChangeOutcome
+from saltus.studies.chart.request import ChartRequest
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -29,147 +32,144 @@ if TYPE_CHECKING:
 class BorderSettings:
     """How much work the borders of a chart may take."""
 
-    curves: int = 24  # The largest number of curves on which motions end.
-    # The search for curves ends after this many changes, for each curve that is wanted, that could not be explained.
-    vain: int = 3
-    harmless: int = 10  # It also ends after this many, for each curve, at which the same motion goes on: these cost little.
-    one_by_one: int = 2000  # The largest number of changes that are looked into one by one.
-    # A change counts this many times where rest is the only motion of the neighbour: that is what a designer asks for.
-    beside_rest: int = 10
+    curves: int = 12  # The largest number of curves on which motions end.
+    batch: int = 4  # Curves are followed so many at a time; the ends that they explain begin no further ones.
+    rounds: int = 12  # How often motions are added to cells, and the changes about these looked into.
 
 
 SETTINGS = BorderSettings()
+KEY = ("row", "column", "amplitude_nrad", "to_row", "to_column")
 
 
 @dataclass
 class Borders:
-    """Curves through the plane of a chart, each a Dataset along `point`, and what became of the changes on none of them."""
+    """Curves through the plane of a chart, each a Dataset along `point`, and what becomes of its changes."""
 
     curves: list[xarray.Dataset] = field(default_factory=list)
-    endings: dict[tuple[int, ...], Ending] = field(default_factory=dict)  # by the key of the change
+    endings: dict[tuple[int, ...], np.ndarray] = field(default_factory=dict)  # of dtype ENDING, by the key of the change
 
-    def to_xarray(self) -> xarray.DataTree:
-        """The curves as groups, and the changes on none of them in the group `ends`: `key` (see `keys_of`), the `outcome`, and
-        where the motion ends at a special point its kind, `horizontal`, `vertical` and `amplitude`."""
+    def of(self, chart: ChartMotions, changes: Changes) -> np.ndarray:
+        """What becomes of these changes, of dtype ENDING; of those that were not looked into nothing is known."""
+        unknown = np.zeros((), ENDING)
+        found = [self.endings.get(key, unknown) for key in keys_of(chart, changes)]
+        return np.array(found, dtype=ENDING).reshape(len(changes))
+
+    def to_xarray(self, chart: ChartMotions) -> xarray.DataTree:
+        """The curves as groups, and all changes of a chart in the group `ends`: `key` (see `keys_of`), the `outcome`,
+        `horizontal` and `vertical` of the place at which the motion ends, up to how many cells it may be off (`uncertainty`),
+        the `amplitude` and the `period` there."""
         import xarray as xr
 
-        rows = [asdict(ending) for ending in self.endings.values()]
-        ends: dict[str, Any] = {"key": (("end", "index"), np.array(list(self.endings), dtype=int).reshape(-1, 5))}
-        for column in fields(Ending):
-            values = [row[column.name] for row in rows]
-            ends[column.name] = ("end", np.array(values, dtype=float if column.type == "float" else str))
+        changes = changes_of(chart)
+        found, rows = self.of(chart, changes), places(changes, self.of(chart, changes))
+        is_end = np.isin(found["outcome"], [outcome for outcome in ChangeOutcome if outcome.is_end])
+        spot = np.where(is_end[:, None], rows, np.nan)
+        columns = {
+            "outcome": (found["outcome"], flags(ChangeOutcome)),
+            "horizontal": (np.interp(spot[:, 1], np.arange(len(chart.horizontal)), chart.horizontal), {}),
+            "vertical": (np.interp(spot[:, 0], np.arange(len(chart.vertical)), chart.vertical), {}),
+            "uncertainty": (np.where(is_end, 0.5 * (found["next"]["share"] - found["settled"]), np.nan), {"units": "cells"}),
+            "amplitude": (found["last"]["amplitude"], {}),
+            "period": (found["last"]["period"], {}),
+        }
+        data: dict[str, Any] = {name: ("end", values, attrs) for name, (values, attrs) in columns.items()}
+        data["key"] = (("end", "index"), np.array(keys_of(chart, changes), dtype=int).reshape(-1, len(KEY)))
         groups = {f"curve_{i:02d}": curve for i, curve in enumerate(self.curves)}
-        return xr.DataTree.from_dict({"ends": xr.Dataset(ends), **groups})
+        return xr.DataTree.from_dict({"ends": xr.Dataset(data), **groups})
 
 
 def with_borders(
-    system: System, chart: xarray.Dataset, *, curves: int = SETTINGS.curves, progress: Progress = silent
+    system: System,
+    chart: xarray.Dataset,
+    *,
+    curves: int = SETTINGS.curves,
+    store: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress = silent,
 ) -> tuple[xarray.Dataset, Borders]:
     """A chart with the stable motions that go on into a cell where no start has led to them, and the exact borders of it.
 
-    Where a cell has a motion and its neighbour none alike, the orbit is solved for and followed towards the neighbour to the
-    special point at which it is lost. The points of the widest families, above all those next to cells with rest only, are
-    followed as curves of LP, PD, BPC and GR through the plane of the chart; the changes that a curve explains are passed over,
-    and at most 2000 are looked into.
+    Where a cell has a motion and its neighbour none alike, the motion is followed towards the neighbour by simulation, and its
+    end enclosed between two values; all changes are looked into so. A motion that reaches the neighbour is added to the chart.
+    From the ends on the widest borders, above all those beside rest alone, the orbit is continued to its special point, and the
+    curve of LP, PD, BPC or GR through it followed through the plane of the chart.
 
     Args:
         system: that of the chart.
         chart: as `stability_chart` returns it.
         curves: how many curves at most.
-        progress: called with the share of the changes that are explained.
+        store: the chart's own; the work on its borders is kept in chunks in it, and a run that was stopped goes on.
+        workers, scheduler: who computes them, see `saltus.sweep.run`.
+        progress: called with the fraction done and what is being done.
 
     Returns:
         The chart, whose attribute `added_by_continuation` is the number of motions added, and its borders.
     """
     check_count("curves", curves, 0)
-    search = first_borders(system, chart, curves, progress)
-    chart, borders = chart.assign_attrs({ADDED: 0}), search.borders
-    while search.missed:
-        before, chart = chart, with_motions(chart, system, search.missed)
-        if chart.attrs[ADDED] == before.attrs[ADDED]:
-            break
-        search = BorderSearch(system, chart, borders, progress)
-        search.look_into(search.renewed())
-    return chart, borders
+    request = ChartRequest.of_chart(system, chart)
+    numbers = {"periods": request.periods, "max_period": request.max_period, "tol": request.tol}
+    place = None if store is None else Path(store)
+    work = Workshop(system, request.paths, store=place, workers=workers, scheduler=scheduler, **numbers)
+    search = _BorderSearch(request, work, chart.assign_attrs({ADDED: 0}))
+    search.complete(part_of(progress, 0.0, 0.6))
+    search.follow_curves(curves, part_of(progress, 0.6, 1.0))
+    return search.chart, search.borders
 
 
-def first_borders(system: System, chart: xarray.Dataset, curves: int, progress: Progress = silent) -> BorderSearch:
-    """The borders of a chart as it is, in a search that also holds the motions that it lacks."""
-    search = BorderSearch(system, chart, Borders(), progress)
-    search.follow_curves(curves)
-    search.look_into(search.waiting)
-    return search
+class _BorderSearch:
+    """A chart that gains motions, and what is known of its borders."""
 
+    def __init__(self, request: ChartRequest, work: Workshop, chart: xarray.Dataset) -> None:
+        self.request, self.work, self.chart, self.borders = request, work, chart, Borders()
+        self._begun: set[str] = set()  # the starts of curves that were tried
 
-class BorderSearch:
-    """The changes of a chart that are still to be explained, and what is known of the others."""
+    def complete(self, progress: Progress) -> None:
+        """Look into all changes, and into those about the motions that this adds to the chart, until it adds none."""
+        for i in range(SETTINGS.rounds):
+            cells = read_chart(self.chart)
+            changes, known = changes_of(cells), self.borders.endings
+            fresh = changes.only(np.array([key not in known for key in keys_of(cells, changes)], dtype=bool))
+            report = part_of(progress, i / SETTINGS.rounds, (i + 1) / SETTINGS.rounds, "changes between cells")
+            known |= dict(zip(keys_of(cells, fresh), self.work.ends(cells, fresh, report), strict=True))
+            changes, found = self._missed(cells, changes)
+            before = self.chart.attrs[ADDED]
+            self.chart = with_motions(self.chart, self.request, changes.target, found["last"])
+            if self.chart.attrs[ADDED] == before:
+                break
 
-    def __init__(self, system: System, chart: xarray.Dataset, borders: Borders, progress: Progress) -> None:
-        self.paths: tuple[str, str] = (str(chart.attrs["path"][0]), str(chart.attrs["path"][1]))
-        self.chart, self.borders, self.progress = read_chart(chart), borders, progress
-        self.follower = Follower(system, self.paths, self.chart)
-        self.waiting = changes_of(self.chart)
-        self.total = max(len(self.waiting), 1)
+    def _missed(self, cells: ChartMotions, changes: Changes) -> tuple[Changes, np.ndarray]:
+        """The changes whose motion reaches a neighbour that has it not; where it has it, nothing changes."""
+        found = self.borders.of(cells, changes)
+        reached = np.flatnonzero(found["outcome"] == ChangeOutcome.MISSED)
+        there = [has_motion(cells, changes.target[k], found["last"]["amplitude"][k]) for k in reached]
+        known = reached[np.array(there, dtype=bool)]
+        for key in keys_of(cells, changes.only(known)):
+            self.borders.endings[key]["outcome"] = ChangeOutcome.CONTINUED
+        left = np.setdiff1d(reached, known)
+        return changes.only(left), found[left]
 
-    @property
-    def missed(self) -> list[tuple[int, int, PeriodicOrbit]]:
-        """Orbits that the chart lacks: row, column, orbit."""
-        return self.follower.missed
+    def follow_curves(self, most: int, progress: Progress) -> None:
+        """Follow the curves of the widest borders through the plane, until there are so many."""
+        cells = read_chart(self.chart)
+        changes = changes_of(cells)
+        bounds = [[float(values.min()), float(values.max())] for values in (cells.horizontal, cells.vertical)]
+        known = self.borders.curves
+        while len(known) < most:
+            changes = changes.only(~explained(cells, changes, known))
+            starts = border_starts(cells, changes, self.borders.of(cells, changes))
+            starts = [start for start in starts if repr(start) not in self._begun][: min(SETTINGS.batch, most - len(known))]
+            if not starts:
+                break
+            self._begun |= {repr(start) for start in starts}
+            report = part_of(progress, len(known) / most, (len(known) + len(starts)) / most, "border curves")
+            known += [
+                curve for curve in self.work.curves(starts, bounds, report) if curve is not None and self._is_new(cells, curve)
+            ]
 
-    def follow_curves(self, most: int) -> None:
-        """Follow the most urgent change to its special point and that through the plane, until `most` curves are known."""
-        curves, vain, harmless = self.borders.curves, SETTINGS.vain * most, SETTINGS.harmless * most
-        while len(self.waiting) and len(curves) < most and vain and harmless:
-            self._report_progress(len(self.waiting))
-            known, first = len(curves), np.arange(len(self.waiting)) == np.argmax(self._urgency(self.waiting))
-            change = self.waiting.only(first)
-            ending, special = self.follower.follow(change)
-            curve = None if special is None else self._curve(special, change, ending)
-            if curve is not None:
-                curves.append(curve)
-            else:
-                self._record(change, ending)
-                vain, harmless = (vain, harmless - 1) if ending.outcome.is_explained else (vain - 1, harmless)
-            self.waiting = self.waiting.only(~first & ~explained(self.chart, self.waiting, curves[known:]))
-
-    def look_into(self, changes: Changes) -> None:
-        """Follow each of these changes, the most urgent ones if there are too many; all of one motion are one after the other."""
-        room = max(0, SETTINGS.one_by_one - len(self.borders.endings))
-        chosen = np.argsort(-self._urgency(changes), kind="stable")[:room]
-        for done, i in enumerate(chosen[np.argsort(changes.motion[chosen], kind="stable")]):
-            self._report_progress(len(chosen) - done)
-            change = changes.only(np.array([i]))
-            self._record(change, self.follower.follow(change)[0])
-
-    def renewed(self) -> Changes:
-        """The changes of a chart with added motions of which nothing is known yet; what is gone with them is forgotten."""
-        keys, endings = keys_of(self.chart, self.waiting), self.borders.endings
-        kept = {key: endings[key] for key in keys if key in endings and endings[key].outcome is not ChangeOutcome.MISSED}
-        self.borders.endings = kept
-        fresh = np.array([key not in kept for key in keys], dtype=bool)
-        return self.waiting.only(fresh & ~explained(self.chart, self.waiting, self.borders.curves))
-
-    def _urgency(self, changes: Changes) -> np.ndarray:
-        """The larger the family the more, above all where it is next to a cell with rest only."""
-        beside_rest = self.chart.monostable[tuple(changes.target.T)]
-        return np.asarray(self.chart.family_size[changes.motion] * np.where(beside_rest, SETTINGS.beside_rest, 1))
-
-    def _record(self, change: Changes, ending: Ending) -> None:
-        self.borders.endings[keys_of(self.chart, change)[0]] = ending
-
-    def _report_progress(self, left: int) -> None:
-        self.progress(1 - left / self.total, "exact borders")
-
-    def _curve(self, special: SpecialPoint, change: Changes, ending: Ending) -> xarray.Dataset | None:
-        """The curve through a special point, or None if a known one goes through it or it cannot be followed."""
-        spot = (ending.horizontal, ending.vertical)
-        known = (curve for curve in self.borders.curves if curve.attrs["kind"] == special.kind)
-        if any(passes_through(self.chart, curve, spot) for curve in known):
-            return None
-        bounds = [(float(values.min()), float(values.max())) for values in (self.chart.horizontal, self.chart.vertical)]
-        along = change.along
-        try:
-            curve = continue_special(special, self.paths[1 - along], bounds=bounds[1 - along], first_bounds=bounds[along])
-            return curve_dataset(curve, self.paths)
-        except (MotionError, ParameterError):
-            return None
+    def _is_new(self, cells: ChartMotions, curve: xarray.Dataset) -> bool:
+        """Whether no known curve of its kind goes through the middle of this one."""
+        middle = curve.sizes["point"] // 2
+        spot = tuple(float(curve[name][middle]) for name in ("horizontal", "vertical"))
+        same = (other for other in self.borders.curves if other.attrs["kind"] == curve.attrs["kind"])
+        return not any(passes_through(cells, other, spot) for other in same)

@@ -16,6 +16,8 @@ import numpy as np
 from saltus.checks import Window
 from saltus.flow import find_recurrence
 from saltus.orbits import initial_states
+from saltus.studies.chart.cell_outcomes import outcomes
+from saltus.studies.chart.cell_verdicts import CellVerdicts
 from saltus.studies.chart.motions import ALIKE, MOTION, SIDES, distinct, has_alike, is_alike, motions_in, table
 from saltus.studies.chart.request import ChartRequest
 from saltus.systems import System
@@ -52,6 +54,7 @@ class CellOutcomes:
     captured: np.ndarray  # at rest, for all later loads
     tiny: np.ndarray  # on motions smaller than those that count
     unsettled: np.ndarray  # chaotic, slow, or of a longer period
+    moving: np.ndarray  # of dtype MOTION: these motions, where they are at the end
 
 
 def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
@@ -61,15 +64,26 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
     along the two axes.
     """
     request = ChartRequest.from_arguments(arguments, block)
-    settled, motions = stable_motions(request)
+    settled, judged, motions = stable_motions(request)
     size = len(settled.captured)
     columns = table(motions, size, request.coordinate) | {
         "rest": settled.captured > 0,
         "tiny": settled.tiny,
-        "unsettled": settled.unsettled,
+        **_verdicts(settled, judged),
     }
+    columns["outcome"] = outcomes(columns["count"], columns["unsettled"], columns["verdict"])
     columns |= beyond_limits(request.system, request.parameters, columns["amplitude"])
     return {name: values.reshape(*request.shape, *values.shape[1:]) for name, values in columns.items()}
+
+
+def _verdicts(settled: CellOutcomes, judged: CellVerdicts) -> dict[str, np.ndarray]:
+    """The variables of a chart that follow from the judgement; starts that settle after all are counted no longer."""
+    unsettled, size = settled.unsettled.copy(), len(settled.unsettled)
+    unsettled[judged.cell[judged.settles]] = 0
+    columns = {"verdict": np.zeros(size, dtype=int), "exponent": np.full(size, np.nan), "exponent_error": np.full(size, np.nan)}
+    for name, values in zip(columns, (judged.verdict, judged.exponent, judged.error), strict=True):
+        columns[name][judged.cell] = values
+    return columns | {"unsettled": unsettled}
 
 
 def beyond_limits(system: System, parameters: Mapping[str, np.ndarray], amplitude: np.ndarray) -> dict[str, np.ndarray]:
@@ -77,15 +91,23 @@ def beyond_limits(system: System, parameters: Mapping[str, np.ndarray], amplitud
     return {f"beyond_{limit.name}": amplitude > limit.value for limit in amplitude_limits(system, parameters)}
 
 
-def stable_motions(request: ChartRequest) -> tuple[CellOutcomes, np.ndarray]:
-    """What the starts in each cell settle on, and the motions that starts from neighbouring cells add to these.
+def stable_motions(request: ChartRequest) -> tuple[CellOutcomes, CellVerdicts, np.ndarray]:
+    """What the starts in each cell settle on, the verdicts on what does not settle, and all motions, with those that starts from
+    neighbouring cells add.
 
     So every motion is followed through the chart to where its stability ends, however little it attracts there.
     """
     states = starts(request.system, request.starts, request.window, request.seed)
     size = math.prod(request.shape)
     settled = settle(request, np.repeat(np.arange(size), len(states)), np.tile(states, (size, 1)))
-    known = new = settled.motions
+    judged = CellVerdicts(request, settled.moving)
+    later = settle(request, *judged.later)
+    known = distinct(np.concatenate([settled.motions, later.motions]))
+    return settled, judged, spread(request, known, known)
+
+
+def spread(request: ChartRequest, new: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """The known motions of all cells with those that starts from new ones lead to in neighbouring cells, and from these again."""
     for _ in range(SETTINGS.rounds):
         cell, states = seeds(new, known, request.shape)
         if not len(cell):
@@ -93,7 +115,7 @@ def stable_motions(request: ChartRequest) -> tuple[CellOutcomes, np.ndarray]:
         further = settle(request, cell, states, known).motions
         new = further[~has_alike(known, further["cell"], further, ALIKE.same)]
         known = distinct(np.concatenate([known, new]))
-    return settled, known
+    return known
 
 
 def starts(system: System, count: int, window: Window, seed: int) -> np.ndarray:
@@ -109,12 +131,12 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
     """Follow motions from states (n, 2) at phase 0 in the cells of these numbers until they settle, or come to a known one."""
     size, least = math.prod(request.shape), request.least
     captured, tiny, unsettled = (np.zeros(size, dtype=np.int64) for _ in range(3))
-    moving, found = np.zeros(len(cell), MOTION), [np.empty(0, MOTION)]
+    moving, found, left = np.zeros(len(cell), MOTION), [np.empty(0, MOTION)], []
     moving["cell"], moving["state"], moving["starts"], moving["amplitude"] = cell, states, 1, np.inf
     for share in (*(SETTINGS.stages if len(cell) > SETTINGS.few_motions else SETTINGS.few_stages), SETTINGS.patience):
         if share == SETTINGS.patience:
             many = np.bincount(moving["cell"], minlength=size)[moving["cell"]] > SETTINGS.patient_with
-            _count(unsettled, moving[many])
+            left.append(moving[many])
             moving = moving[~many]
         moving, rests = _followed(request, moving, math.ceil(share * request.periods))
         settled = moving["period"] > 0
@@ -127,8 +149,9 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
             moving = moving[~_arrived(moving, known)]
     small = moving["amplitude"] < least
     _count(tiny, moving[small])
-    _count(unsettled, moving[~small])
-    return CellOutcomes(distinct(np.concatenate(found)), captured, tiny, unsettled)
+    unfinished = np.concatenate([*left, moving[~small]])
+    _count(unsettled, unfinished)
+    return CellOutcomes(distinct(np.concatenate(found)), captured, tiny, unsettled, unfinished)
 
 
 def _count(number: np.ndarray, motions: np.ndarray) -> None:

@@ -12,6 +12,7 @@ from saltus.checks import Rectangle, check_count
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.chart.borders import with_borders
+from saltus.studies.chart.changes import read_chart
 from saltus.studies.chart.disagreements import disagreements
 from saltus.studies.chart.request import ChartRequest
 from saltus.systems import System
@@ -116,10 +117,11 @@ def bordered_chart(system: System, *, curves: int = 12, progress: Progress = sil
     import xarray as xr
 
     chart = stability_chart(system, progress=part_of(progress, 0.0, 0.5), **options)
-    chart, borders = with_borders(system, chart, curves=curves, progress=part_of(progress, 0.5, 1.0))
+    where = {name: options.get(name) for name in ("store", "workers", "scheduler")}
+    chart, borders = with_borders(system, chart, curves=curves, progress=part_of(progress, 0.5, 1.0), **where)
     chart.attrs = {name: value for name, value in chart.attrs.items() if name != "plan"}
     groups = {"chart": chart, "disagreements": disagreements(chart, borders)}
     static = quasi_static_border(system, tuple(chart.attrs["path"]), float(chart["vertical"].min()))
     if static is not None:
         groups["static"] = static.to_xarray()
-    return xr.DataTree.from_dict(groups).assign({"borders": borders.to_xarray()})
+    return xr.DataTree.from_dict(groups).assign({"borders": borders.to_xarray(read_chart(chart))})

@@ -8,7 +8,11 @@ import numpy as np
 
 from saltus.studies.chart.border_curves import explained, unseen_folds
 from saltus.studies.chart.borders import Borders
-from saltus.studies.chart.changes import changes_of, keys_of, read_chart
+from saltus.studies.chart.cell_outcomes import CellOutcome
+from saltus.studies.chart.changes import changes_of, read_chart
+from saltus.studies.chart.endings import ChangeOutcome
+from saltus.studies.chart.sampled_ends import sampled_ends
+from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
@@ -18,41 +22,46 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     """Where chart and curves do not agree, away from the cells through which the curves run.
 
     Returns:
-        A Dataset with the changes along `change` that neither a curve nor a special point between the two cells explains:
-        `horizontal` and `vertical` halfway between the cells, `amplitude` and `period` of the motion that ends, `cells` of its
-        family, whether the neighbour has rest alone, `beside_rest`, and whether the change was `looked_into`; and along
-        `unseen` the places on the curves of folds beside which no cell has the motions that end there. The attributes
-        `changes` and `changes_beside_rest` count all that there are, `on_curves` those that a curve explains, `harmless` those
-        where the same motion goes on, with another amplitude than expected or too small to count; `chaos_beside_rest` counts
-        pairs of neighbouring cells, one with rest alone and one where no start settles, between which no motion ends but chaos.
+        A Dataset with the changes along `change` of which it is not known what becomes of the motion, nor any curve explains
+        them: `horizontal` and `vertical` halfway between the cells, `amplitude` and `period` of the motion that ends, `cells` of
+        its family, whether the neighbour has rest alone, `beside_rest`; and along `unseen` the places on the curves of folds
+        beside which no cell has the motions that end there. The attributes: `changes` and `changes_beside_rest` count all that
+        there are, `located` those that end at an enclosed place, `on_curves` those that a curve explains; `sampled` how many of
+        the former were solved for by continuation, and `sampled_agree` how many of these lie where simulation has enclosed them;
+        `harmless` those where the same motion goes on, with another amplitude than expected or too small to count;
+        `chaos_beside_rest` counts pairs of neighbouring cells, one with rest alone and one with chaos alone, between which no
+        motion ends but chaos.
     """
     import xarray as xr
 
     cells = read_chart(chart)
     changes = changes_of(cells)
-    endings = [borders.endings.get(key) for key in keys_of(cells, changes)]
-    on_curves = explained(cells, changes, borders.curves)
-    harmless = np.array([e is not None and not e.outcome.is_change for e in endings], dtype=bool) & ~on_curves
-    known = on_curves | np.array([e is not None and e.outcome.is_explained for e in endings], dtype=bool)
-    left = changes.only(~known)
+    found = borders.of(cells, changes)
+    kinds = [ChangeOutcome(outcome) for outcome in found["outcome"]]
+    ends, harmless = (np.array([getattr(k, name) for k in kinds], dtype=bool) for name in ("is_end", "is_harmless"))
+    on_curves = explained(cells, changes, borders.curves) & ~harmless
+    left = changes.only(~(on_curves | ends | harmless))
     middle, unseen = (left.source + left.target) / 2, unseen_folds(cells, borders.curves)
     columns = {
         "amplitude": cells.motions["amplitude"][left.motion],
         "period": cells.motions["period"][left.motion],
         "cells": cells.family_size[left.motion],
         "beside_rest": cells.monostable[tuple(left.target.T)],
-        "looked_into": np.array([e is not None for e in endings], dtype=bool)[~known],
     }
     data = {name: ("change", values) for name, values in columns.items()}
     for i, (name, axis) in enumerate((("vertical", cells.vertical), ("horizontal", cells.horizontal))):
         data[name] = ("change", np.interp(middle[:, i], np.arange(len(axis)), axis))
         data[f"unseen_{name}"] = ("unseen", np.interp(unseen[:, i], np.arange(len(axis)), axis))
-    number = chart.transpose("vertical", "horizontal", ...)
-    chaos = ((number["count"] == 0) & (number["unsettled"] > 0)).values
+    chaos = (chart["outcome"] == CellOutcome.CHAOS).transpose("vertical", "horizontal").values
+    path = chart.attrs["path"]
+    sample = sampled_ends(System.from_json(chart.attrs["system"]), (str(path[0]), str(path[1])), cells, borders)
     attrs = {
         "changes": len(changes),
         "changes_beside_rest": int(cells.monostable[tuple(changes.target.T)].sum()),
+        "located": int(ends.sum()),
         "on_curves": int(on_curves.sum()),
+        "sampled": int(np.isfinite(sample).sum()),
+        "sampled_agree": int(np.nansum(sample)),
         "harmless": int(harmless.sum()),
         "chaos_beside_rest": _neighbours(chaos, cells.monostable),
     }

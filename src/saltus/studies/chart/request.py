@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.attractors import Unsettled
 from saltus.checks import (
     check_along,
     check_axis,
@@ -22,6 +23,7 @@ from saltus.checks import (
 )
 from saltus.errors import ParameterError, shown
 from saltus.provenance import check_provenance, identity, provenance
+from saltus.studies.chart.cell_outcomes import CellOutcome, flags
 from saltus.studies.chart.motions import KEPT
 from saltus.systems import System, check_system
 from saltus.theory import amplitude_limits
@@ -120,6 +122,16 @@ class ChartRequest:
         numbers = {name: arguments[name] for name in NUMBERS}
         return cls(system=system, paths=paths, window=arguments["window"], **block, **numbers)
 
+    @classmethod
+    def of_chart(cls, system: System, chart: Any) -> ChartRequest:
+        """The request of which a chart is the answer."""
+        attrs = chart.attrs
+        low_x, high_x, low_v, high_v = (float(value) for value in attrs["window"])
+        numbers = {name: attrs[name].item() if isinstance(attrs[name], np.generic) else attrs[name] for name in NUMBERS}
+        axes = {name: chart[name].values for name in ("horizontal", "vertical")}
+        window, paths = ((low_x, high_x), (low_v, high_v)), (str(attrs["path"][0]), str(attrs["path"][1]))
+        return cls(system=system, paths=paths, window=window, **axes, **numbers)
+
     def plan(self) -> Plan:
         """The chart as a sweep: chunks of rows, each a call of `cells`."""
         from saltus.sweep import Plan
@@ -152,7 +164,11 @@ class ChartRequest:
             ("count", "i2", "1", (), "stable motions beside rest, mirror images counted once"),
             ("rest", "?", "1", (), "some start is captured at rest"),
             ("tiny", "i2", "1", (), "starts that end on motions too small to count"),
-            ("unsettled", "i2", "1", (), "starts that do not settle"),
+            ("unsettled", "i2", "1", (), "starts that neither come to rest nor repeat themselves"),
+            ("outcome", "i1", "1", (), "what there is in the cell"),
+            ("verdict", "i1", "1", (), "what the motions are that do not settle; 0 too where all do"),
+            ("exponent", "f8", "1", (), "largest Lyapunov exponent of the motions that do not settle, per unit of time"),
+            ("exponent_error", "f8", "1", (), "half width of its 95 % interval"),
             ("motion_amplitude", "f8", unit, each, "amplitude of each motion"),
             ("motion_other", "f8", unit, each, "extremum of each motion on the other side, as its amplitude if symmetric"),
             ("motion_period", "i2", "1", each, "forcing periods of each motion"),
@@ -162,8 +178,9 @@ class ChartRequest:
         ]
         limits = amplitude_limits(self.system)
         rows += [(f"beyond_{limit.name}", "?", "1", (), f"the largest motion passes {limit.meaning}") for limit in limits]
+        meanings = {"outcome": flags(CellOutcome), "verdict": flags(Unsettled)}
         return {
-            key: Variable(dtype=dtype, extra=extra, attrs={"units": units, "long_name": text})
+            key: Variable(dtype=dtype, extra=extra, attrs={"units": units, "long_name": text} | meanings.get(key, {}))
             for key, dtype, units, extra, text in rows
         }
 

@@ -1,0 +1,230 @@
+"""What becomes of the motions of a chart between two neighbouring cells, found by simulation in lanes.
+
+A motion is followed from the middle of its cell towards that of the neighbour: where it settles as the same motion, it starts
+from there; where it does not, the way is halved. So many changes are looked into at once, and no orbit is solved for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+import numpy as np
+
+from saltus.flow import find_recurrence, return_period
+from saltus.studies.chart.motions import ALIKE
+from saltus.systems import System
+
+
+class ChangeOutcome(IntEnum):
+    """What becomes of a motion between two cells."""
+
+    UNKNOWN = 0
+    JUMP = 1
+    DOUBLING = 2
+    SYMMETRY = 3
+    SHRINKS = 4
+    CONTINUED = 5
+    MISSED = 6
+
+    def __str__(self) -> str:
+        return SENTENCES[self]
+
+    @property
+    def is_end(self) -> bool:
+        """Whether the motion ends at a place between the two cells."""
+        return self in ENDS
+
+    @property
+    def is_harmless(self) -> bool:
+        """Whether the same motion goes on into the neighbour."""
+        return self in (ChangeOutcome.SHRINKS, ChangeOutcome.CONTINUED)
+
+
+ENDS = (ChangeOutcome.JUMP, ChangeOutcome.DOUBLING, ChangeOutcome.SYMMETRY)
+SENTENCES = {
+    ChangeOutcome.UNKNOWN: "not known",
+    ChangeOutcome.JUMP: "jumps to another motion",
+    ChangeOutcome.DOUBLING: "passes into one of twice or half its period",
+    ChangeOutcome.SYMMETRY: "gains or loses its symmetry",
+    ChangeOutcome.SHRINKS: "becomes too small to count",
+    ChangeOutcome.CONTINUED: "goes on",
+    ChangeOutcome.MISSED: "goes on, but no start of the neighbour has led to it",
+}
+
+# A motion on the way: at which share of it, its state at phase 0, period, impacts, extrema; a period of 0 if it does not settle.
+WAY = np.dtype(
+    [
+        ("share", float),
+        ("state", float, (2,)),
+        ("period", np.int64),
+        ("impact_count", np.int64),
+        ("amplitude", float),
+        ("other", float),
+    ]
+)
+# The outcome, the last share of the way at which the motion has settled in time, the last at which it is the same motion, settled
+# or about to settle, and the next, at which it is another.
+ENDING = np.dtype([("outcome", np.int8), ("settled", float), ("last", WAY), ("next", WAY)])
+
+
+@dataclass(frozen=True)
+class TraceSettings:
+    """How changes are looked into in lanes."""
+
+    halvings: int = 6  # The end of a motion is enclosed in this power of a half of the way: 1/64 of a cell.
+    # From its own cell a motion starts without a second state to head on from, so that its basin is missed sooner: it is lost
+    # there only from so near.
+    first_halvings: int = 10
+    rounds: int = 24  # Steps of a motion: more than this takes but where it is lost from afar and found again from near, often.
+    stages: tuple[float, ...] = (1 / 20, 9 / 20)  # Shares of the forcing periods after which what is lost is not followed on.
+    # States a number of periods apart that are as near as this share of the amplitude are of one motion that settles slowly, as
+    # it does beside its special point.
+    slow: float = 1e-3
+    patience: int = 8  # A motion that reaches the neighbour but has not settled there is followed for so many times the periods.
+    # A motion is the same a step further on if its extrema have changed by less than this share of the amplitude for a step from
+    # cell to cell, and in shorter steps by the root of their length, as extrema change beside a fold.
+    change: float = ALIKE.family
+
+
+SETTINGS = TraceSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """The ways along which motions are followed, n of them: parameters from one end to the other, and the motions at the
+    start."""
+
+    system: System
+    start: Mapping[str, np.ndarray]  # the parameters by dotted path, (n,), at the middle of the motions' cells
+    end: Mapping[str, np.ndarray]
+    motions: np.ndarray  # (n,), of dtype MOTION
+    periods: int
+    max_period: int
+    tol: float
+
+    def settled(self, rows: np.ndarray, last: np.ndarray, share: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the motions from states (n, 2) at a share of these ways settle on, of dtype WAY, and whether they have settled.
+
+        What has come far from the last motion, of dtype WAY, is followed no further.
+        """
+        found, settled = np.zeros(len(rows), WAY), np.zeros(len(rows), dtype=bool)
+        left = np.arange(len(rows))
+        found["share"], found["state"] = share, states
+        for part in SETTINGS.stages:
+            if not left.size:
+                break
+            found[left], settled[left] = self.followed(rows[left], found[left], math.ceil(part * self.periods))
+            left = left[~settled[left] & is_near(last[left], found[left])]
+        return found, settled
+
+    def followed(self, rows: np.ndarray, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
+        """Motions, of dtype WAY, so many forcing periods later at the most, and whether they have settled."""
+        parameters = {path: a[rows] + motions["share"] * (self.end[path][rows] - a[rows]) for path, a in self.start.items()}
+        ends = find_recurrence(
+            self.system,
+            motions["state"],
+            max(periods, 3 * self.max_period),
+            parameters=parameters,
+            max_period=self.max_period,
+            kept=2 * self.max_period,
+            extrema=True,
+            impact_count=True,
+            tol=self.tol,
+        )
+        size = np.nanmax(np.abs(ends.states[:, :, 0]), axis=1, initial=0.0)[:, None]
+        slow = return_period(ends.states, self.max_period, SETTINGS.slow * size)
+        settled = ends.periodic | ends.rest
+        ends = replace(ends, period=np.where(settled, ends.period, slow))
+        found = motions.copy()
+        found["state"], found["period"], found["impact_count"] = ends.last, ends.period, ends.impact_count
+        high, low = ends.highest, -ends.lowest
+        found["amplitude"], found["other"] = np.maximum(high, low), np.minimum(high, low)
+        for name in ("period", "impact_count", "amplitude", "other"):
+            found[name][ends.rest] = 0
+        return found, settled
+
+
+def trace(ways: Ways, least: float) -> np.ndarray:
+    """What becomes of each motion on its way, of dtype ENDING; `least` is the amplitude that counts.
+
+    That it is lost counts only from a place no farther than the last halving: from afar its basin may be too small.
+    """
+    count = len(ways.motions)
+    result = np.zeros(count, ENDING)
+    last, following = result["last"], result["next"]
+    for name in ("state", "period", "impact_count", "amplitude", "other"):
+        last[name] = ways.motions[name]
+    before, high, trial, going = last.copy(), np.ones(count), np.full(count, 0.5), np.ones(count, dtype=bool)
+    for _ in range(SETTINGS.rounds):
+        rows = np.flatnonzero(going)
+        if not rows.size:
+            break
+        found, settled = ways.settled(rows, last[rows], trial[rows], _heading(last[rows], before[rows], trial[rows]))
+        same = _is_same(last[rows], found)
+        on, lost = rows[same], rows[~same]
+        before[on], last[on] = last[on], found[same]
+        result["settled"][on] = np.where(settled[same], found["share"][same], result["settled"][on])
+        going[on] = (trial[on] < 1.0) & (last["amplitude"][on] >= least)
+        near = 0.5 ** np.where(last["share"] > 0.0, SETTINGS.halvings, SETTINGS.first_halvings)
+        following[lost], going[lost] = found[~same], trial[lost] - last["share"][lost] > near[lost]
+        high[on], high[lost] = np.where(trial[on] < high[on], high[on], 1.0), trial[lost]
+        trial = np.where(high - last["share"] > near, 0.5 * (last["share"] + high), high)
+    _wait(ways, result)
+    result["outcome"] = np.where(going, ChangeOutcome.UNKNOWN, _outcomes(last, following, least))
+    return result
+
+
+def _wait(ways: Ways, result: np.ndarray) -> None:
+    """Follow what has reached the neighbour without having settled there to where it settles; if that is something else, it is
+    what comes next."""
+    rows = np.flatnonzero((result["last"]["share"] >= 1.0) & (result["settled"] < 1.0))
+    if not rows.size:
+        return
+    last = result["last"][rows]
+    found, _ = ways.followed(rows, last, SETTINGS.patience * ways.periods)
+    same = _is_same(last, found)
+    result["last"][rows[same]], result["settled"][rows[same]] = found[same], 1.0
+    result["next"][rows[~same]], result["last"]["share"][rows[~same]] = found[~same], result["settled"][rows[~same]]
+
+
+def _heading(last: np.ndarray, before: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """States (n, 2) at these shares of the way, in a straight line through the last two; that of the last where these differ
+    much, as at another phase of several periods."""
+    step, gone = last["state"] - before["state"], last["share"] - before["share"]
+    usable = (gone > 0.0) & (np.abs(step).max(axis=1) <= ALIKE.alike * last["amplitude"])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ahead = np.where(usable, (share - last["share"]) / gone, 0.0)
+    return np.asarray(last["state"] + ahead[:, None] * step)
+
+
+def is_symmetric(motions: np.ndarray) -> np.ndarray:
+    """Which motions are their own mirror images."""
+    return np.asarray(np.abs(motions["amplitude"] - motions["other"]) < ALIKE.symmetric * motions["amplitude"])
+
+
+def is_near(last: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Whether the extrema have changed by no more than those of one motion may in a step of this length."""
+    size = np.maximum(last["amplitude"], found["amplitude"])
+    apart = np.maximum(*(np.abs(found[name] - last[name]) for name in ("amplitude", "other")))
+    return np.asarray(apart <= SETTINGS.change * np.sqrt(np.abs(found["share"] - last["share"])) * size)
+
+
+def _is_same(last: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Whether what was found a step further on is the same motion."""
+    same = (found["period"] == last["period"]) & (is_symmetric(found) == is_symmetric(last))
+    return np.asarray(same & is_near(last, found))
+
+
+def _outcomes(last: np.ndarray, following: np.ndarray, least: float) -> np.ndarray:
+    """The outcomes that follow from the last motion that was the same and from the first one that was another."""
+    near = is_near(last, following)
+    ratio = following["period"] / last["period"]
+    outcome = np.full(len(last), ChangeOutcome.JUMP, dtype=np.int8)
+    outcome[near & (ratio == 1.0)] = ChangeOutcome.SYMMETRY
+    outcome[near & ((ratio == 2.0) | (ratio == 0.5))] = ChangeOutcome.DOUBLING
+    outcome[last["share"] >= 1.0] = ChangeOutcome.MISSED
+    outcome[last["amplitude"] < least] = ChangeOutcome.SHRINKS
+    return outcome
