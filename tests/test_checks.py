@@ -62,7 +62,7 @@ def test_what_is_no_orbit_or_special_point_is_refused(function, more, name):
 def test_a_step_that_leads_nowhere_is_refused(step):
     forced = SYSTEM.with_({"load.horizontal": saltus.Harmonic(amplitude=0.5), "load.vertical": -0.5, "model.damping": 0.1})
     orbit = saltus.find_orbit(forced, theta=0.3)
-    with pytest.raises(ParameterError, match=r"^step must (lie|be a number) in \(0, 1000\]"):
+    with pytest.raises(ParameterError, match=r"^step must (lie|be a number) in "):
         saltus.continue_orbit(orbit, "load.frequency", (0.9, 1.1), step=step)
 
 

@@ -29,6 +29,7 @@ class Limits:
     count: int = 10_000_000  # Motions, points, samples: more of them at once is a slip of the pen, and fits into no memory.
     periods: int = 10**12  # Forcing periods, or units of time, of one motion: days of one core.
     threads: int = 1024  # More than a machine has cores; each thread takes memory before it does anything.
+    value: float = 1e100  # Of an axis, a window or a state: differences and squares of larger ones are no numbers.
     order: int = 1000  # Of a harmonic: the step of the integrator shrinks with it.
     seed: int = 2**63 - 1  # What files and random generators hold.
     motion: int = 2048  # Bytes that a motion of an ensemble takes; 1000 were measured, and samples come to it.
@@ -219,7 +220,7 @@ def check_axis(name: str, values: Any) -> np.ndarray:
         axis = np.atleast_1d(np.asarray(values, dtype=float))
     except (TypeError, ValueError):
         axis = np.empty(0)
-    if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all() or not (np.diff(axis) > 0).all():
+    if axis.ndim != 1 or not axis.size or not (np.abs(axis) <= LIMITS.value).all() or not (np.diff(axis) > 0).all():
         raise ParameterError(f"{name} must be numbers that rise, each above the one before, got {shown(values)}", name)
     return axis
 
@@ -289,7 +290,7 @@ def check_window(window: Any, system: System) -> Window:
         bounds = np.asarray(window, dtype=float)
     except (TypeError, ValueError):
         bounds = np.empty(0)
-    if bounds.shape != (2, 2) or not np.isfinite(bounds).all() or not (bounds[:, 0] < bounds[:, 1]).all():
+    if bounds.shape != (2, 2) or not (np.abs(bounds) <= LIMITS.value).all() or not (bounds[:, 0] < bounds[:, 1]).all():
         raise ParameterError(
             f"window must be ((least, largest coordinate), (least, largest velocity)), got {shown(window)}", "window"
         )
@@ -336,7 +337,7 @@ def check_states(name: str, states: Any) -> np.ndarray:
         array = np.asarray(states, dtype=float).reshape(-1, 2)
     except (TypeError, ValueError):
         array = np.full((1, 2), np.nan)
-    if not np.isfinite(array).all():
+    if not (np.abs(array) <= LIMITS.value).all():
         raise ParameterError(f"{name} must be states (coordinate, velocity), an array (n, 2), got {shown(states)}", name)
     return array
 
