@@ -147,10 +147,9 @@ class Continuation:
                     self.missed.append(Missed(CurveMissed.NOT_LOCATED, test.kind, a.point.parameters, b.point.parameters))
                 else:
                     found.append(zero)
-        first, last = samples[0].point, samples[-1].point
-        counts = self.events.outside(first), self.events.outside(last)
-        if not found and None not in counts and counts[0] != counts[1]:
-            self.missed.append(Missed(CurveMissed.STABILITY, "", first.parameters, last.parameters))
+            if not self.trail.explained(a, b):
+                self.missed.append(Missed(CurveMissed.STABILITY, "", a.point.parameters, b.point.parameters))
+        first = samples[0].point
         for zero in sorted(self.events.distinct(found), key=lambda zero: first.curve.norm(zero.point.place - first.place)):
             self.special.append(zero)
             if self.events.keeps_special:

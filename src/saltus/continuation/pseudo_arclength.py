@@ -83,7 +83,9 @@ class EquationCurve(Curve[P]):
         """The point a step further; None where Newton's method does not converge or leads away from what was predicted."""
         guess = predicted(before, point, step)
         ahead = self.solve(guess, point.tangent)
-        return None if ahead is None or self.norm(ahead.place - guess) >= STEPS.off * step else ahead
+        straight = before is None or not before.curve.joins(point.curve)
+        off = STEPS.off_tangent if straight else STEPS.off
+        return None if ahead is None or self.norm(ahead.place - guess) >= off * step else ahead
 
     def turn(self, a: P, b: P) -> float:
         """The angle between the tangents, rad."""

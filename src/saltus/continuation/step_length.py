@@ -22,6 +22,7 @@ class StepSettings:
     most_points: int = 20_000  # points after which the curve is given up
     most_stretched: float = 3.0  # the largest step, in the last one, for which the curvature of the last one is of use
     off: float = 0.05  # share of a step by which its end may lie off where it was predicted: else it may be on another branch
+    off_tangent: float = 0.3  # the same share where it was predicted along the tangent alone, which may itself be inexact
     beside: float = 0.1  # share of a step by which a point within it, at a given value, may lie beside the cubic through its ends
     closing: float = 0.2  # share of a step by which the first point of a curve may lie beside it for the curve to close
     ahead: float = 1e-6  # length along a tangent of the point that gives its direction after the impacts are renumbered

@@ -34,6 +34,7 @@ class TestFunction:
     kind: str
     value: Callable[[Any], float]
     width: float = 1e-11  # of the bracket of the zero, as a share of the step; the best point found in it is nearer still
+    decisive: bool = False  # whether the count of `Events.outside` changes at its zeros
     guides: bool = False  # whether it is smooth, so that a step is taken again, shorter, in which it changes unexpectedly
     singular: bool = False  # whether the equations are singular at its zeros, so that points beside them cannot be solved for
 

@@ -37,6 +37,7 @@ class TrailPoint:
     point: Any
     arc: float  # the length of the curve up to it
     values: np.ndarray  # that of the barrier first if there is one
+    outside: int | None  # see `Events.outside`
 
 
 class Trail:
@@ -56,7 +57,9 @@ class Trail:
         self.barrier = self.events.barrier()
         self.tests = [*([] if self.barrier is None else [self.barrier]), *self.events.tests(point)]
         self.guides = np.array([test.guides for test in self.tests], dtype=bool)
-        self.latest = TrailPoint(point, 0.0, self._values(point))
+        self.decisive = np.array([test.decisive for test in self.tests], dtype=bool)
+        self.seen: list[TrailPoint] = []
+        self.latest = self._at(point, 0.0)
         self.last = [self.latest]
 
     def explains(self, ahead: Any) -> bool:
@@ -83,7 +86,7 @@ class Trail:
         samples = self.up_to([], ahead)
         if self.barrier is None or samples[-1].values[0] < 0.0 or len(self.last) == 1:  # a curve may begin on the barrier
             return samples
-        samples = self.examined(samples, slice(1))
+        samples = self.examined(samples)
         beyond = next((i for i, sample in enumerate(samples) if i and sample.values[0] < 0.0), len(samples))
         return samples[: beyond + 1]
 
@@ -94,8 +97,10 @@ class Trail:
         before, last = self.last[-1], self._sample(ahead)
         return [*(sample for sample in samples[:-1] or [before] if sample.arc < last.arc), last]
 
-    def examined(self, samples: list[TrailPoint], rows: slice = slice(None)) -> list[TrailPoint]:
-        """The points of a step with as many more between as are needed to see every zero of the test functions in `rows`."""
+    def examined(self, samples: list[TrailPoint]) -> list[TrailPoint]:
+        """The points of a step with as many more between as are needed to see every zero of the test functions."""
+        if samples is self.seen:
+            return samples
         looks, i, known = 0, 0, self.last[:-1]
         narrowest = SETTINGS.narrowest * (samples[-1].arc - samples[0].arc)
         while i + 1 < len(samples) and looks < SETTINGS.most_looks:
@@ -103,13 +108,22 @@ class Trail:
             near = sorted(
                 [*[*known, *samples[:i]][-2:], *samples[i + 2 : i + 4]], key=lambda s: max(a.arc - s.arc, s.arc - b.arc)
             )
-            share = _where_to_look(a, b, near[:2], rows) if b.arc - a.arc > narrowest else None
+            share = None
+            if b.arc - a.arc > narrowest:
+                share = _where_to_look(a, b, near[:2]) or (None if self.explained(a, b) else 0.5)
             middle = None if share is None else self._middle(a, b, share)
             if middle is None:
                 i += 1
             else:
                 samples, looks = [*samples[: i + 1], middle, *samples[i + 1 :]], looks + 1
+        self.seen = samples
         return samples
+
+    def explained(self, a: TrailPoint, b: TrailPoint) -> bool:
+        """Whether a count outside that differs at two points comes with a change of sign of a test function that decides."""
+        if a.outside == b.outside or None in (a.outside, b.outside):
+            return True
+        return bool((a.values * b.values <= 0.0)[self.decisive].any())
 
     def _middle(self, a: TrailPoint, b: TrailPoint, share: float) -> TrailPoint | None:
         """The sample at a share of the way between two, or None where the curve cannot be solved for."""
@@ -119,25 +133,26 @@ class Trail:
         if point is None:
             return None
         first, second = arc(a.point, point), arc(point, b.point)
-        return TrailPoint(point, a.arc + (b.arc - a.arc) * first / (first + second), self._values(point))
+        return self._at(point, a.arc + (b.arc - a.arc) * first / (first + second))
 
     def _sample(self, ahead: Any) -> TrailPoint:
         """A point ahead of the last one."""
         if self.latest.point is not ahead:
             before = self.last[-1]
-            self.latest = TrailPoint(ahead, before.arc + arc(before.point, ahead), self._values(ahead))
+            self.latest = self._at(ahead, before.arc + arc(before.point, ahead))
         return self.latest
 
-    def _values(self, point: Any) -> np.ndarray:
-        return np.array([test.value(point) for test in self.tests])
+    def _at(self, point: Any, length: float) -> TrailPoint:
+        """A point at a length of the curve, with all that is to be known of it."""
+        return TrailPoint(point, length, np.array([test.value(point) for test in self.tests]), self.events.outside(point))
 
 
-def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint], rows: slice) -> float | None:
+def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> float | None:
     """The share of the way from a to b at which a test function may have zeros that its values at both ends do not tell."""
-    begin, end = a.values[rows], b.values[rows]
+    begin, end = a.values, b.values
     with np.errstate(all="ignore"):
         rise = end - begin
-        bend, twist, unsure, lever = _higher(a, b, near, rows)
+        bend, twist, unsure, lever = _higher(a, b, near)
         signs = np.sign(begin) * np.sign(end)
         room = np.where(signs > 0, 4.0 * np.minimum(np.abs(begin), np.abs(end)), np.abs(rise))
         swing = np.abs(bend) + 1.25 * np.abs(lever).max() * (np.abs(twist) + unsure)
@@ -157,14 +172,14 @@ def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint], row
     return place
 
 
-def _higher(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint], rows: slice) -> tuple[np.ndarray, ...]:
+def _higher(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> tuple[np.ndarray, ...]:
     """The coefficients of second and third order, the uncertainty of either, and the lever of the last two over the grid.
 
     Without two points near it is the last term known that is uncertain: of the straight line half of its rise.
     """
-    begin, end, length = a.values[rows], b.values[rows], b.arc - a.arc
+    begin, end, length = a.values, b.values, b.arc - a.arc
     slope, nothing, everywhere = (end - begin) / length, np.zeros(len(begin)), np.ones(GRID.size)
-    seconds = [((end - c.values[rows]) / (b.arc - c.arc) - slope) / (c.arc - a.arc) for c in near]
+    seconds = [((end - c.values) / (b.arc - c.arc) - slope) / (c.arc - a.arc) for c in near]
     if len(near) < 2:
         bend = length**2 * seconds[0] if near else nothing
         return bend, nothing, np.abs(bend if near else end - begin), everywhere

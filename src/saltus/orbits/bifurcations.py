@@ -42,12 +42,27 @@ def scaled_determinant(matrix: np.ndarray) -> float:
     return float(np.linalg.det(matrix / lengths[:, None])) if (lengths > 0).all() else 0.0
 
 
-@lru_cache(maxsize=4)
 def torus(point: OrbitPoint) -> float:
-    """The modulus of a complex pair of multipliers less 1; -1 where there is none, and where there cannot be one (errata 22)."""
-    values = point.orbit.multipliers
-    pairs = values[np.abs(values.imag) > 1e-9]
-    return float(np.abs(pairs).max(initial=0.0)) - 1.0
+    """The product, over all pairs of multipliers, of their product less 1: smooth, and 0 where a complex pair has the modulus 1.
+
+    A real pair may have that product as well, which is no special point. 0 where it is so but for rounding all along, and -1
+    where it is not known. Of two multipliers it is that of the segments' determinants, which no large multiplier hides.
+    """
+    values, equations = point.orbit.multipliers, point.equations
+    with np.errstate(all="ignore"):
+        if len(values) == 2:
+            half = float(np.prod(np.linalg.det(equations.here) / np.linalg.det(equations.there)))
+            product = (half**2 if point.orbit.symmetric else half) - 1.0
+        else:
+            first, second = np.triu_indices(len(values), 1)
+            product = float(np.prod(values[first] * values[second] - 1.0).real)
+    return -1.0 if not math.isfinite(product) else product if abs(product) > ROUNDING else 0.0
+
+
+def complex_pair(orbit: PeriodicOrbit) -> float:
+    """The largest modulus of a complex pair of multipliers; 0 where there is none."""
+    values = orbit.multipliers
+    return float(np.abs(values[np.abs(values.imag) > 1e-9]).max(initial=0.0))
 
 
 def never_torus(orbit: PeriodicOrbit) -> bool:
@@ -70,12 +85,14 @@ def touching(point: OrbitPoint) -> float:
     return (-1) ** pairs * min(NEAREST, orbit.clearance, orbit.shallowest)
 
 
+ROUNDING = 1e-12  # by which a product of multipliers may differ from 1 where nothing is lost
 NEAREST = 1.0  # upper limit of the distance of an orbit from a grazing, which would be infinite for one that never turns
 
 
-FLIP = {symmetric: Test(SpecialKind.BPC if symmetric else SpecialKind.PD, flip, guides=True) for symmetric in (True, False)}
-FOLD, CROSSING = Test(SpecialKind.LP, fold, guides=True), Test(SpecialKind.BPC, crossing, guides=True, singular=True)
-TORUS = Test(SpecialKind.NS, torus)
+CHANGES = {"decisive": True, "guides": True}  # of stability, smoothly
+FLIP = {symmetric: Test(SpecialKind.BPC if symmetric else SpecialKind.PD, flip, **CHANGES) for symmetric in (True, False)}
+FOLD, CROSSING = Test(SpecialKind.LP, fold, **CHANGES), Test(SpecialKind.BPC, crossing, singular=True, **CHANGES)
+TORUS = Test(SpecialKind.NS, torus, decisive=True)
 TOUCHING = Test(SpecialKind.GR, touching)
 GRAZING = Test(SpecialKind.GR, grazing, 1e-15)  # narrower than others: beside a grazing motions part by the square root
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.continuation import Continuation, Cut, End, Events, Missed, Zero, located
-from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, grazing, never_torus, torus
+from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, complex_pair, grazing, never_torus
 from saltus.orbits.grazing import other_side
 from saltus.orbits.images import asymmetry, falls_onto_image, halves_of, nearest, passes_image, repetition
 from saltus.orbits.orbit_curve import OrbitPoint
@@ -33,6 +33,7 @@ class BranchLimits:
     shrunk_impacts: int = 60
     # With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved for.
     steepest: float = 1e8
+    on_circle: float = 1e-9  # Without damping multipliers lie on the unit circle, but for rounding that is below this.
     smallest: float = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
     same_fold: float = 1e-8  # A fold and a crossing of branches whose parameters differ by less than this are one point.
     # A complex pair of multipliers beyond the unit circle by more than this, where areas never grow, is an error of the package.
@@ -68,7 +69,8 @@ class BranchEvents(OrbitEvents):
 
     def accepts(self, point: OrbitPoint, ahead: OrbitPoint) -> bool:
         """Whether a step has not gone over to the orbits that are their own images, nor, from one grazing, beyond the next."""
-        skipped = grazing(point) <= TOLERANCES.touch and grazing(ahead) < 0.0
+        begun = point.iterations == 0  # with the signature of the other side of a grazing, where nothing had to be solved
+        skipped = begun and grazing(point) <= TOLERANCES.touch and grazing(ahead) < 0.0
         return not skipped and not falls_onto_image(point, ahead)
 
     def barrier(self) -> Test:
@@ -92,11 +94,11 @@ class BranchEvents(OrbitEvents):
 
     def outside(self, point: OrbitPoint) -> int | None:
         """How many multipliers are outside the unit circle; None at a grazing."""
-        return None if point.orbit.grazes else int(np.count_nonzero(np.abs(point.orbit.multipliers) > 1.0))
+        return None if point.orbit.grazes else int(np.count_nonzero(np.abs(point.orbit.multipliers) > 1.0 + SETTINGS.on_circle))
 
     def distinct(self, found: list[Zero]) -> list[Zero]:
-        """Special points without the crossings of branches that are folds, and without pairs of multipliers on the unit circle
-        by rounding, where areas never grow."""
+        """Special points without the crossings of branches that are folds, and without tori of real multipliers or where areas
+        never grow."""
         folds = [zero.parameter for zero in found if zero.kind == SpecialKind.LP]
 
         def is_fold(zero: Zero) -> bool:
@@ -104,7 +106,7 @@ class BranchEvents(OrbitEvents):
             return crossing and any(abs(zero.parameter - p) < SETTINGS.same_fold for p in folds)
 
         def impossible(zero: Zero) -> bool:
-            return zero.kind == SpecialKind.NS and never_torus(zero.point.orbit)
+            return zero.kind == SpecialKind.NS and (never_torus(zero.point.orbit) or not complex_pair(zero.point.orbit))
 
         return [zero for zero in found if not is_fold(zero) and not impossible(zero)]
 
@@ -114,8 +116,8 @@ class BranchEvents(OrbitEvents):
 
     def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
         """The end of an orbit that has shrunk to rest, or has lost its stability."""
-        if torus(ahead) > SETTINGS.impossible_pair and never_torus(ahead.orbit):
-            where, modulus = ahead.parameters, f"{1.0 + torus(ahead):.9g}"
+        if complex_pair(ahead.orbit) > 1.0 + SETTINGS.impossible_pair and never_torus(ahead.orbit):
+            where, modulus = ahead.parameters, f"{complex_pair(ahead.orbit):.9g}"
             run.missed.append(Missed(OrbitMissed.IMPOSSIBLE_PAIR, SpecialKind.NS, where, where, modulus))
         if self.while_stable and cut is None and not ahead.orbit.stable:
             return super().ended(run, ahead, cut) or End(OrbitEnd.UNSTABLE, ahead.parameter)

@@ -139,10 +139,10 @@ class PeriodicOrbit:
         """The least depth to which it goes beyond a contact that is no singularity, on either side; inf without passages."""
         return float(self._looks[:, at.SHALLOWEST].min())
 
-    @property
+    @cached_property
     def slowest(self) -> float:
         """The least speed of an impact; inf where there is none; below 0: no orbit."""
-        return float(self.speeds.min(initial=math.inf))
+        return float(self.solution.unknowns[1::2].min()) if self.signature.sides else math.inf
 
     @property
     def admissible(self) -> bool:

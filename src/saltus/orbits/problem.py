@@ -61,19 +61,24 @@ class Equations:
         matrix[-d:, :d] += closing * self.there[-1]
         return matrix
 
+    @cached_property
+    def _all(self) -> np.ndarray:
+        return np.column_stack([self.jacobian(), self.parameters])
+
     def derivatives(self) -> np.ndarray:
         """The derivatives to the unknowns and the parameters."""
-        return np.column_stack([self.jacobian(), self.parameters])
+        return self._all
 
     def monodromy(self) -> np.ndarray:
         """The chain of the segments' maps, from the first unknowns to those a (half) period later; inf at a grazing."""
         chain = np.eye(self.here.shape[1])
         with np.errstate(all="ignore"):
-            for here, there in zip(self.here, self.there, strict=True):
-                try:
-                    chain = -np.linalg.solve(there, here @ chain)
-                except np.linalg.LinAlgError:
-                    return np.full_like(chain, np.inf)
+            try:
+                maps = -np.linalg.solve(self.there, self.here)
+            except np.linalg.LinAlgError:
+                return np.full_like(chain, np.inf)
+            for segment in maps:
+                chain = segment @ chain
         return chain
 
 
@@ -200,14 +205,22 @@ class Problem:
 
     def _segments(self, unknowns: np.ndarray, frequency: float) -> Segments:
         """The segments between the impacts."""
-        sides, along = self.signature.sides, self._along()
-        if not sides:
+        n = len(self.signature.sides)
+        if not n:
             spans = np.array([[0.0, self.closing / frequency, 0.0]])
-            return Segments(spans, np.array([[0, along[0]]]), unknowns.reshape(1, -1).copy())
-        phases, speeds = unknowns[::2], unknowns[1::2]
-        ends = np.append(phases[1:], phases[0] + self.closing)
-        spans = np.stack([phases / frequency, ends / frequency, speeds], axis=1)
-        return Segments(spans, np.stack([sides, along], axis=1).astype(np.int64), np.zeros((len(sides), 2)))
+            return Segments(spans, self._sides, unknowns.reshape(1, -1).copy())
+        spans = np.empty((n, 3))
+        spans[:, 0] = unknowns[::2]
+        spans[:-1, 1], spans[-1, 1] = unknowns[2::2], unknowns[0] + self.closing
+        spans[:, :2] /= frequency
+        spans[:, 2] = unknowns[1::2]
+        return Segments(spans, self._sides, np.zeros((n, 2)))
+
+    @cached_property
+    def _sides(self) -> np.ndarray:
+        """The sides before and along each segment, (n, 2)."""
+        sides, along = self.signature.sides, self._along()
+        return np.array(list(zip(sides or (0,), along, strict=True)), dtype=np.int64)
 
     def _along(self) -> tuple[int, ...]:
         """The side of each segment, 0 for all sides."""
@@ -227,7 +240,7 @@ class Problem:
     def _crossing(self, unknowns: np.ndarray, frequency: float, segments: Segments, flown: Flown) -> Equations:
         spans, (ends, columns, looks, rates) = segments.spans, flown
         n, count = len(spans), len(self.paths)
-        sign = np.where(np.array(self.signature.along()) > 0, rates[0], rates[1])
+        sign = np.where(segments.sides[:, 1] > 0, rates[0], rates[1])
         residual, here, there = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
         parameters = np.empty((n, 2, count))
         place = self.paths.index(FREQUENCY) if FREQUENCY in self.paths else -1
