@@ -32,9 +32,9 @@ class DiagramSearchSettings:
     narrow: float = 0.02
     rounds: int = 100  # Rounds of starts from neighbours: each adds what the one before has found a value further.
     transient: int = 24  # Forcing periods at the beginning of motions in which near returns are looked for.
-    # Where a stable part of a branch ends, motions are started from its last orbit, this share of the range further on both
+    # Where a stable part of a branch ends, motions are started from its last orbit, these shares of the range further on both
     # sides: what they fall to is there where no start of the grid may lead.
-    beyond: tuple[float, ...] = (3e-4,)
+    beyond: tuple[float, ...] = (3e-5, 3e-4)
     deviations: float = 1.96  # Standard deviations to each side of a 95 % interval.
 
 
