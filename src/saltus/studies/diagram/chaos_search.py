@@ -30,9 +30,8 @@ class ChaosSettings:
     fine_step: float = 3e-4
     long_period: int = 6
     edge: float = 1e-4  # Share of the range to which the bracket of an edge is halved.
-    # States of the chaos at one end of an interval, and motions that have settled there, from which motions are begun within.
-    seeds: int = 2
-    neighbours: int = 4
+    seeds: int = 2  # States of the chaos at each end of an interval from which motions are begun within.
+    neighbours: int = 4  # Motions that have settled at each end, from which others are begun within.
     states: int = 8  # Last states of each unsettled motion that are given to the judgement.
     # Shares of the range beside a special point at which motions from its orbit are begun: narrow bands begin there.
     beside: tuple[float, ...] = (-4e-4, -1.5e-4, 1.5e-4, 4e-4)
@@ -279,10 +278,7 @@ class _BandSearch:
 
     def refine(self) -> None:
         """Halve intervals in which something changes, or in which there is chaos, as long as they are wide."""
-        while True:
-            pairs = [(a, b) for a, b in pairwise(self.places) if self._is_of_interest(a, b)]
-            if not pairs:
-                return
+        while pairs := [(a, b) for a, b in pairwise(self.places) if self._is_of_interest(a, b)]:
             self._begin_between(pairs)
             self.spread()
 
@@ -309,9 +305,10 @@ class _BandSearch:
         for i in range(self.settings.confirmations):
             self._halve()
             runs = [(run, self._some_of(run)) for run in self._runs()]
-            failed = self._confirm((place for _, some in runs for place in some), 1)
+            failed = self._confirm((place for run, some in runs for place in some + self._beside_windows(run)), 1)
             leaving = [a for a, b in self._edges() if b.life >= self.settings.lasting]
             leaving += [place for _, some in runs if any(p.settled for p in some if p.chaotic) for place in some]
+            leaving += [place for place in self.places if place.settled and place.care == 1]
             failed += self._confirm(leaving, 2)
             if not failed:
                 return
@@ -330,10 +327,7 @@ class _BandSearch:
 
     def _halve(self) -> None:
         """Halve the brackets of all edges: with care where it took care to see that there is no chaos beyond."""
-        while True:
-            wide = [(a, b) for a, b in self._edges() if abs(b.value - a.value) > self.settings.edge * self.span]
-            if not wide:
-                return
+        while wide := [(a, b) for a, b in self._edges() if abs(b.value - a.value) > self.settings.edge * self.span]:
             for care in {b.care for _, b in wide}:
                 self._begin_between([pair for pair in wide if pair[1].care == care], care)
 
@@ -360,6 +354,15 @@ class _BandSearch:
         """The ends of a band, and values evenly between them."""
         count = 2 + int((run[-1].value - run[0].value) / (self.settings.every * self.span))
         return [run[i] for i in np.unique(np.linspace(0, len(run) - 1, count).astype(int))]
+
+    def _beside_windows(self, run: list[_Place]) -> list[_Place]:
+        """Where there are, beside chaos, motions that settle over a narrow part of a band: it may be a window."""
+        extents: dict[tuple[int, int], list[float]] = {}
+        for place in run:
+            for kind in place.kinds:
+                extents.setdefault(kind, []).append(place.value)
+        narrow = {kind for kind, values in extents.items() if values[-1] - values[0] <= self.settings.every * self.span}
+        return [place for place in run if place.kinds & narrow]
 
     def tried(self) -> Tried:
         """What became of motions at all values."""
