@@ -11,7 +11,7 @@ from shared_systems import forced
 import saltus
 from saltus.errors import ParameterError
 from saltus.orbits import continue_orbit, continue_special, find_orbit, follow_stable
-from saltus.studies import Borders, bordered_chart, disagreements, stability_chart, with_borders
+from saltus.studies import Borders, bordered_chart, disagreements, stability_chart, with_borders, wrong_cells
 from saltus.studies.chart.border_curves import curve_dataset, explained
 from saltus.studies.chart.changes import changes_of, keys_of, read_chart
 from saltus.studies.chart.endings import ChangeOutcome, Ways, trace
@@ -332,3 +332,17 @@ def test_borders_that_were_interrupted_go_on_to_the_same_bytes(tmp_path):
     assert all(file.stat().st_mtime_ns == when for file, when in untouched.items())
     xr.testing.assert_identical(whole["borders"].to_dataset(), again["borders"].to_dataset())
     xr.testing.assert_identical(whole["disagreements"].to_dataset(), again["disagreements"].to_dataset())
+
+
+def test_a_chart_that_has_lost_its_motions_is_wrong_where_there_are_some():
+    """By charts with more and other starts on a finer grid: few cells of a whole chart are wrong, and most of an emptied one."""
+    whole = completed()[0]
+    good = wrong_cells(forced(1.0), whole, blocks=1, size=4)
+    assert good["checked_cells"] == 16
+    assert good["wrong_rest"] == 0
+    assert good["wrong_motions"] <= 4
+    empty = whole.copy(deep=True)
+    empty["motion_amplitude"][:] = np.nan
+    empty["outcome"][:] = 0
+    bad = wrong_cells(forced(1.0), empty, blocks=1, size=4)
+    assert bad["wrong_rest"] == bad["wrong_motions"] == bad["wrong_outcome"] > 4

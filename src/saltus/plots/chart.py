@@ -196,7 +196,7 @@ def _filling(name: str) -> Patch:
     """A patch of a legend with the filling of cells."""
     fill, hatch, colour, words = FILLINGS[name]
     with mpl.rc_context({"hatch.linewidth": 0.3, "hatch.color": colour}):
-        return Patch(facecolor=fill or "#7fb8a8", edgecolor=colour, linewidth=0.0, hatch=hatch, label=words)
+        return Patch(facecolor=fill or "#7fb8a8", edgecolor=colour, linewidth=0.0, hatch=hatch[:3], label=words)
 
 
 def _fillings(charts: Sequence[Any]) -> list[Patch]:

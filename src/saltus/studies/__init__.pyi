@@ -1,6 +1,7 @@
 from .chart.borders import Borders, with_borders
 from .chart.chart import bordered_chart, stability_chart
 from .chart.disagreements import disagreements
+from .chart.wrong_cells import wrong_cells
 from .diagram.chaos_search import chaotic_bands
 from .diagram.diagram import bifurcation_diagram, response_spectrum
 from .portrait import phase_portrait
@@ -15,4 +16,5 @@ __all__ = [
     "response_spectrum",
     "stability_chart",
     "with_borders",
+    "wrong_cells",
 ]
