@@ -17,6 +17,7 @@ class LocationSettings:
     """How a zero of a test function is bracketed."""
 
     most_points: int = 80  # Points that are solved for: bisection alone needs 50 for a width of rounding.
+    rounding: float = 4e-15  # The narrowest bracket that is asked for, in which a few places differ by their rounding.
     slow: int = 3  # After so many points that have not halved the bracket the next one is its middle.
     overshoot: float = 0.5  # Share of the wanted width by which a point is put beyond the zero, so that it closes the bracket.
     nodes: int = 4  # Nearest points through which the inverse interpolation goes.
@@ -79,6 +80,7 @@ def _next_share(known: list[KnownPlace], before: float, width: float, widths: li
     """Where to look next for the zero, or None when it is bracketed: by inverse interpolation, or halfway if that is slow."""
     i = _bracket(known, before) if before != 0.0 else 0
     low, high = known[i].share, known[i + 1].share
+    width = max(width, SETTINGS.rounding)
     widths.append(high - low)
     if high - low <= width or 0.0 in (known[i].value, known[i + 1].value) or len(widths) > SETTINGS.most_points:
         return None
