@@ -46,7 +46,8 @@ def torus(point: OrbitPoint) -> float:
     """The product, over all pairs of multipliers, of their product less 1: smooth, and 0 where a complex pair has the modulus 1.
 
     A real pair may have that product as well, which is no special point. 0 where it is so but for rounding all along, and -1
-    where it grazes, as it is not known there. Of two multipliers it is that of the segments' determinants, which no large multiplier hides.
+    where it grazes, as it is not known there. Of two multipliers it is that of the segments' determinants, which no large
+    multiplier hides.
     """
     values, equations = point.orbit.multipliers, point.equations
     if point.orbit.grazes:
