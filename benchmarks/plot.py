@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import io
 from typing import Any
 
 from saltus.plots.conventions import DOUBLE_COLUMN, FAINT, new_figure, panel_label, style
@@ -21,8 +21,8 @@ LOOKS = {
 }
 
 
-def draw(results: dict[str, Any], path: Path) -> None:
-    """Both panels, written to `path`."""
+def draw(results: dict[str, Any]) -> bytes:
+    """Both panels, as a PNG file."""
     with style():
         figure = new_figure(width=DOUBLE_COLUMN, height=95.0)
         left, right = figure.subplots(1, 2)
@@ -39,7 +39,9 @@ def draw(results: dict[str, Any], path: Path) -> None:
             panel_label(ax, label)
         handles, labels = left.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=4)
-        figure.savefig(path)
+        picture = io.BytesIO()
+        figure.savefig(picture, format="png")
+    return picture.getvalue()
 
 
 def _look(name: str) -> dict[str, Any]:

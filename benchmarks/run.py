@@ -27,7 +27,7 @@ from tasks.throughput import extrapolated, throughput
 from tasks.work_precision import work_precision
 from tasks.zeno import zeno
 
-from saltus.files import write_atomically, write_text
+from saltus.files import write_bytes, write_text
 
 RESULTS = Path(__file__).parent / "results"
 GRID = ("1000", "100", "1e-8")
@@ -84,7 +84,7 @@ def main() -> None:
     if chosen.grid:
         results["grid"] = run_child("grid", *GRID, limit=3600.0)
     write_text(RESULTS / "benchmarks.json", json.dumps(results, indent=1) + "\n")
-    write_atomically(RESULTS / "benchmarks.png", lambda part: draw(results, part))
+    write_bytes(RESULTS / "benchmarks.png", draw(results))
     print(write_text(RESULTS / "benchmarks.md", report(results)).read_text())
     if set(chosen.only) == set(MODULES):  # AUTO is a peer too, in files of its own
         beside_auto(head, chosen.quick)

@@ -16,7 +16,7 @@ from auto.picture import SHOWN, draw
 from auto.program import Mesh, constants, linked, run, version
 from auto.section import report
 from auto.verdicts import row
-from saltus.files import write_atomically, write_text
+from saltus.files import write_bytes, write_text
 
 RESULTS = Path(__file__).resolve().parent.parent / "results"
 MESHES = (Mesh(20), Mesh(100), Mesh(400), Mesh(200, 7))
@@ -31,7 +31,7 @@ def beside_auto(about: dict[str, Any], quick: bool = False, folder: Path = RESUL
     start = time.perf_counter()
     try:
         results = {"about": about} | measured(quick)
-        write_atomically(folder / "auto.png", lambda part: draw(results, part))
+        write_bytes(folder / "auto.png", draw(results))
     except AbsentError as reason:
         results = {"about": about, "absent": str(reason)}
     write_text(folder / "auto.json", json.dumps(results, indent=1) + "\n")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import io
 from typing import Any
 
 from auto.case import KNOWN
@@ -15,8 +15,8 @@ NEAR_FOLDS = ((0.84, 0.912), (1.9, 2.8))
 NEAR_GRAZING = ((0.2842, 0.2854), (1.025, 1.065))
 
 
-def draw(results: dict[str, Any], path: Path) -> None:
-    """Three panels, written to `path`: the finest mesh of each B in the first two."""
+def draw(results: dict[str, Any]) -> bytes:
+    """Three panels, as a PNG file: the finest mesh of each B in the first two."""
     with style():
         figure = new_figure(width=DOUBLE_COLUMN, height=80.0)
         folds, grazing, errors = figure.subplots(1, 3)
@@ -28,7 +28,9 @@ def draw(results: dict[str, Any], path: Path) -> None:
             panel_label(ax, label)
         handles, labels = folds.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=5)
-        figure.savefig(path)
+        picture = io.BytesIO()
+        figure.savefig(picture, format="png")
+    return picture.getvalue()
 
 
 def _branches(ax: Any, results: dict[str, Any], window: tuple[tuple[float, float], tuple[float, float]]) -> None:

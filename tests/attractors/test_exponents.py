@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import xarray as xr
-from shared_systems import forced, walled
+from shared_systems import forced, paired, walled
 from verdict_cases import spread
 
 import saltus
@@ -307,6 +307,5 @@ def test_they_refuse_what_has_no_meaning(follow, changes, match):
 
 
 def test_lanes_refuse_two_coordinates():
-    system = saltus.System(model=saltus.TwoLayer(beta0=1.4), load=saltus.Load(vertical=-0.5))
     with pytest.raises(ParameterError, match="one coordinate"):
-        lyapunov_many(system, theta_1=0.1, theta_2=-0.1, velocity=(0.0, 0.0))
+        lyapunov_many(paired(), x=0.1, y=-0.1, velocity=(0.0, 0.0))
