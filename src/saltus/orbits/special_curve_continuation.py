@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_bounds, check_kind, check_path, check_step
+from saltus.checks import check_bounds, check_count, check_kind, check_path, check_step
 from saltus.continuation import STEPS, Continuation, Cut, End, TestFunction, both_ways
 from saltus.errors import ParameterError
 from saltus.orbits.branch_continuation import STEP
@@ -69,6 +69,7 @@ def continue_special(
     *,
     first_bounds: tuple[float, float] | None = None,
     step: float = STEP,
+    most_points: int = STEPS.most_points,
     progress: Progress = silent,
 ) -> SpecialCurve:
     """The curve of LP, PD, BPC or GR through a special point of a branch, in the branch's parameter and a second one.
@@ -82,6 +83,7 @@ def continue_special(
         bounds: its least and largest value; by default from a tenth to ten times what it is (from -1 to 1 for 0).
         first_bounds: those of the branch's own parameter; by default as far to both sides as its branch was wide, or to a tenth.
         step: the longest step, in the norm of `OrbitCurve`.
+        most_points: of each direction, after which the curve is given up, with that reason.
         progress: called with the share of the first range that has been seen and the values of both parameters.
 
     Raises:
@@ -90,6 +92,7 @@ def continue_special(
     """
     check_kind("special", special, SpecialPoint, source="branch.special")
     check_step(step)
+    check_count("most_points", most_points, 1)
     if special.kind not in FOLLOWED:
         raise ParameterError(f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}")
     if isinstance(special.orbit, RestingOrbit):
@@ -108,7 +111,8 @@ def continue_special(
     limits = _limits(special, system.parameters[path], bounds, first_bounds)
     start = _start(special, (first_path, path), limits)
     bounds_of = {first_path: limits[0], path: limits[1]}
-    course = both_ways(start, lambda: CurveEvents(special.kind), bounds_of, replace(STEPS, longest=step), progress)
+    steps = replace(STEPS, longest=step, most_points=most_points)
+    course = both_ways(start, lambda: CurveEvents(special.kind), bounds_of, steps, progress)
     return SpecialCurve(**vars(course), kind=special.kind, paths=(first_path, path))
 
 

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 ENDS, CURVES = "saltus.studies.chart.border_work:ends", "saltus.studies.chart.border_work:curves"
 CHUNK = 1000  # changes of a chunk: with fewer the lanes have too little to do, and more take longer than one would lose
 CURVE_BYTES = 1 << 17  # of a curve as text: 1000 points
+MOST_POINTS = 400  # of a curve in each direction: one that needs more winds up in ever smaller steps
 
 
 @dataclass(frozen=True)
@@ -178,7 +179,13 @@ def curve_from(system: System, paths: Sequence[str], start: Mapping[str, Any], b
     if special is None:
         return None
     try:
-        curve = continue_special(special, paths[1 - along], bounds=tuple(bounds[1 - along]), first_bounds=tuple(bounds[along]))
+        curve = continue_special(
+            special,
+            paths[1 - along],
+            bounds=tuple(bounds[1 - along]),
+            first_bounds=tuple(bounds[along]),
+            most_points=MOST_POINTS,
+        )
         return curve_dataset(curve, paths)
     except (MotionError, ParameterError):
         return None
