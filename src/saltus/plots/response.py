@@ -267,12 +267,10 @@ def response_legend(figure: Any, spectra: list[Any], *, limits: bool = True, cri
 
 
 def missed_states(spectra: list[Any]) -> str | None:
-    """In words, the share of random states that end on a motion which is not drawn: the 95 % interval for each panel."""
-    known = [spectrum.attrs for spectrum in spectra if "missed_low" in spectrum.attrs]
-    if not known:
+    """What the share means that `note_missed` writes above the panels; None where no sample was taken."""
+    if not any("missed_low" in spectrum.attrs for spectrum in spectra):
         return None
-    shares = ", ".join(f"{100 * attrs['missed_low']:.1f} to {100 * attrs['missed_high']:.1f} %" for attrs in known)
-    return f"random states that end on a motion that is not drawn: {shares} (95 % interval)"
+    return "missed: random states that end on a motion that is not drawn, and the 95 % interval of their share"
 
 
 def line_labels(spectra: list[Any]) -> list[tuple[str, list[dict[str, Any]]]]:

@@ -39,6 +39,8 @@ class ResponseCriteria:
     beside: float = 1e-9  # Branches are read at this relative distance on both sides of a value at which one may begin.
     on_branch: float = 2e-2  # A simulated attractor lies this near, in rad, to the line drawn between the points of its branch.
     equal: float = 1e-10  # Amplitudes that differ by less, in rad, are equal.
+    # Folds that are nearer to one another show in no picture: at Hhat = 0.2 the resonance's peak has two, 5e-7 apart.
+    invisible: float = 1e-4
     resonance: float = 0.9  # The primary resonance of Fig. 9 is at about this frequency.
     samples: int = 600  # The number of values, an even one, at which the stable motions of a range are counted.
     apart: float = 0.1  # Motions or amplitudes that differ by more, in rad, plainly differ.
@@ -100,8 +102,20 @@ def _knots_appear(panels: Panels) -> Measured:
 def _primary_resonance(spectrum: Any) -> dict[str, int]:
     branch = main_branch(spectrum)
     start = 2 / 3 * float(branch["parameter"][int(np.argmax(branch["amplitude"].values))])
-    unstable = branch["stable"].values[branch["parameter"].values > start] == 0
-    return {"knots": int((spectrum["knots"]["parameter"].values > start).sum()), "unstable": int(unstable.sum())}
+    place = branch["parameter"].values
+    beyond = place > start
+    unstable = int(((branch["stable"].values == 0) & beyond & ~_invisible(branch)).sum())
+    return {"knots": int((spectrum["knots"]["parameter"].values > start).sum()), "unstable": unstable}
+
+
+def _invisible(branch: Any) -> np.ndarray:
+    """Which points lie on an unstable part that no picture shows: its ends are less than `CRITERIA.invisible` apart, (point,)."""
+    place, unstable = branch["parameter"].values, branch["stable"].values == 0
+    runs = np.split(np.arange(len(place)), np.flatnonzero(np.diff(unstable)) + 1)
+    narrow = [run for run in runs if np.ptp(place[max(run[0] - 1, 0) : run[-1] + 2]) < CRITERIA.invisible]
+    chosen = np.zeros(len(place), dtype=bool)
+    chosen[[i for run in narrow for i in run]] = True
+    return chosen & unstable
 
 
 def _knots_differ(panels: Panels) -> Measured:

@@ -20,7 +20,7 @@ class BorderStartSettings:
     reach: float = 1.5  # Ends no farther than this from one another, in cells, may lie on one border.
     fewest: int = 3  # The least number of ends on a border that is followed.
     beside_rest: int = 10  # An end counts this many times beside rest alone: that is what a designer asks for.
-    tries: int = 3  # The most ends of a border from which its curve is begun.
+    tries: int = 8  # The most ends of a border from which its curve is begun.
     beyond: float = 0.5  # Orbits are followed this far beyond the end of their motion, in cells.
 
 
