@@ -7,9 +7,20 @@ import pytest
 from contact_reference import follow
 
 import saltus
-from saltus.errors import ParameterError
+from saltus.errors import MotionError, ParameterError
 from saltus.flow import EventKind
-from saltus.systems import Contact, Harmonic, Load, Metainterface, Model, NewtonImpact, System, TwoLayer, VelocityReduction
+from saltus.systems import (
+    Contact,
+    Harmonic,
+    Load,
+    Metainterface,
+    Model,
+    NewtonImpact,
+    System,
+    TwoLayer,
+    VelocityReduction,
+    energy_gain,
+)
 
 BETA80 = math.radians(80)
 
@@ -206,6 +217,40 @@ def test_what_has_no_meaning_is_refused_by_name(ask, words):
     assert words in str(refused.value)
 
 
+def test_a_transfer_gains_energy_where_the_condition_of_two_layers_says_so():
+    """M_ss e_s^2 + 2 cos(2 beta0) e_s g + M_jj g^2 > M_ss; and an impact then leaves the energy that it says."""
+    rng, gaining = np.random.default_rng(6), 0
+    for _ in range(50):
+        m, beta0, g, e = 10 ** rng.uniform(-2, 1), rng.uniform(0.3, 2.8), rng.uniform(), rng.uniform(0, 1, 2)
+        law, mass = NewtonImpact(e=tuple(e), transfer=g), (1 + m, 1.0)
+        found = energy_gain(TwoLayer(beta0=beta0, mass_ratio=m), law)
+        for s, name in enumerate(("lower", "upper")):
+            j = 1 - s
+            left = mass[s] * e[s] ** 2 + 2 * math.cos(2 * beta0) * e[s] * g + mass[j] * g**2
+            assert found[name] == pytest.approx(left / mass[s] - 1.0, abs=1e-12)
+            gaining += left > mass[s]
+    assert 5 < gaining < 95
+
+
+def test_an_impact_from_the_upper_layer_gains_the_energy_that_was_announced():
+    system = layers(transfer=1.0, mass_ratio=0.7)
+    motion = moved(system, (0.0, 0.15), (0.0, 0.0), 8.0)
+    impact = motion.events.of(EventKind.IMPACT)[0]
+    assert impact.contact == "upper"
+    mass = system.model.mass_matrix((0.0, 0.0))
+    before, after = np.array(impact.velocity_before), np.array(impact.velocity_after)
+    gained = (after @ mass @ after) / (before @ mass @ before) - 1.0
+    assert gained == pytest.approx(energy_gain(system.model, system.impact)["upper"], abs=1e-12)
+    assert gained == pytest.approx(0.7, abs=1e-12)
+
+
+def test_each_factor_of_a_law_has_a_path_and_survives_a_file():
+    system = layers(e=(0.2, 0.1), transfer=0.3)
+    assert system.parameters["impact.e.1"] == 0.1
+    assert system.with_({"impact.e.1": 0.4}).impact == NewtonImpact(e=(0.2, 0.4), transfer=0.3)
+    assert System.from_json(system.to_json()) == System.from_toml(system.to_toml()) == system
+
+
 class BetweenWalls(Model):
     """x'' = A cos(W tau), between walls at -d and d: two contacts of one coordinate."""
 
@@ -249,3 +294,16 @@ def test_between_two_walls_the_symmetric_orbit_is_its_closed_form():
             assert abs(event.velocity_after[0]) == pytest.approx(v, abs=1e-10)
         found += 1
     assert found
+
+
+class Indefinite(BetweenWalls):
+    """A mass of -1, which no mechanism has."""
+
+    def mass_matrix(self, x):
+        return -1.0
+
+
+def test_a_mass_that_no_mechanism_has_ends_in_a_sentence():
+    system = System(model=Indefinite(), load=Load(frequency=1.0, force=Harmonic(amplitude=0.8)))
+    with pytest.raises(MotionError, match=r"the impact law has no solution at time .* the mass matrix is not positive definite"):
+        saltus.simulate(system, x=0.0, velocity=0.5, duration=20.0)

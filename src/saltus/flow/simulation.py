@@ -123,6 +123,9 @@ def _advance(system: System, run: Program, now: KernelState, recorder: Recorder,
 def _refuse(system: System, status: int, now: KernelState) -> None:
     """Turn a status that is not an end into a sentence."""
     at, velocity = f"at time {now.time:.9g}", now.velocity[0]
+    if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and system.model.contacts:
+        what = "no choice of closed contacts is consistent" if status == Status.NOT_UNIQUE else "the impact law has no solution"
+        raise MotionError(f"{what} {at}: the mass matrix is not positive definite there, or all but singular")
     if status == Status.NOT_UNIQUE:
         raise MotionError(
             f"the motion from rest at contact {at} is not unique: the accelerations of both sides point away from it; "

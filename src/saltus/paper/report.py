@@ -14,21 +14,13 @@ from importlib.resources import files
 from pathlib import Path
 
 import saltus
-from saltus.files import read_dataset, write_text
+from saltus.files import write_text
 from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import Claim, ClaimVerdict, with_summaries
 from saltus.paper.claims.claim_tables import Origin, section_titles
 from saltus.paper.claims.ledger import LISTING_TITLES, ledger_table, listed, tally, to_markdown
 from saltus.paper.errata import errata
 from saltus.paper.figures.figure import PaperFigure
-
-
-def compute_claims(figure: PaperFigure, folder: Path) -> list[Claim]:
-    """The claims of a figure from the data that it left in `folder`."""
-    import xarray
-
-    data = read_dataset(folder / f"{figure.name}.nc")
-    return figure.claims(xarray.DataTree(data) if isinstance(data, xarray.Dataset) else data)
 
 
 def write(figures: Iterable[PaperFigure], folder: Path, known: Mapping[str, Iterable[Claim]]) -> list[Claim]:

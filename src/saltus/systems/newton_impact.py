@@ -51,7 +51,7 @@ def energy_gain(model: Model, impact: ImpactLaw) -> dict[str, float]:
 
     With all other contacts closed, at rest and the impact the only one: the velocities after it are v+ = -E v- where an impulse
     acts, and (v+' M v+) / (v-' M v-) - 1 is the share, on fixed ground and in the position where all contacts are closed. For two
-    layers it is negative iff M_ss e_s^2 - 2 M_sj e_s g + M_jj g^2 <= M_ss in the gaps' coordinates.
+    layers it is positive where M_ss e_s^2 + 2 cos(2 beta0) e_s g + M_jj g^2 > M_ss, s the layer that is hit.
     """
     contacts, names = model.contacts, model.coordinates
     position = {contact.coordinate: float(contact.position) for contact in contacts}

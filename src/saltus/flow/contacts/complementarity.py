@@ -88,7 +88,7 @@ def complementary(matrix, right, size, block, tried, z):
         worst = 0.0
         for i in range(size):
             if bits >> i & 1:
-                worst = max(worst, -tried[i] * matrix[i, i])
+                worst = max(worst, -tried[i] * abs(matrix[i, i]))
             else:
                 left = right[i]
                 for j in range(size):

@@ -135,7 +135,7 @@ def push(where, state, model, contacts, solver):
 
 
 @lean_jit
-def record_contact_event(where, state, contacts, solver, events, kind, which, t):
+def record_contact_event(where, state, contacts, events, kind, which, t):
     """Append an event: (period, kind, bits of contacts, 0) and (local time, velocities before and after, impulses).
 
     The velocities before are those of the state at this call; `fill_after` completes the event.
@@ -163,7 +163,7 @@ def fill_after(where, state, contacts, solver, events):
 
 
 @lean_jit
-def settle_contact(where, state, env, model, contacts, solver, i, rate):
+def settle_contact(where, state, model, contacts, solver, i, rate):
     """Put a contact that was closed by an impact, or held, at its position with the rate after it."""
     own, count, coordinate = where[Where.OWN], contacts.shape[0], contacts[i, ContactColumn.COORDINATE]
     state[State.COORDINATES + coordinate] = contact_position(solver, own, count, i)
@@ -179,7 +179,7 @@ def contact_impact(where, state, env, model, contacts, solver, events, t, hit):
     regular, chosen = couple(where, state, env, model, contacts, solver), hit
     for i in range(count):
         chosen |= contacts[i, ContactColumn.CLOSED] << i
-    record_contact_event(where, state, contacts, solver, events, EventCode.IMPACT, hit, t)
+    record_contact_event(where, state, contacts, events, EventCode.IMPACT, hit, t)
     for i in range(count):  # a contact that is reached without a speed, to within the working precision
         if hit >> i & 1:
             solver[Solver.RATES][i] = min(solver[Solver.RATES][i], 0.0)
@@ -189,7 +189,7 @@ def contact_impact(where, state, env, model, contacts, solver, events, t, hit):
     push(where, state, model, contacts, solver)
     for i in range(count):
         if chosen >> i & 1:
-            settle_contact(where, state, env, model, contacts, solver, i, solver[Solver.RATES][i])
+            settle_contact(where, state, model, contacts, solver, i, solver[Solver.RATES][i])
     fill_after(where, state, contacts, solver, events)
     return Status.PAUSED
 
@@ -311,7 +311,7 @@ def smaller_set(solver, contacts, near):
 
 
 @lean_jit
-def bring_to_rest(where, state, env, model, contacts, solver, near):
+def bring_to_rest(where, state, model, contacts, solver, near):
     """Take the speeds of the contacts in `near`, by impulses on these alone, and close them."""
     count, row = contacts.shape[0], 0
     size = reduce_to(solver, near, count)
@@ -329,7 +329,7 @@ def bring_to_rest(where, state, env, model, contacts, solver, near):
     push(where, state, model, contacts, solver)
     for i in range(count):
         if near >> i & 1:
-            settle_contact(where, state, env, model, contacts, solver, i, 0.0)
+            settle_contact(where, state, model, contacts, solver, i, 0.0)
 
 
 @lean_jit

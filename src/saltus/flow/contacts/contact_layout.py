@@ -12,7 +12,6 @@ class ContactColumn(IntEnum):
     CLOSED = 1  # whether it does: its gap and the gap's rate are then exactly 0
     SKIP = 2  # of its guard, how many of the first Taylor coefficients are known to be 0 at the start of a step
     RELEASED = 3  # 1 where its reaction has just reached 0 from above, so that it is known to be 0
-    HELD = 4  # whether it was closed before the last decision
 
 
 class ContactPart(IntEnum):

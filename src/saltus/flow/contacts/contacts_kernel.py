@@ -150,19 +150,16 @@ def end_accumulation_of(where, state, settings, env, model, contacts, work, solv
         moving |= (1 << i) if near >> i & 1 and solver[Solver.RATES][i] != 0.0 else 0
     if left < 0.0:
         return t
-    record_contact_event(where, state, contacts, solver, events, EventCode.HELD, moving, t + left)
-    bring_to_rest(where, state, env, model, contacts, solver, near)
+    record_contact_event(where, state, contacts, events, EventCode.HELD, moving, t + left)
+    bring_to_rest(where, state, model, contacts, solver, near)
     fill_after(where, state, contacts, solver, events)
-    for i in range(count):
-        if near >> i & 1:
-            contacts[i, ContactColumn.HELD] = 1
     return t + left
 
 
 @lean_jit
 def decide_contacts(where, state, settings, env, model, contacts, work, solver, events, origin):
     """Find out which contacts are closed from here on. Returns PAUSED to go on, or NOT_UNIQUE."""
-    t, count, candidates, opened = state[State.TIME], contacts.shape[0], 0, 0
+    t, count = state[State.TIME], contacts.shape[0]
     rested = where[Where.HELD] == 1
     settled = end_accumulation_of(where, state, settings, env, model, contacts, work, solver, events, t, origin)
     candidates = closed_bits(contacts)
@@ -172,7 +169,7 @@ def decide_contacts(where, state, settings, env, model, contacts, work, solver, 
     hold_coordinates(where, env, contacts)
     opened = candidates & ~closed_bits(contacts)
     if opened and where[Where.LEAVE_BY] == 0:
-        record_contact_event(where, state, contacts, solver, events, EventCode.RELEASE, opened, t)
+        record_contact_event(where, state, contacts, events, EventCode.RELEASE, opened, t)
     where[Where.LEAVE_BY] = 0
     where[Where.HELD] = 1
     for i in range(env[0].size - where[Where.OWN], env[0].size):
@@ -180,9 +177,8 @@ def decide_contacts(where, state, settings, env, model, contacts, work, solver, 
             where[Where.HELD] = 0
     for i in range(count):
         contacts[i, ContactColumn.RELEASED] = 0
-        contacts[i, ContactColumn.HELD] = contacts[i, ContactColumn.CLOSED]
     if where[Where.HELD] == 1 and not rested:
-        record_contact_event(where, state, contacts, solver, events, EventCode.RESTING, closed_bits(contacts), settled)
+        record_contact_event(where, state, contacts, events, EventCode.RESTING, closed_bits(contacts), settled)
     where[Where.MODE] = Mode.REST if where[Where.HELD] == 1 else Mode.ARC
     where[Where.SIDE] = 1 + closed_bits(contacts)
     return Status.PAUSED
@@ -274,7 +270,7 @@ def contact_arc(where, state, settings, env, model, contacts, work, solver, step
     if hit >= 0:
         where[Where.MODE], contacts[hit, ContactColumn.RELEASED] = Mode.CONTACT, 1 if first > 0.0 else 0
     if limit >= 0:
-        record_contact_event(where, state, contacts, solver, events, EventCode.LIMIT, 0, state[State.TIME])
+        record_contact_event(where, state, contacts, events, EventCode.LIMIT, 0, state[State.TIME])
         events[0][where[Where.EVENTS] - 1, 3] = limit - count
         return Status.LIMITED
     unit = min(settings[Setting.LENGTH], 1.0) if settings[Setting.LENGTH] > 0.0 else 1.0
