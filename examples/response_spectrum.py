@@ -15,15 +15,14 @@ system = saltus.System(
     load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(amplitude=1.0), vertical=-0.5),
 )
 spectrum = response_spectrum(system, bounds=(2.0, 2.6), max_period=3, values=[2.2, 2.4], starts=16)
-for name in sorted(spectrum.children):
-    if name.startswith("branch"):
-        branch = spectrum[name].to_dataset()
-        low, high = float(branch.parameter.min()), float(branch.parameter.max())
-        print(f"{name}: period {int(branch.period[0])}, Omega {low:.4f} to {high:.4f}, ends {branch.attrs['ends']}")
-        for kind, place in zip(branch.kind.values, branch.special_parameter.values, strict=True):
-            print(f"  {kind:16} {place:.9f}")
-        stable, worst = int(branch.stable.sum()), float(branch.kept.max())
-        print(f"  {stable} of {branch.sizes['point']} orbits are stable, and after 20 periods off by at most {worst:.0e}")
+for number in range(spectrum["branches"].sizes["branch"]):
+    branch = saltus.branch_of(spectrum, number)
+    low, high = float(branch.parameter.min()), float(branch.parameter.max())
+    print(f"branch {number}: period {int(branch.period[0])}, Omega {low:.4f} to {high:.4f}, ends {branch.attrs['ends']}")
+    for kind, place in zip(branch.kind.values, branch.special_parameter.values, strict=True):
+        print(f"  {kind:16} {place:.9f}")
+    stable, worst = int(branch.stable.sum()), float(branch.kept.max())
+    print(f"  {stable} of {branch.sizes['point']} orbits are stable, and after 20 periods off by at most {worst:.0e}")
 dots = spectrum["attractors"]
 print(
     f"simulation settled at Omega = {dots.parameter.values} on periods {dots.period.values}, amplitudes {dots.amplitude.values}"
@@ -33,7 +32,7 @@ with tempfile.TemporaryDirectory() as folder:  # a file keeps the orbits themsel
     path = Path(folder) / "spectrum.nc"
     spectrum.to_netcdf(path, engine="h5netcdf")
     with xr.open_datatree(path, engine="h5netcdf") as file:
-        loop = file["branch_001"].to_dataset().load()
+        loop = saltus.branch_of(file.load(), 1)
 orbits = orbits_of(loop)
 print(f"reloaded: {orbits[0]}")
 

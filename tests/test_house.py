@@ -27,6 +27,7 @@ SHARED = {
     "provenance",
     "public_functions",
     "branch_lines",
+    "branch_tables",
     "_front_door",
 }  # what every room may import
 # The rooms whose front doors a room may use besides its own; `plots` knows datasets only, `continuation` functions and arrays.

@@ -14,6 +14,7 @@ from .attractors import (
     zero_one_test,
 )
 from .bounds import capture_speed
+from .branch_tables import branch_of
 from .config import load_study
 from .errors import MotionError, ParameterError, SaltusError, SweepError, TraceError
 from .flow import EventKind, Motion, Sensitivities, Stop, sensitivities, simulate, simulate_many
@@ -86,6 +87,7 @@ __all__ = [
     "attractors_along",
     "basins_of_attraction",
     "bifurcation_diagram",
+    "branch_of",
     "capture_speed",
     "chaotic_bands",
     "classify",

@@ -1,8 +1,7 @@
 """Branches of a diagram's DataTree as lines over the parameter, and borders of a chart's: what pictures draw and measures read.
 
-A diagram has children `branch_000`, `branch_001`, ... (see `saltus.orbits`), each with `parameter`, `stable`, `impact_count` and
-quantities such as `amplitude` over its points, the model's margins as `margin_...`, and the `kind` of its special points with
-their places.
+A branch (see `branch_tables.py`) has `parameter`, `stable`, `impact_count` and quantities such as `amplitude` over its points,
+the model's margins as `margin_...`, and the `kind` of its special points with their places.
 """
 
 from __future__ import annotations
@@ -33,13 +32,6 @@ class BranchLine(NamedTuple):
     validity: ModelValidity
     points: range  # of the branch
     places: np.ndarray  # (n, 2), parameter and quantity: those points, and the special points at which the part ends
-
-
-def branches_of(diagram: Any) -> Iterator[tuple[str, Any]]:
-    """(name, Dataset) of every branch, in order."""
-    for name in sorted(diagram.children):
-        if name.startswith("branch_"):
-            yield name, diagram[name].to_dataset()
 
 
 def border_curves(tree: Any) -> list[Any]:
@@ -122,8 +114,6 @@ def _place_of_change(branch: Any, quantity: str, cut: int, kinds: tuple[str, ...
     a, b = (np.array([float(branch[name][k]) for name in names]) for k in (cut - 1, cut))
     size = np.array([np.ptp(branch[name].values) or 1.0 for name in names])
     middle = (a + b) / 2
-    if "kind" not in branch:
-        return middle
     known = np.isin(branch["kind"].values, kinds)
     places = np.stack([branch[f"special_{name}"].values[known] for name in names], axis=1)
     if not len(places):

@@ -119,8 +119,7 @@ def lock(file: IO[bytes], shared: bool = False) -> bool | None:
 def read_dataset(path: Path | str) -> Any:
     """The Dataset or DataTree in a netCDF file, in memory; its checksum is compared before HDF5 sees it.
 
-    A file without a checksum, which another program wrote, is read as it is. The time to open one grows with the square of the
-    number of groups, in h5netcdf's search for the names of dimensions: more than a minute for the 226 groups of Fig. 9.
+    A file without a checksum, which another program wrote, is read as it is.
 
     Raises:
         ParameterError: there is no such file, it is damaged, or it is no netCDF file.

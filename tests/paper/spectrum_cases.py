@@ -3,6 +3,8 @@
 import numpy as np
 import xarray as xr
 
+from saltus.branch_tables import branch_tables
+
 KINDS = {"straight": "landmark", "reaction": "assumption", "reach": "limit"}  # of the margins of these diagrams
 
 
@@ -24,20 +26,17 @@ def branch(
     }
     for name, values in (margins or {}).items():
         data[f"margin_{name}"] = ("point", np.asarray(values, float), {"margin_kind": KINDS[name]})
-    if special:
-        kinds, places, sizes = zip(*special, strict=True)
-        data["kind"] = ("special", np.array(kinds))
-        data["special_parameter"] = ("special", np.array(places, float))
-        data["special_amplitude"] = ("special", np.array(sizes, float))
-        data["special_highest"] = ("special", np.array(sizes, float))
-        data["special_lowest"] = ("special", -0.5 * np.array(sizes, float))
+    places, sizes = (np.array([row[i] for row in special], float) for i in (1, 2))
+    columns = {"parameter": places, "amplitude": sizes, "highest": sizes, "lowest": -0.5 * sizes}
+    data["kind"] = ("special", np.array([row[0] for row in special], str))
+    data |= {f"special_{name}": ("special", values) for name, values in columns.items()}
     return xr.Dataset(data, attrs={"origin": origin, "end_reasons": list(ends), "end_kinds": ["", ""]})
 
 
 def diagram(*branches, dots=(), bounds=(0.0, 3.0)):
     """A DataTree of branches and of dots (parameter, amplitude)."""
     places = np.array(dots, float).reshape(-1, 2)
-    parts = {f"branch_{i:03d}": data for i, data in enumerate(branches)}
+    parts = branch_tables(branches)
     columns = {"parameter": places[:, 0], "amplitude": places[:, 1], "highest": places[:, 1], "lowest": -0.5 * places[:, 1]}
     columns["placed"] = np.ones(len(places), dtype=int)
     parts["attractors"] = xr.Dataset({name: ("dot", values) for name, values in columns.items()})

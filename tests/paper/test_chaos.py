@@ -12,9 +12,9 @@ from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.measures import chaos_measures
 
 
-def panel(*spans, wandering=(), bounds=(0.0, 3.0), stable=True):
+def panel(*spans, wandering=(), bounds=(0.0, 3.0), stable=True, others=()):
     """A diagram with one branch over its whole range, bands at `spans`, and chaos or transients at the values `wandering`."""
-    tree = diagram(branch(bounds, [0.5, 0.6], [stable, stable]), bounds=bounds)
+    tree = diagram(branch(bounds, [0.5, 0.6], [stable, stable]), *others, bounds=bounds)
     low, high = (np.array([span[i] for span in spans], float) for i in (0, 1))
     marks = np.full(len(spans), "cascade", dtype="U16")
     columns = {"low": low, "high": high, "exponent": np.full(len(spans), 0.1), "low_edge": marks, "high_edge": marks}
@@ -125,8 +125,7 @@ def test_erratum_37_two_regions_of_chaos_are_two_and_parted_by_stable_motions(sp
 
 
 def test_motions_between_two_regions_of_chaos_must_be_large():
-    small = panel((1.0, 1.2), (2.0, 2.2))
-    small["branch_001"] = xr.DataTree(branch([2.5, 3.0], [2.0, 2.0], [1, 1]))
+    small = panel((1.0, 1.2), (2.0, 2.2), others=[branch([2.5, 3.0], [2.0, 2.0], [1, 1])])
     assert verdicts(chaos_measures.force_diagrams({1.0: small}))["fig11-two-regions"] is ClaimVerdict.DISAGREES
 
 

@@ -9,6 +9,7 @@ import xarray as xr
 from claim_verdicts import verdicts
 from scipy.integrate import solve_ivp
 
+from saltus.branch_tables import branch_tables
 from saltus.orbits import continue_orbit, find_orbit
 from saltus.paper import FIGURES, ClaimVerdict
 from saltus.paper.figures.harmonic_loads import AMPLITUDE, under_force
@@ -59,7 +60,7 @@ def panels():
     for frequency in (0.5, 1.0):
         system = under_force(frequency=frequency, amplitude=1.0)
         branch = continue_orbit(find_orbit(system, theta=0.3), AMPLITUDE, (1e-3, 1.6))
-        parts = {"branch_000": branch.to_xarray(), "undeformed": undeformed(system, CRITICAL)}
+        parts = {**branch_tables([branch.to_xarray()]), "undeformed": undeformed(system, CRITICAL)}
         found[frequency] = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"critical": CRITICAL}), **parts})
     return found
 

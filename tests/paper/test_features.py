@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from spectrum_cases import branch, diagram, folded, loop
 
+from saltus.branch_tables import branch_of
 from saltus.paper.measures import spectrum_features as features
 
 
 def test_the_main_branch_is_the_longest_one_of_period_one():
     long = branch([0, 30], [1, 1], [1, 1], periods=3)
     data = diagram(long, folded(), branch([1, 2], [1, 1], [1, 1]))
-    assert features.main_branch(data).equals(data["branch_001"].to_dataset())
+    assert features.main_branch(data).equals(branch_of(data, 1))
 
 
 @pytest.mark.parametrize(

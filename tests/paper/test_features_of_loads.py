@@ -10,6 +10,7 @@ from spectrum_cases import branch, diagram, folded, loop
 from test_errata import crossings
 
 import saltus
+from saltus.branch_tables import branch_tables
 from saltus.paper import ClaimVerdict
 from saltus.paper.figures import fig13
 from saltus.paper.figures.harmonic_loads import AMPLITUDE, under_both, under_force
@@ -64,7 +65,7 @@ def first_cycle():
         "system": system.to_json(),
         "critical": 0.5 / math.tan(math.radians(80)),
     }
-    tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs=attributes), "branch_000": found.to_xarray()})
+    tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs=attributes), **branch_tables([found.to_xarray()])})
     return tree.assign(birth=xr.DataTree(birth(tree)))
 
 

@@ -9,6 +9,7 @@ from claim_verdicts import claims_of
 from spectrum_cases import branch, diagram
 
 import saltus
+from saltus.branch_tables import branch_tables
 from saltus.paper import ClaimVerdict
 from saltus.paper.figures.closed_layer import closed_layer
 from saltus.paper.figures.harmonic_loads import AMPLITUDE, under_force
@@ -55,7 +56,7 @@ def test_that_the_closed_layer_stays_closed_fails_by_two_kinds_of_evidence(tree,
 def test_both_layers_equations_along_simulated_motions_give_the_margin_of_the_branch():
     orbit = saltus.find_orbit(under_force(amplitude=0.5), theta=0.3)
     found = saltus.continue_orbit(orbit, AMPLITUDE, (0.1, 1.2))
-    tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"bounds": [0.1, 1.2]}), "branch_000": found.to_xarray()})
+    tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"bounds": [0.1, 1.2]}), **branch_tables([found.to_xarray()])})
     layer = closed_layer(tree)
     assert layer["simulated"].values == pytest.approx(layer["stored"].values, abs=1e-6)
     assert layer["simulated"].values.min() < -0.5 < 0.0 < layer["simulated"].values.max()

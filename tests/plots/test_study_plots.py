@@ -7,6 +7,7 @@ import pytest
 import xarray
 from matplotlib.colors import same_color
 
+from saltus.branch_tables import branch_tables
 from saltus.plots.attractors import draw_attractors
 from saltus.plots.conventions import LIMIT, STABLE, UNSTABLE
 from saltus.plots.diagram import draw_diagram
@@ -95,15 +96,17 @@ def test_arrows_point_along_the_motion():
 # --- diagrams ----------------------------------------------------------------------------------------------------------------
 
 
-def diagram(amplitudes=(0.5, 1.0), limits=(1.74, 3.48)):
-    """A tree as small as they come: one branch without special points."""
+def diagram(amplitudes=(0.5, 1.0), limits=(1.74, 3.48), parameters=(0.5, 1.0)):
+    """A tree as small as they come: one branch without special points, or none."""
     n = len(amplitudes)
     branch = xarray.Dataset(
         {
-            "parameter": ("point", np.linspace(0.5, 1.0, n)),
+            "parameter": ("point", np.array(parameters[:n])),
             "amplitude": ("point", np.array(amplitudes)),
             "stable": ("point", np.ones(n, dtype=bool)),
             "impact_count": ("point", np.full(n, 2)),
+            **{f"special_{name}": ("special", np.empty(0)) for name in ("parameter", "amplitude")},
+            "kind": ("special", np.empty(0, dtype=str)),
         }
     )
     empty = np.empty(0)
@@ -118,7 +121,13 @@ def diagram(amplitudes=(0.5, 1.0), limits=(1.74, 3.48)):
         "limits": list(limits),
     }
     return xarray.DataTree.from_dict(
-        {"/": xarray.Dataset(attrs=attrs), "branch_000": branch, "attractors": dots, "bands": bands, "stroboscopic": strobes}
+        {
+            "/": xarray.Dataset(attrs=attrs),
+            **branch_tables([branch] if n else []),
+            "attractors": dots,
+            "bands": bands,
+            "stroboscopic": strobes,
+        }
     )
 
 
@@ -134,8 +143,7 @@ def test_no_limit_is_drawn_where_there_is_none_or_it_varies():
 
 
 def test_a_diagram_of_nothing_but_rest_is_drawn():
-    tree = diagram()
-    del tree["branch_000"]
+    tree = diagram(())
     tree["stroboscopic"]["peak"][:] = 0.0
     figure = draw_diagram(tree)
     low, high = figure.axes[0].get_ylim()
@@ -144,9 +152,7 @@ def test_a_diagram_of_nothing_but_rest_is_drawn():
 
 
 def test_branches_beyond_the_bounds_do_not_set_the_scale():
-    tree = diagram()
-    far = tree["branch_000"].to_dataset().assign(parameter=("point", [2.0, 3.0]), amplitude=("point", [40.0, 50.0]))
-    tree["branch_001"] = xarray.DataTree(far)
+    tree = diagram((0.5, 1.0, 40.0, 50.0), parameters=(0.5, 1.0, 2.0, 3.0))
     assert draw_diagram(tree).axes[0].get_ylim()[1] == pytest.approx(1.08)
 
 

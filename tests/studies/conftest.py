@@ -3,6 +3,8 @@
 import pytest
 from study_cases import detached
 
+from saltus.branch_tables import branches_of
+
 
 @pytest.fixture(scope="session")
 def spectrum():
@@ -13,4 +15,4 @@ def spectrum():
 @pytest.fixture(scope="session")
 def branches(spectrum):
     """The datasets of its branches."""
-    return [spectrum[name].to_dataset() for name in sorted(spectrum.children) if name.startswith("branch_")]
+    return [branch for _, branch in branches_of(spectrum)]

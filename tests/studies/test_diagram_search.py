@@ -7,6 +7,7 @@ import pytest
 from shared_systems import forced
 from study_cases import FREQUENCY
 
+from saltus.branch_tables import branches_of
 from saltus.checks import check_window
 from saltus.flow import find_recurrence
 from saltus.orbits import continue_orbit, orbits_of, search_orbits
@@ -60,10 +61,10 @@ def independent_attractors(bounds, values, starts, seed):
 def lies_on_a_stable_branch(tree, row):
     """Whether a stable orbit of the dataset alone, solved at the value, has the extrema of a motion or of its mirror image."""
     value, period, highest, lowest, _ = row
-    for name in tree.children:
-        if not name.startswith("branch_") or int(tree[name]["period"][0]) != period:
+    for _, branch in branches_of(tree):
+        if int(branch["period"][0]) != period:
             continue
-        orbits = orbits_of(tree[name].to_dataset())
+        orbits = orbits_of(branch)
         for a, b in pairwise(orbits):
             start, end = a.solution.values[0], b.solution.values[0]
             if a.signature != b.signature or start == end or not min(start, end) <= value <= max(start, end):

@@ -91,7 +91,7 @@ def test_the_orbits_of_a_curve_come_back_too(tmp_path):
 def test_what_is_no_branch_is_refused(spectrum):
     with pytest.raises(ParameterError, match=r"orbits_of takes the dataset of a branch.*lacks 'unknowns'"):
         orbits_of(spectrum["attractors"].to_dataset())
-    branch = spectrum["branch_000"].to_dataset()
+    branch = saltus.branch_of(spectrum, 0)
     with pytest.raises(ParameterError, match="lacks 'system'"):
         orbits_of(branch.drop_attrs())
 

@@ -8,6 +8,7 @@ from shared_systems import forced, under
 from study_cases import AMPLITUDE, FREQUENCY
 
 import saltus
+from saltus import branch_tables
 from saltus.orbits import orbits_of
 from saltus.studies import bifurcation_diagram, response_spectrum
 from saltus.systems import Harmonic
@@ -16,7 +17,7 @@ pytestmark = pytest.mark.thorough  # structures of their own for each load
 
 
 def branches_of(tree):
-    return [tree[name].to_dataset() for name in sorted(tree.children) if name.startswith("branch")]
+    return [branch for _, branch in branch_tables.branches_of(tree)]
 
 
 def test_a_moving_ground_is_the_force_omega_squared_zeta():

@@ -8,6 +8,7 @@ from shared_systems import forced
 from study_cases import AMPLITUDE
 
 import saltus
+from saltus.branch_tables import branches_of
 from saltus.orbits import orbits_of
 from saltus.studies import bifurcation_diagram
 from saltus.studies.diagram.diagram_dataset import confirmed
@@ -50,7 +51,7 @@ def test_a_family_that_rests_is_confirmed_over_its_whole_period():
 def test_a_diagram_has_the_family_that_rests_and_the_one_that_does_not():
     tree = bifurcation_diagram(SLOW, AMPLITUDE, (0.05, 0.5), max_period=2, values=[0.07, 0.15, 0.45], starts=8)
     assert tree["search"]["at_rest"].values.tolist() == [8, 0, 0]  # only below Hcr = 0.088
-    branches = [tree[name].to_dataset() for name in tree.children if name.startswith("branch")]
+    branches = [branch for _, branch in branches_of(tree)]
     assert len(branches) == 2
     resting = next(branch for branch in branches if "releases" in branch)
     moving = next(branch for branch in branches if "releases" not in branch)

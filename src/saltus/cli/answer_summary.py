@@ -53,19 +53,19 @@ def _borders(tree: Any) -> Iterator[str]:
 
 
 def _diagram(tree: Any) -> Iterator[str]:
+    from saltus.branch_tables import branches_of
+
     path = tree.attrs["path"]
-    for name in sorted(tree.children):
-        if name.startswith("branch_"):
-            branch = tree[name]
-            special = [branch[key].values for key in ("kind", "special_parameter") if key in branch]  # a branch may have none
-            kinds = [f"{kind} {value:.6g}" for kind, value in zip(*special, strict=True)]
-            more = f" and {len(kinds) - MOST_KINDS} more" if len(kinds) > MOST_KINDS else ""
-            period = int(branch["period"].max())  # where it ends at its own image, the orbit of half the period stands
-            x, listed = branch["parameter"].values, ", ".join(kinds[:MOST_KINDS]) or "no special points"
-            yield (
-                f"{name}: period {period}, {path} {x.min():.6g} to {x.max():.6g}, "
-                f"{int(branch['stable'].sum())} of {x.size} points stable; {listed}{more}"
-            )
+    for number, branch in branches_of(tree):
+        special = (branch[name].values for name in ("kind", "special_parameter"))
+        kinds = [f"{kind} {value:.6g}" for kind, value in zip(*special, strict=True)]
+        more = f" and {len(kinds) - MOST_KINDS} more" if len(kinds) > MOST_KINDS else ""
+        period = int(branch["period"].max())  # where it ends at its own image, the orbit of half the period stands
+        x, listed = branch["parameter"].values, ", ".join(kinds[:MOST_KINDS]) or "no special points"
+        yield (
+            f"branch {number}: period {period}, {path} {x.min():.6g} to {x.max():.6g}, "
+            f"{int(branch['stable'].sum())} of {x.size} points stable; {listed}{more}"
+        )
     for low, high, rate in zip(*(tree["bands"][name].values for name in ("low", "high", "exponent")), strict=True):
         yield f"chaos: {path} {low:.6g} to {high:.6g}, largest exponent {rate:.3g}"
 

@@ -21,7 +21,7 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
     """Points along `point`, special points along `special`.
 
     `stable` and `symmetric` are 0 or 1; `unknowns` and `sides` hold each orbit's own (see `problem.py`), filled up with nan and
-    0. Orbits that rest have `releases`, `rests` (times) and `rest_share` besides. Of both ends the attributes hold the sentence
+    0. Orbits that rest have the times of `releases` and `rests` besides. Of both ends the attributes hold the sentence
     (`ends`), the reason as a word (`end_reasons`) and the kind of the special point there, if any (`end_kinds`).
     """
     import xarray
@@ -65,6 +65,7 @@ def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[st
         ("slowest", column(lambda o: o.slowest), {"long_name": "least speed of an impact"}),
         ("clearance", column(lambda o: o.clearance), {"long_name": "least inner minimum of the gap"}),
         ("residual", column(lambda o: o.residual), {}),
+        ("rest_share", column(lambda o: o.rest_share if isinstance(o, RestingOrbit) else 0.0), {}),
     ]
     for name in orbits[0].problem.margins:
         attrs = {"long_name": f"least {name}", "margin_kind": str(model.margin_kind(name))}
@@ -80,7 +81,6 @@ def _rests(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
     return {
         "releases": (("point", "rest"), np.array([orbit.releases for orbit in resting])),
         "rests": (("point", "rest"), np.array([orbit.rests for orbit in resting])),
-        "rest_share": ("point", np.array([orbit.rest_share for orbit in resting])),
     }
 
 
@@ -103,8 +103,6 @@ def _unknowns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
 
 def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:
     """The special points with their evidence."""
-    if not special:
-        return {}
     rows: dict[str, list[Any]] = {
         "kind": [str(s.kind) for s in special],
         "special_parameter": [s.parameter for s in special],
@@ -120,4 +118,9 @@ def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:
         "test_value": [s.evidence.value for s in special],
         "special_defect": [s.defect for s in special],
     }
-    return {name: ("special", np.array(values)) for name, values in rows.items()}
+    return {name: ("special", np.array(values, dtype=_dtype(name))) for name, values in rows.items()}
+
+
+def _dtype(name: str) -> type:
+    """Of a column of special points, which may have no rows."""
+    return str if name == "kind" else int if name in ("special_impact_count", "special_period") else float

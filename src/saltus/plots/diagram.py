@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from saltus.branch_lines import branches_of
 from saltus.plots.axis_names import parameter_name, symbol, unit_in_brackets
 from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure, styled
 from saltus.plots.response import draw_bands, draw_limits, draw_response, note_missed, response_legend
@@ -55,19 +54,17 @@ def draw_diagram(tree: Any) -> Figure:
 
 def _unit(tree: Any) -> str:
     """The unit of the amplitudes, as the branches carry it."""
-    return next((unit_in_brackets(branch["amplitude"]) for _, branch in branches_of(tree)), "")
+    points = tree["points"]
+    return unit_in_brackets(points["amplitude"]) if "amplitude" in points else ""
 
 
 def _top(tree: Any, low: float, high: float) -> float:
     """The largest amplitude within the bounds, or 1 where there is none."""
-    inside = [branch["amplitude"].values[_within(branch["parameter"].values, low, high)] for _, branch in branches_of(tree)]
-    found = [float(values.max()) for values in inside if values.size]
-    dots = tree["attractors"]["amplitude"].values
-    return max([*found, *dots[np.isfinite(dots)], 0.0]) or 1.0
-
-
-def _within(x: np.ndarray, low: float, high: float) -> np.ndarray:
-    return np.asarray((x >= low) & (x <= high))
+    points, found = tree["points"], tree["attractors"]["amplitude"].values
+    if points.sizes["point"]:
+        x = points["parameter"].values
+        found = np.append(found, points["amplitude"].values[(x >= low) & (x <= high)])
+    return float(np.max(found[np.isfinite(found)], initial=0.0)) or 1.0
 
 
 def draw_stroboscopic_states(ax: Any, tree: Any) -> None:

@@ -1,17 +1,18 @@
 """Response spectra and bifurcation diagrams: branches of periodic motions, their special points, bands and simulated attractors.
 
-They are drawn from the DataTree of a study: children `branch_...` (see `saltus.orbits`), `attractors` (dots) and `bands`.
+They are drawn from the DataTree of a study: its branches (see `branch_tables.py`), `attractors` (dots) and `bands`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import ModelValidity, branches_of, margins_of, smooth_lines, validity_of
+from saltus.branch_lines import ModelValidity, margins_of, smooth_lines, validity_of
+from saltus.branch_tables import branches_of
 from saltus.plots.conventions import INK, LIMIT, LIMIT_LINE, PALE_STABLE, PALE_UNSTABLE, STABLE_LINE, UNSTABLE_LINE
 
 
@@ -54,18 +55,17 @@ MARK_NAMES = {
 
 def highest(spectrum: Any, low: float, high: float, quantity: str = "amplitude") -> float:
     """The largest value of a quantity on all branches between two values of the parameter."""
-    return max(float(values.max()) for values in _inside(spectrum, low, high, quantity) if values.size)
+    return float(_inside(spectrum, low, high, quantity).max())
 
 
 def lowest(spectrum: Any, low: float, high: float, quantity: str = "amplitude") -> float:
     """The least one."""
-    return min(float(values.min()) for values in _inside(spectrum, low, high, quantity) if values.size)
+    return float(_inside(spectrum, low, high, quantity).min())
 
 
-def _inside(spectrum: Any, low: float, high: float, quantity: str) -> Iterator[np.ndarray]:
-    for _, branch in branches_of(spectrum):
-        x = branch["parameter"].values
-        yield branch[quantity].values[(x >= low) & (x <= high)]
+def _inside(spectrum: Any, low: float, high: float, quantity: str) -> np.ndarray:
+    x = spectrum["points"]["parameter"].values
+    return np.asarray(spectrum["points"][quantity].values[(x >= low) & (x <= high)])
 
 
 def draw_branches(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0, weight: float = 1.0) -> None:
@@ -103,13 +103,11 @@ def draw_special(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: flo
 
 def special_places(spectrum: Any, kind: str, quantity: str = "amplitude") -> np.ndarray:
     """(parameter, quantity) of the special points of a kind on all branches, (n, 2)."""
-    rows = [np.empty((0, 2))]
-    for _, branch in branches_of(spectrum):
-        if "kind" in branch:
-            here = branch["kind"].values == kind
-            columns = (branch[f"special_{name}"].values[here] for name in ("parameter", quantity))
-            rows.append(np.stack(list(columns), axis=1))
-    return np.concatenate(rows)
+    special = spectrum["special"]
+    if "kind" not in special:  # a diagram without branches
+        return np.empty((0, 2))
+    here = special["kind"].values == kind
+    return np.stack([special[f"special_{name}"].values[here] for name in ("parameter", quantity)], axis=1)
 
 
 def _mark(style: dict[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import branches_of
+from saltus.branch_tables import branches_of
 from saltus.orbits import PeriodicOrbit, orbits_of
 from saltus.paper.figure_data import dataset
 from saltus.paper.measures.spectrum_features import within

@@ -128,16 +128,16 @@ def jumps(spectrum: Any) -> Any:
     system = System.from_json(str(spectrum.attrs["system"]))
     low, high = spectrum.attrs["bounds"]
     rows = []
-    for name, branch in detached(spectrum):
+    for number, branch in detached(spectrum):
         for fold in turning(branch):
             orbit, sign = _last_stable(branch, float(fold))
             if orbit is not None and low < fold < high:
-                rows.append((name, float(fold), float(fold * (1 + sign * SETTINGS.beyond)), orbit))
+                rows.append((number, float(fold), float(fold * (1 + sign * SETTINGS.beyond)), orbit))
     orbits = [row[3] for row in rows]
     columns = {name: ("jump", np.array([row[k] for row in rows]), "1") for k, name in ((1, "fold"), (2, "value"))}
     return dataset(
         {
-            "branch": ("jump", np.array([row[0] for row in rows], dtype="U16")),
+            "branch": ("jump", np.array([row[0] for row in rows], dtype=int)),
             **columns,
             "before": ("jump", np.array([orbit.amplitude for orbit in orbits]), "rad"),
             "after": ("jump", _settled(system, str(spectrum.attrs["path"]), columns["value"][1], orbits), "rad"),

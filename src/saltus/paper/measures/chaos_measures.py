@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors import excludes_tori
-from saltus.branch_lines import branches_of
+from saltus.branch_tables import branches_of
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.measures.response_measures import Panels
 from saltus.paper.measures.spectrum_features import amplitudes_at, count, stable_motions

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import branches_of, smooth_lines
+from saltus.branch_lines import smooth_lines
+from saltus.branch_tables import branches_of
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.measures.spectrum_features import (
     PROMINENT,

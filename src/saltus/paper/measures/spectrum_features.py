@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import BranchLine, branch_lines, branches_of, smooth_lines
+from saltus.branch_lines import BranchLine, branch_lines, smooth_lines
+from saltus.branch_tables import branches_of
 
 PROMINENT = 0.05  # least height of a resonance above the minima beside it, as a share of the highest amplitude
 FREE_ENDS = {"closed", "bound"}  # the end reasons of a branch that is connected to no other
@@ -25,14 +26,14 @@ def main_branch(spectrum: Any) -> Any:
     return max((b for _, b in branches_of(spectrum) if int(b["period"][0]) == 1), key=lambda b: np.ptp(b["parameter"].values))
 
 
-def detached(spectrum: Any) -> list[tuple[str, Any]]:
+def detached(spectrum: Any) -> list[tuple[int, Any]]:
     """The branches that no special point ties to another one and that reach into the range, without the main one."""
-    found = []
-    for name, branch in branches_of(spectrum):
+    found, main = [], main_branch(spectrum)
+    for number, branch in branches_of(spectrum):
         free = FREE_ENDS.issuperset(np.atleast_1d(branch.attrs["end_reasons"]).tolist())
-        same = branch.equals(main_branch(spectrum))
+        same = branch.equals(main)
         if branch.attrs["origin"] == "start" and free and not same and within(spectrum, branch).any():
-            found.append((name, branch))
+            found.append((number, branch))
     return found
 
 
@@ -87,8 +88,7 @@ def stable_motions(spectrum: Any, values: np.ndarray) -> np.ndarray:
 
 def first_fold(branch: Any) -> tuple[float, float]:
     """(parameter, amplitude) at which a branch begins: its fold of least parameter, nan where it has none."""
-    kinds = branch["kind"].values if "kind" in branch else np.empty(0)
-    folds = np.flatnonzero(kinds == "LP")
+    folds = np.flatnonzero(branch["kind"].values == "LP")
     if not folds.size:
         return (np.nan, np.nan)
     least = folds[int(np.argmin(branch["special_parameter"].values[folds]))]
@@ -98,17 +98,12 @@ def first_fold(branch: Any) -> tuple[float, float]:
 def count(spectrum: Any, kind: str) -> int:
     """How many special points of a kind lie on all branches within the range."""
     low, high = spectrum.attrs["bounds"]
-    return sum(
-        int(((b["kind"] == kind) & (b["special_parameter"] >= low) & (b["special_parameter"] <= high)).sum())
-        for _, b in branches_of(spectrum)
-        if "kind" in b
-    )
+    kinds, places = (spectrum["special"][name].values for name in ("kind", "special_parameter"))
+    return int(((kinds == kind) & (places >= low) & (places <= high)).sum())
 
 
 def turning(branch: Any) -> np.ndarray:
     """The parameters of the folds at which the stability changes: there motions jump, (n,)."""
-    if "kind" not in branch:
-        return np.empty(0)
     folds = branch["special_parameter"].values[branch["kind"].values == "LP"]
     lines = list(branch_lines(branch))
     meets = [one.places[-1, 0] for one, two in pairwise(lines) if one.stable != two.stable]

@@ -104,8 +104,8 @@ def bifurcation_diagram(
         progress: called with the fraction done and what is being done.
 
     Returns:
-        A DataTree: `branch_000`, ..., `attractors` (what simulation settled on), `unplaced` (what of it lies on no branch), and
-        `bands`, `exponents`, `stroboscopic` (see `Bands`), and `search`; docs/orbits.md lists their variables and attributes.
+        A DataTree: the branches in `branches`, `points`, `special` and `orbits` (`branch_of` gives one), `attractors`,
+        `unplaced`, `bands`, `exponents`, `stroboscopic` and `search`; docs/orbits.md lists their variables and attributes.
 
     Raises:
         ParameterError: an argument without meaning.

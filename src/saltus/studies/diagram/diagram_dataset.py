@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.branch_tables import branch_tables
 from saltus.orbits import Branch, PeriodicOrbit, RestingOrbit, defects
 from saltus.provenance import provenance
 from saltus.studies.diagram.attractors_found import Place
@@ -55,10 +56,8 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
         missed=search.missed.missed,
         samples_tried=search.missed.samples,
     )
-    nodes = {"/": xarray.Dataset(attrs=attributes)}
     order = sorted(range(len(branches)), key=lambda i: (branches[i].points[0].orbit.period, -len(branches[i].points)))
-    datasets = confirmed([branches[i] for i in order])
-    nodes |= {f"branch_{i:03d}": data for i, data in enumerate(datasets)}
+    nodes = {"/": xarray.Dataset(attrs=attributes), **branch_tables(confirmed([branches[i] for i in order]))}
     chaos = search.chaos
     bands = {"bands": band_dataset()} if chaos is None else explained(system, chaos, branches).to_datasets()
     found = {"attractors": _attractors(search), "unplaced": _unplaced(search)}
