@@ -23,7 +23,7 @@ from saltus.flow import (
     segments,
     steps,
 )
-from saltus.flow.contacts import complementarity, contact_impacts, contact_layout, contacts_kernel
+from saltus.flow.contacts import complementarity, contact_impacts, contact_layout, contact_tangent, contacts_kernel
 from saltus.flow.memory_layout import State
 from saltus.taylor import (
     Case,
@@ -56,6 +56,7 @@ from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit
 """
 ENV = {"parameter": ("parameters", 0), "constant": ("constants", 0), "record": ("table", 0)}
 LEAVES = ENV | {"time": ("t", 0), "origin": ("origin", 0), "side": ("side", 0)}
+HERE = {"coordinate": ("state", State.COORDINATES.value)}  # in the kernel's state
 
 
 @dataclass(frozen=True)
@@ -63,9 +64,9 @@ class Structure:
     """The compiled functions of a traced structure, and its sizes."""
 
     module: ModuleType
-    functions: tuple[
-        Any, ...
-    ]  # series, contact_series, reset, contact_damping, tangent: what the kernel calls; or series, matrices
+    # What the kernel calls: series, contact_series, reset, contact_damping, tangent; with several contacts series, matrices,
+    # matrix_slopes, tangent.
+    functions: tuple[Any, ...]
     signs: tuple[int, ...] = ()  # of the contacts, of a model with several
 
     def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -74,7 +75,7 @@ class Structure:
         self.module.constants(parameters, constants)
         if self.signs:
             env = (np.append(parameters, np.ones(self.module.OWN)), constants, *records)
-            return env, (*self.functions, np.array(self.signs, dtype=float))
+            return env, (*self.functions[:2], np.array(self.signs, dtype=float), *self.functions[2:])
         env = (parameters, constants, *records)
         self.module.geometry(env, geometry)
         return env, (*self.functions[:4], geometry, self.functions[4])
@@ -99,7 +100,7 @@ def kernel_module() -> ModuleType:
 @cache
 def load_contacts_kernel() -> Callable[..., int]:
     """The kernel for models with several contacts, `advance_contacts` of `contacts/contacts_kernel.py`."""
-    parts = (contact_layout, complementarity, contact_impacts, contacts_kernel)
+    parts = (contact_layout, complementarity, contact_impacts, contact_tangent, contacts_kernel)
     return entry_point(load_module("contacts", _text(kernel_layout, roots, steps, *parts)).advance_contacts)
 
 
@@ -118,7 +119,7 @@ def _text(*modules: ModuleType) -> str:
 def load_structure(trace: Trace) -> Structure:
     """The functions of a trace's structure."""
     module = load_module("structure", generated_header(_SIGNATURES) + structure_text(trace))
-    several = ("series", "matrices")
+    several = ("series", "matrices", "matrix_slopes", "tangent")
     names = several if trace.signs else ("series", "contact_series", "reset", "contact_damping", "tangent")
     return Structure(module, tuple(pointer(getattr(module, name)) for name in names), trace.signs)
 
@@ -144,7 +145,7 @@ def structure_text(trace: Trace) -> str:
     instant = ("side", "env", "piece")
     functions = [_series(trace, known), _table("constants", Places(("parameters", "constants"), ENV), list(known), {})]
     if trace.signs:
-        return _source(sizes, [*functions, _matrices(trace, known)])
+        return _source(sizes, [*functions, _matrices(trace, known), _matrix_slopes(trace, known), _tangent(trace, known)])
     functions += [
         _contact_series(trace, known),
         _at_impact("reset", ("t", "origin", "v0", *instant), impact, known),
@@ -167,6 +168,7 @@ def constants(trace: Trace) -> dict[Expr, int]:
     ]
     for _, _, changes in event_derivatives.changes(trace) if trace.columns else []:
         roots += changes.values()
+    roots += event_derivatives.number_slopes(trace)
     return shared_constants(roots)
 
 
@@ -191,11 +193,16 @@ def _series(trace: Trace, known: dict[Expr, int]) -> str:
     rows = range(len(trace.acceleration))
     gap = [] if trace.gap is None else [("g", 0)]
     targets = [*(("a", i) for i in rows), *gap, *(("m", j) for j in range(len(trace.reactions) + len(trace.margins)))]
-    leaves = LEAVES | {"free": ("parameters", len(trace.parameters))}
+    leaves = LEAVES | _free(trace)
     places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves)
     layout = Rows([("q", i) for i in rows], [("v", i) for i in rows], targets, MOST_COEFFICIENTS, any_order=True)
     motion = tape([*trace.acceleration, *motion_roots(trace)], known, series=True)
     return function_text("series", places, "SCALAR", [layout, motion])
+
+
+def _free(trace: Trace) -> dict[str, tuple[str, int]]:
+    """Where it stands which coordinates no contact holds."""
+    return {"free": ("parameters", len(trace.parameters))}
 
 
 def _contact_series(trace: Trace, known: dict[Expr, int]) -> str:
@@ -210,8 +217,15 @@ def _contact_series(trace: Trace, known: dict[Expr, int]) -> str:
 def _matrices(trace: Trace, known: dict[Expr, int]) -> str:
     """The mass matrix, E and the positions of the contacts at a state, one after the other."""
     roots = [*trace.mass, *trace.restitution, *trace.positions]
-    places = Places(("env", "piece", "state", "out"), ENV | {"coordinate": ("state", State.COORDINATES.value)})
+    places = Places(("env", "piece", "state", "out"), ENV | HERE)
     return function_text("matrices", places, "SCALAR", [Case(tape(roots, known), [("out", i) for i in range(len(roots))])])
+
+
+def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> str:
+    """The derivatives of what `matrices` fills along each column, one column after the other."""
+    roots, places = event_derivatives.number_slopes(trace), Places(("env", "piece", "state", "out"), ENV | HERE)
+    cases = [Case(tape(roots, known), [("out", i) for i in range(len(roots))])] if roots else []
+    return function_text("matrix_slopes", places, "SCALAR", cases)
 
 
 def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]) -> str:
@@ -229,7 +243,7 @@ def _tangent(trace: Trace, known: dict[Expr, int]) -> str:
     for kind, detail, changes in event_derivatives.changes(trace) if trace.columns else []:
         targets = [("state", starts[leaf.op] + leaf.value) for leaf in changes]
         cases.append(Case(tape(list(changes.values()), known), targets, (("kind", int(kind)), ("detail", int(detail)))))
-    places = Places(("kind", "detail", "t", "origin", "side", "env", "piece", "state"), LEAVES | state)
+    places = Places(("kind", "detail", "t", "origin", "side", "env", "piece", "state"), LEAVES | _free(trace) | state)
     return function_text("tangent", places, "SCALAR", cases)
 
 

@@ -42,7 +42,8 @@ def changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]]]:
 
     The leaf "shift" of a column is by how much the event moves.
     """
-    events = [(EventCode.LIMIT, i, _shifts(margin_shift(trace, name))) for i, name in enumerate(trace.margins)]
+    events = [(EventCode.LIMIT, i, _shifts(margin_shift(trace, margin))) for i, margin in enumerate(trace.margins.values())]
+    events += [(EventCode.RELEASE, i, _shifts(margin_shift(trace, reaction))) for i, reaction in enumerate(trace.reactions)]
     if trace.gap is None:
         return events
     jump = saltation(trace)
@@ -166,10 +167,16 @@ def time_left(trace: Trace) -> Expr:
     return -2.0 * flights / (1.0 - last_speed / speed)
 
 
-def margin_shift(trace: Trace, name: str) -> list[Expr]:
-    """dt of a margin m(q, v, a, t, c) reaching 0: -(m_q u + m_v z + m_c) / (m_t + m_q v + m_v a), a being the model's own."""
+def number_slopes(trace: Trace) -> list[Expr]:
+    """The derivatives of the numbers of a model's contacts (mass matrix, E, positions) along each column, one after the other."""
+    numbers = [*trace.mass, *trace.restitution, *trace.positions]
+    return [derivative_along(trace, x, j) for j in range(trace.columns) for x in numbers]
+
+
+def margin_shift(trace: Trace, margin: Expr) -> list[Expr]:
+    """dt of a margin, or a contact's reaction, m(q, v, a, t, c) reaching 0: -(m_q u + m_v z + m_c) / (m_t + m_q v + m_v a)."""
     a = trace.acceleration[: trace.dof]
-    margin = substitute(trace.margins[name], {Expr("acceleration", (), i): a[i] for i in range(trace.dof)})
+    margin = substitute(margin, {Expr("acceleration", (), i): a[i] for i in range(trace.dof)})
     speed = time_derivative(trace, margin)
     for i in range(trace.dof):
         speed = speed + differentiate(margin, Expr("coordinate", (), i)) * Expr("velocity", (), i)

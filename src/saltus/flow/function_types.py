@@ -18,12 +18,13 @@ CONTACT_SERIES = types.void(_f, _f, _f, ENV, _i, _f1, _f2, _i)
 RESET = types.UniTuple(_f, 2)(_f, _f, _f, _f, ENV, _i)
 CONTACT_DAMPING = _f(_f, _f, _f, ENV, _i)
 TANGENT = types.void(_i, _i, _f, _f, _f, ENV, _i, _f1)
-MATRICES = types.void(ENV, _i, _f1, _f1)
+MATRICES = MATRIX_SLOPES = types.void(ENV, _i, _f1, _f1)
 
 with pointers():
     _functions = [types.FunctionType(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING, TANGENT)]
     MODEL = types.Tuple((*_functions[:4], _f1, _functions[4]))
-    CONTACT_MODEL = types.Tuple((_functions[0], types.FunctionType(MATRICES), _f1))
+    _matrices = types.FunctionType(MATRICES)
+    CONTACT_MODEL = types.Tuple((_functions[0], _matrices, _f1, _matrices, _functions[4]))
 STEP_BUFFERS, EVENT_BUFFERS = types.Tuple((_i2, _f2, _f3)), types.Tuple((_i2, _f2))
 ADVANCE = _i(_i1, _f1, _f1, ENV, MODEL, STEP_BUFFERS, EVENT_BUFFERS)
 ADVANCE_CONTACTS = _i(_i1, _f1, _f1, ENV, CONTACT_MODEL, _i2, STEP_BUFFERS, EVENT_BUFFERS)

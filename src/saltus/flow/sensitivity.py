@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import check_names
+from saltus.flow.contacts.contact_layout import ImpactDetail
 from saltus.flow.kernel_layout import GrazingDetail
 from saltus.flow.memory_layout import RestDetail
 from saltus.flow.motion import EventKind, Motion
@@ -17,8 +18,16 @@ from saltus.flow.request import MotionRequest
 from saltus.flow.simulation import Followed, follow
 from saltus.flow.stops import Stop
 from saltus.progress import Progress, silent
-from saltus.systems import System, check_system
+from saltus.systems import System, check_system, constrained_acceleration
 from saltus.taylor import FREQUENCY
+
+IRREGULAR = {
+    ImpactDetail.NO_SPEED: "at time {time:.9g} a contact is reached without speed, where the motion has no derivative",
+    ImpactDetail.APART: (
+        "at time {time:.9g} contacts close together, which motions beside this one close one after the other, so that the "
+        "motion is not continuous in what moves them apart"
+    ),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +86,7 @@ def sensitivities(
         u+ = x_c - v+ dt,     u'+ = R_v (u'- + a_old dt) + R_t dt + R_c - a_new dt,
 
     whose determinant is R_v v+ / v-. A release moves with the root of the contact acceleration; at rest the derivatives are
-    those of the contact.
+    those of the contact. With several contacts the law of those that act is differentiated (see `contacts/contact_tangent.py`).
 
     Args:
         system: what moves.
@@ -118,7 +127,7 @@ def sensitivities(
 
 def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
     """The parameters to differentiate to, of a system whose motion has derivatives here."""
-    check_system(system, "sensitivities")
+    check_system(system, "sensitivities", several_contacts=True)
     return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
 
 
@@ -140,7 +149,13 @@ def _rates(motion: Motion) -> np.ndarray:
     velocity = np.atleast_1d(motion.velocity)
     if side == 0:
         return np.zeros(2 * velocity.size)
-    acceleration = system.model.acceleration(motion.time, motion.position, motion.velocity, float(side), system.load)
+    acceleration: Any
+    if system.model.contacts:
+        held = {contact.coordinate for contact in system.model.contacts if contact.name in motion.closed}
+        free = [float(name not in held) for name in system.model.coordinates]
+        acceleration = constrained_acceleration(system.model, motion.time, motion.position, motion.velocity, system.load, free)
+    else:
+        acceleration = system.model.acceleration(motion.time, motion.position, motion.velocity, float(side), system.load)
     return np.concatenate([velocity, np.atleast_1d(np.asarray(acceleration, dtype=float))])
 
 
@@ -149,6 +164,8 @@ def _undefined(motion: Motion, columns: np.ndarray) -> str | None:
     if np.isfinite(columns).all():
         return None
     for event, detail in zip(reversed(motion.events), motion.events.details[::-1], strict=True):
+        if event.kind is EventKind.IMPACT and motion.system.model.contacts and detail != ImpactDetail.REGULAR:
+            return IRREGULAR[ImpactDetail(detail)].format(time=event.time)
         if event.kind is EventKind.CHATTER:
             return f"at time {event.time:.9g} impacts without loss became too small to be followed, and their phase is lost"
         if event.kind is EventKind.GRAZING and detail == GrazingDetail.TRIPLE:
@@ -158,4 +175,9 @@ def _undefined(motion: Motion, columns: np.ndarray) -> str | None:
                 f"from time {event.time:.9g} on it rests at contact and impacts lose nothing, so that a motion from a state "
                 "beside it never comes to rest: there is no derivative to what moves it off the contact"
             )
+    if motion.system.model.contacts:
+        return (
+            "it starts with a closed contact whose impacts lose nothing, or a reaction reaches 0 without a rate, so that motions "
+            "beside it go another way"
+        )
     return "the derivatives leave the range of numbers"

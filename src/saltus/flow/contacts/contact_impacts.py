@@ -11,16 +11,16 @@ import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, complementary, invert
 from saltus.flow.contacts.contact_layout import MOST_IMPACTS, VANISHED, ContactColumn, ContactPart, Solver
-from saltus.flow.kernel_layout import CHATTER_SPEED, SLOW, Status, Where
-from saltus.flow.memory_layout import EventCode, State
+from saltus.flow.kernel_layout import CHATTER_SPEED, SLOW, Where
+from saltus.flow.memory_layout import State
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 
 @jit
-def solver_arrays(own, count):
-    """The arrays of `Solver`."""
+def solver_arrays(own, count, columns):
+    """The arrays of `Solver`, for so many columns of a tangent."""
     most = max(2 * own, count + 1)
     return (
         np.zeros(own * own + count * count + count),
@@ -30,7 +30,29 @@ def solver_arrays(own, count):
         np.zeros((count, count)),
         *(np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)),
         *(np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)),
+        *(np.zeros(columns * (own * own + count * count + count)), np.zeros(own)),
+        *(np.zeros(columns), np.zeros((columns, count))),
     )
+
+
+@lean_jit
+def hold_coordinates(where, env, contacts):
+    """Tell the model's functions which coordinates are free."""
+    first = env[0].size - where[Where.OWN]
+    for i in range(where[Where.OWN]):
+        env[0][first + i] = 1.0
+    for i in range(contacts.shape[0]):
+        if contacts[i, ContactColumn.CLOSED] == 1:
+            env[0][first + contacts[i, ContactColumn.COORDINATE]] = 0.0
+
+
+@lean_jit
+def closed_bits(contacts):
+    """The contacts that are closed."""
+    bits = 0
+    for i in range(contacts.shape[0]):
+        bits |= contacts[i, ContactColumn.CLOSED] << i
+    return bits
 
 
 @lean_jit
@@ -148,6 +170,8 @@ def record_contact_event(where, state, contacts, events, kind, which, t):
         values[i, 1 + k] = values[i, 1 + own + k] = state[first + k]
     for k in range(contacts.shape[0]):
         values[i, 1 + 2 * own + k] = 0.0
+    for j in range(where[Where.COLUMNS]):
+        values[i, 1 + 2 * own + contacts.shape[0] + j] = math.nan  # unless `note_shifts` knows better
     where[Where.EVENTS] = i + 1
 
 
@@ -170,28 +194,6 @@ def settle_contact(where, state, model, contacts, solver, i, rate):
     state[State.COORDINATES + where[Where.DOF] + coordinate] = model[ContactPart.SIGNS][i] * rate + 0.0
     contacts[i, ContactColumn.CLOSED] = 1 if rate == 0.0 else 0
     contacts[i, ContactColumn.SKIP], contacts[i, ContactColumn.RELEASED] = 1, 0
-
-
-@lean_jit
-def contact_impact(where, state, env, model, contacts, solver, events, t, hit):
-    """Apply the impact law to all contacts whose gap is 0, of which those in `hit` have just closed. PAUSED, or NO_IMPACT."""
-    own, count = where[Where.OWN], contacts.shape[0]
-    regular, chosen = couple(where, state, env, model, contacts, solver), hit
-    for i in range(count):
-        chosen |= contacts[i, ContactColumn.CLOSED] << i
-    record_contact_event(where, state, contacts, events, EventCode.IMPACT, hit, t)
-    for i in range(count):  # a contact that is reached without a speed, to within the working precision
-        if hit >> i & 1:
-            solver[Solver.RATES][i] = min(solver[Solver.RATES][i], 0.0)
-    acts = impact_impulses(solver, own, count, chosen, solver[Solver.RATES]) if regular else -1
-    if acts < 0:
-        return Status.NO_IMPACT
-    push(where, state, model, contacts, solver)
-    for i in range(count):
-        if chosen >> i & 1:
-            settle_contact(where, state, model, contacts, solver, i, solver[Solver.RATES][i])
-    fill_after(where, state, contacts, solver, events)
-    return Status.PAUSED
 
 
 @lean_jit

@@ -20,6 +20,8 @@ class ContactPart(IntEnum):
     SERIES = 0
     MATRICES = 1
     SIGNS = 2
+    SLOPES = 3  # of what `MATRICES` fills, along each column of the tangent
+    TANGENT = 4
 
 
 class Solver(IntEnum):
@@ -39,6 +41,18 @@ class Solver(IntEnum):
     FALLING_GAPS = 11  # while an accumulation is followed
     FALLING_RATES = 12
     FALLING_PULLS = 13
+    SLOPES = 14  # a row for each column of the tangent: the derivatives of `NUMBERS`
+    JUMP = 15  # of the velocities at an impact
+    HELD_SHIFTS = 16  # by how much the end of an accumulation moves with each column
+    PULL_SLOPES = 17  # the derivatives of `PULLS`, a row for each column
+
+
+class ImpactDetail(IntEnum):
+    """What an impact leaves of the tangent."""
+
+    REGULAR = 0
+    NO_SPEED = 1  # a contact is reached without speed, so that motions beside this one have no derivative
+    APART = 2  # contacts close at one instant, and motions beside this one close them one after the other
 
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -49,4 +63,6 @@ NEAR = (
 ROUNDING = 2.0**-6  # of a gap, in NEAR times the contact's position
 VIOLATED = 1e-12  # The largest share of its right-hand side by which a complementarity problem may be violated by rounding.
 MOST_IMPACTS = 100_000  # that an accumulation is followed for: e = 0.9996 needs so many for 16 digits
+APART = 1e-9  # Contacts close together in motions beside one if the derivatives of their instants differ by less than this share.
+RELATIVE_STEP = 1e-4  # of differences of an accumulation's duration: their error is its square, and 1e-12 by rounding
 VANISHED = 1e-16  # Impacts that are slower than the first one of an accumulation by this factor end it.

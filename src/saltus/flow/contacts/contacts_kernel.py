@@ -17,23 +17,49 @@ import numpy as np
 
 from saltus.flow.contacts.contact_impacts import (
     bring_to_rest,
-    contact_impact,
+    closed_bits,
     contact_position,
     couple,
     fill_after,
     frozen_accumulation,
+    hold_coordinates,
+    impact_impulses,
     near_contacts,
+    push,
     record_contact_event,
+    settle_contact,
     slow_impacts,
     smaller_set,
     solver_arrays,
 )
-from saltus.flow.contacts.contact_layout import NEAR, ROUNDING, ContactColumn, ContactPart, Solver
+from saltus.flow.contacts.contact_layout import NEAR, ROUNDING, ContactColumn, ContactPart, ImpactDetail, Solver
+from saltus.flow.contacts.contact_tangent import (
+    accumulation_shifts,
+    closing_columns,
+    decide_columns,
+    hold_columns,
+    impulse_columns,
+    note_shifts,
+    note_velocities,
+    release_columns,
+    rest_columns,
+)
 from saltus.flow.function_types import ADVANCE_CONTACTS
-from saltus.flow.kernel_layout import BATCH, EXACT, SHORTEST, ZERO, Mode, Setting, Status, Where, Work
+from saltus.flow.kernel_layout import BATCH, EXACT, ROUGHER, SHORTEST, ZERO, Mode, Setting, Status, Where, Work
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.roots import NEVER, SIMPLE, contact_root, horner, horner_slope, leading, margin_root
-from saltus.flow.steps import expand, leaps, motion_end, move, next_target, record_step, step_size, work_arrays
+from saltus.flow.steps import (
+    column_step,
+    expand,
+    forget,
+    leaps,
+    motion_end,
+    move,
+    next_target,
+    record_step,
+    step_size,
+    work_arrays,
+)
 from saltus.taylor import lean_jit
 from saltus.taylor import not_here as cached_jit
 
@@ -41,14 +67,37 @@ from saltus.taylor import not_here as cached_jit
 
 
 @lean_jit
-def hold_coordinates(where, env, contacts):
-    """Tell the model's functions which coordinates are free."""
-    first = env[0].size - where[Where.OWN]
-    for i in range(where[Where.OWN]):
-        env[0][first + i] = 1.0
-    for i in range(contacts.shape[0]):
-        if contacts[i, ContactColumn.CLOSED] == 1:
-            env[0][first + contacts[i, ContactColumn.COORDINATE]] = 0.0
+def contact_impact(where, state, env, model, contacts, work, solver, events, t, origin, hit):
+    """Apply the impact law to all contacts whose gap is 0, of which those in `hit` have just closed. PAUSED, or NO_IMPACT."""
+    own, count, first, detail = where[Where.OWN], contacts.shape[0], State.COORDINATES + where[Where.DOF], ImpactDetail.REGULAR
+    regular, chosen = couple(where, state, env, model, contacts, solver), hit
+    for i in range(count):
+        chosen |= contacts[i, ContactColumn.CLOSED] << i
+    record_contact_event(where, state, contacts, events, EventCode.IMPACT, hit, t)
+    if where[Where.COLUMNS] > 0:
+        detail = closing_columns(where, state, env, model, contacts, work, solver, t, origin, hit)
+        events[0][where[Where.EVENTS] - 1, 3] = detail
+        note_velocities(where, state, solver, 0.0)
+    for i in range(count):  # a contact that is reached without a speed, to within the working precision
+        if hit >> i & 1:
+            solver[Solver.RATES][i] = min(solver[Solver.RATES][i], 0.0)
+        solver[Solver.GAPS][i] = solver[Solver.RATES][i]
+    acts = impact_impulses(solver, own, count, chosen, solver[Solver.RATES]) if regular else -1
+    if acts < 0:
+        return Status.NO_IMPACT
+    push(where, state, model, contacts, solver)
+    for i in range(count):
+        if chosen >> i & 1:
+            settle_contact(where, state, model, contacts, solver, i, solver[Solver.RATES][i])
+    fill_after(where, state, contacts, solver, events)
+    if detail == ImpactDetail.NO_SPEED:
+        forget(where, state)
+    elif where[Where.COLUMNS] > 0:
+        note_velocities(where, state, solver, -1.0)
+        impulse_columns(where, state, env, model, contacts, solver, acts, chosen)
+        hold_columns(where, state, contacts, solver, chosen)
+        note_shifts(where, state, contacts, events, state, first + where[Where.DOF])
+    return Status.PAUSED
 
 
 @lean_jit
@@ -58,15 +107,6 @@ def gap_series(model, contacts, work, i, position, order, g):
     for k in range(order + 1):
         g[k] = sign * work[Work.POSITIONS][coordinate, k]
     g[0] -= sign * position
-
-
-@lean_jit
-def closed_bits(contacts):
-    """The contacts that are closed."""
-    bits = 0
-    for i in range(contacts.shape[0]):
-        bits |= contacts[i, ContactColumn.CLOSED] << i
-    return bits
 
 
 @lean_jit
@@ -151,8 +191,13 @@ def end_accumulation_of(where, state, settings, env, model, contacts, work, solv
     if left < 0.0:
         return t
     record_contact_event(where, state, contacts, events, EventCode.HELD, moving, t + left)
+    if where[Where.COLUMNS] > 0:
+        accumulation_shifts(where, state, env, model, contacts, work, solver, near, t, origin)
+        note_shifts(where, state, contacts, events, solver[Solver.HELD_SHIFTS], 0)
     bring_to_rest(where, state, model, contacts, solver, near)
     fill_after(where, state, contacts, solver, events)
+    if where[Where.COLUMNS] > 0:
+        rest_columns(where, state, env, model, contacts, solver, near)
     return t + left
 
 
@@ -160,7 +205,9 @@ def end_accumulation_of(where, state, settings, env, model, contacts, work, solv
 def decide_contacts(where, state, settings, env, model, contacts, work, solver, events, origin):
     """Find out which contacts are closed from here on. Returns PAUSED to go on, or NOT_UNIQUE."""
     t, count = state[State.TIME], contacts.shape[0]
-    rested = where[Where.HELD] == 1
+    rested, shifts = where[Where.HELD] == 1, State.COORDINATES + 2 * where[Where.DOF]
+    for j in range(where[Where.COLUMNS]):
+        solver[Solver.HELD_SHIFTS][j] = state[shifts + j]
     settled = end_accumulation_of(where, state, settings, env, model, contacts, work, solver, events, t, origin)
     candidates = closed_bits(contacts)
     couple(where, state, env, model, contacts, solver)
@@ -170,6 +217,8 @@ def decide_contacts(where, state, settings, env, model, contacts, work, solver, 
     opened = candidates & ~closed_bits(contacts)
     if opened and where[Where.LEAVE_BY] == 0:
         record_contact_event(where, state, contacts, events, EventCode.RELEASE, opened, t)
+        note_shifts(where, state, contacts, events, state, shifts)
+    decide_columns(where, state, env, model, contacts, work, solver, t, origin)
     where[Where.LEAVE_BY] = 0
     where[Where.HELD] = 1
     for i in range(env[0].size - where[Where.OWN], env[0].size):
@@ -179,6 +228,7 @@ def decide_contacts(where, state, settings, env, model, contacts, work, solver, 
         contacts[i, ContactColumn.RELEASED] = 0
     if where[Where.HELD] == 1 and not rested:
         record_contact_event(where, state, contacts, events, EventCode.RESTING, closed_bits(contacts), settled)
+        note_shifts(where, state, contacts, events, solver[Solver.HELD_SHIFTS], 0)
     where[Where.MODE] = Mode.REST if where[Where.HELD] == 1 else Mode.ARC
     where[Where.SIDE] = 1 + closed_bits(contacts)
     return Status.PAUSED
@@ -189,6 +239,9 @@ def contact_step_size(where, settings, env, model, contacts, work, t, origin, ta
     """The step that the series of the free coordinates and of the reactions allow."""
     order, tol, own = where[Where.ORDER], settings[Setting.TOLERANCE], where[Where.OWN]
     natural = step_size(work[Work.VELOCITIES][:own], order, size, tol)
+    if where[Where.COLUMNS] > 0:
+        q, v, a = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.ACCELERATIONS]
+        natural = min(natural, column_step(where, q, v, a, order, ROUGHER * tol))
     sharp = min(tol, EXACT) if where[Where.MODE] == Mode.REST else tol
     for i in range(contacts.shape[0]):
         if contacts[i, ContactColumn.CLOSED] == 1:
@@ -266,12 +319,18 @@ def contact_arc(where, state, settings, env, model, contacts, work, solver, step
         contacts[i, ContactColumn.SKIP] = 0
     if bits > 0:
         where[Where.MODE] = Mode.CONTACT
-        return contact_impact(where, state, env, model, contacts, solver, events, state[State.TIME], bits)
+        return contact_impact(where, state, env, model, contacts, work, solver, events, state[State.TIME], origin, bits)
     if hit >= 0:
+        if where[Where.COLUMNS] > 0:
+            release_columns(where, state, env, model, work, state[State.TIME], origin, hit)
         where[Where.MODE], contacts[hit, ContactColumn.RELEASED] = Mode.CONTACT, 1 if first > 0.0 else 0
     if limit >= 0:
         record_contact_event(where, state, contacts, events, EventCode.LIMIT, 0, state[State.TIME])
         events[0][where[Where.EVENTS] - 1, 3] = limit - count
+        if where[Where.COLUMNS] > 0:
+            piece, shifts = where[Where.PIECE], State.COORDINATES + 2 * where[Where.DOF]
+            model[ContactPart.TANGENT](EventCode.LIMIT, limit - count, state[State.TIME], origin, 1.0, env, piece, state)
+            note_shifts(where, state, contacts, events, state, shifts)
         return Status.LIMITED
     unit = min(settings[Setting.LENGTH], 1.0) if settings[Setting.LENGTH] > 0.0 else 1.0
     ended = hit >= 0 or natural > 0.1 * SHORTEST * unit or h == target - t
@@ -281,7 +340,7 @@ def contact_arc(where, state, settings, env, model, contacts, work, solver, step
 @cached_jit(ADVANCE_CONTACTS)
 def advance_contacts(where, state, settings, env, model, contacts, steps, events):
     """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the reason."""
-    work, solver = work_arrays(where), solver_arrays(where[Where.OWN], contacts.shape[0])
+    work, solver = work_arrays(where), solver_arrays(where[Where.OWN], contacts.shape[0], where[Where.COLUMNS])
     couple(where, state, env, model, contacts, solver)
     hold_coordinates(where, env, contacts)
     for _ in range(BATCH):

@@ -1,0 +1,336 @@
+"""What the events of several contacts make of the tangent's columns (see `taylor/derivatives.py`).
+
+At an event at time t(c) the columns are first taken along with it, to the derivatives of the state *at the event*, u + v dt and
+z + a dt with the acceleration a before it. There the event's own map is differentiated, with the contacts that act. Once it is
+known which contacts are closed afterwards the columns are taken back to a fixed time, with the velocity and acceleration that
+the motion then has. Nothing jumps at a simple release, so that its saltation is the identity.
+
+Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines `contacts`, `model`, `solver`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from saltus.flow.contacts.complementarity import acting, invert
+from saltus.flow.contacts.contact_impacts import closed_bits, frozen_accumulation, hold_coordinates, restitution
+from saltus.flow.contacts.contact_layout import APART, RELATIVE_STEP, ContactColumn, ContactPart, ImpactDetail, Solver
+from saltus.flow.kernel_layout import Where, Work
+from saltus.flow.memory_layout import EventCode, State
+from saltus.flow.steps import expand
+from saltus.taylor import jit, lean_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@lean_jit
+def move_columns(where, state, work, sign):
+    """Take the columns to the event that moves (sign +1), or back from it to a fixed time (-1): u + v dt, z + a dt."""
+    own, dof, a = where[Where.OWN], where[Where.DOF], work[Work.ACCELERATIONS]
+    for j in range(where[Where.COLUMNS]):
+        shift = sign * state[State.COORDINATES + 2 * dof + j]
+        for i in range(own):
+            place = State.COORDINATES + own * (1 + j) + i
+            if shift != 0.0:
+                state[place] += shift * state[State.COORDINATES + dof + i]
+                state[place + dof] += shift * a[i, 0]
+
+
+@lean_jit
+def clear_shifts(where, state):
+    """The event is over."""
+    for j in range(where[Where.COLUMNS]):
+        state[State.COORDINATES + 2 * where[Where.DOF] + j] = 0.0
+
+
+@lean_jit
+def fill_slopes(where, state, env, model, solver):
+    """The derivatives of mass matrix, E and positions along each column."""
+    model[ContactPart.SLOPES](env, where[Where.PIECE], state, solver[Solver.SLOPES])
+
+
+@lean_jit
+def slope(solver, own, count, j, place):
+    """The derivative of one of the numbers of the contacts along column j."""
+    return solver[Solver.SLOPES][j * (own * own + count * count + count) + place]
+
+
+@lean_jit
+def lift(where, state, model, contacts, solver, j, i):
+    """The derivative of a contact's gap along column j."""
+    own, count, coordinate = where[Where.OWN], contacts.shape[0], contacts[i, ContactColumn.COORDINATE]
+    moved = slope(solver, own, count, j, own * own + count * count + i)
+    return model[ContactPart.SIGNS][i] * (state[State.COORDINATES + own * (1 + j) + coordinate] - moved)
+
+
+@lean_jit
+def lift_rate(where, state, model, contacts, j, i):
+    """The derivative of the rate of a contact's gap along column j."""
+    own, coordinate = where[Where.OWN], contacts[i, ContactColumn.COORDINATE]
+    return model[ContactPart.SIGNS][i] * state[State.COORDINATES + where[Where.DOF] + own * (1 + j) + coordinate]
+
+
+@lean_jit
+def hold_columns(where, state, contacts, solver, chosen):
+    """The columns of a coordinate at a contact in `chosen`: it is where the contact is, and, if it stays closed, at rest."""
+    own, count, dof = where[Where.OWN], contacts.shape[0], where[Where.DOF]
+    for j in range(where[Where.COLUMNS]):
+        for i in range(count):
+            if chosen >> i & 1:
+                place = State.COORDINATES + own * (1 + j) + contacts[i, ContactColumn.COORDINATE]
+                state[place] = slope(solver, own, count, j, own * own + count * count + i)
+                if contacts[i, ContactColumn.CLOSED] == 1:
+                    state[place + dof] = 0.0
+
+
+@lean_jit
+def release_columns(where, state, env, model, work, t, origin, i):
+    """Take the columns to the instant at which a reaction reaches 0."""
+    expand(where, state, env, model, work, t, origin, 1.0, 0)
+    model[ContactPart.TANGENT](EventCode.RELEASE, i, t, origin, 1.0, env, where[Where.PIECE], state)
+    move_columns(where, state, work, 1.0)
+
+
+@lean_jit
+def closing_columns(where, state, env, model, contacts, work, solver, t, origin, hit):
+    """Take the columns to the instant at which the contacts in `hit` close; returns an `ImpactDetail`."""
+    detail, first = ImpactDetail.REGULAR, State.COORDINATES + 2 * where[Where.DOF]
+    expand(where, state, env, model, work, t, origin, 1.0, 0)
+    fill_slopes(where, state, env, model, solver)
+    for j in range(where[Where.COLUMNS]):
+        known = False
+        for i in range(contacts.shape[0]):
+            if not hit >> i & 1:
+                continue
+            rate = solver[Solver.RATES][i]
+            if rate >= 0.0:
+                return ImpactDetail.NO_SPEED
+            shift = -lift(where, state, model, contacts, solver, j, i) / rate
+            if known and abs(shift - state[first + j]) > APART * (abs(shift) + abs(state[first + j])):
+                shift, detail = math.nan, ImpactDetail.APART
+            state[first + j], known = shift, True
+    move_columns(where, state, work, 1.0)
+    return detail
+
+
+@jit
+def impulse_columns(where, state, env, model, contacts, solver, acts, chosen):
+    """Differentiate an impact at which the contacts in `acts` have impulses, and those in `chosen` count in its law.
+
+    M w = S J with the jump w of the velocities, and rates after the impact of -E v-, or of 0 where `chosen` is empty:
+
+        M dw + dM w = S dJ,    (dw)_i = -dv_i - sum_j (E_ij dv_j + dE_ij v_j)  of the acting contacts, along their signs.
+
+    `solver` holds the coupling, the inverse of M, the rates before the impact (in `GAPS`) and w (in `JUMP`).
+    """
+    own, count, signs, dof = where[Where.OWN], contacts.shape[0], model[ContactPart.SIGNS], where[Where.DOF]
+    inverse, twist, right = solver[Solver.INVERSE], np.zeros(own), solver[Solver.RIGHT]
+    fill_slopes(where, state, env, model, solver)
+    for j in range(where[Where.COLUMNS]):
+        for a in range(own):  # M^-1 dM w
+            twist[a] = 0.0
+            for b in range(own):
+                for c in range(own):
+                    twist[a] += inverse[a, b] * slope(solver, own, count, j, own * b + c) * solver[Solver.JUMP][c]
+        for i in range(count):
+            right[i] = lift_rate(where, state, model, contacts, j, i) - signs[i] * twist[contacts[i, ContactColumn.COORDINATE]]
+            for k in range(count):
+                if chosen >> k & 1:
+                    right[i] += restitution(solver, own, count, i, k) * lift_rate(where, state, model, contacts, j, k)
+                    right[i] += slope(solver, own, count, j, own * own + count * i + k) * solver[Solver.GAPS][k]
+        acting(solver[Solver.COUPLING], right, count, acts, solver[Solver.BLOCK], solver[Solver.TRIED])
+        for a in range(own):
+            place = State.COORDINATES + dof + own * (1 + j) + a
+            state[place] -= twist[a]
+            for i in range(count):
+                state[place] += inverse[a, contacts[i, ContactColumn.COORDINATE]] * signs[i] * solver[Solver.TRIED][i]
+
+
+@lean_jit
+def note_velocities(where, state, solver, before):
+    """The velocities plus `before` times what was noted, into `JUMP`: those before an impact, then their jump."""
+    for a in range(where[Where.OWN]):
+        velocity = state[State.COORDINATES + where[Where.DOF] + a]
+        solver[Solver.JUMP][a] = velocity if before == 0.0 else velocity + before * solver[Solver.JUMP][a]
+
+
+@lean_jit
+def note_shifts(where, state, contacts, events, shifts, first):
+    """Note with the last event by how much it moves with each column: `shifts` from `first` on."""
+    for j in range(where[Where.COLUMNS]):
+        events[1][where[Where.EVENTS] - 1, 1 + 2 * where[Where.OWN] + contacts.shape[0] + j] = shifts[first + j]
+
+
+@lean_jit
+def pull_slopes(where, state, env, model, contacts, work, solver, t, origin):
+    """The derivatives at an event of the second derivatives of the gaps with no contact closed, into `PULL_SLOPES`.
+
+    The coordinates are to be free, and the columns those of the event.
+    """
+    own, a, first = where[Where.OWN], work[Work.ACCELERATIONS], State.COORDINATES + 2 * where[Where.DOF]
+    expand(where, state, env, model, work, t, origin, 1.0, 0)
+    move_columns(where, state, work, -1.0)
+    expand(where, state, env, model, work, t, origin, 1.0, 2)
+    for j in range(where[Where.COLUMNS]):
+        for i in range(contacts.shape[0]):
+            coordinate = contacts[i, ContactColumn.COORDINATE]
+            change = a[own * (1 + j) + coordinate, 0] + state[first + j] * a[coordinate, 1]
+            solver[Solver.PULL_SLOPES][j, i] = model[ContactPart.SIGNS][i] * change
+    move_columns(where, state, work, 1.0)
+
+
+@lean_jit
+def perturb(where, state, model, contacts, solver, j, step):
+    """Move all that the duration of an accumulation depends on by a step along column j; its sizes that are 0 stay so."""
+    own, count, signs = where[Where.OWN], contacts.shape[0], model[ContactPart.SIGNS]
+    numbers = solver[Solver.NUMBERS]
+    for i in range(count):
+        if solver[Solver.GAPS][i] != 0.0:
+            solver[Solver.GAPS][i] += step * lift(where, state, model, contacts, solver, j, i)
+        if solver[Solver.RATES][i] != 0.0:
+            solver[Solver.RATES][i] += step * lift_rate(where, state, model, contacts, j, i)
+        solver[Solver.PULLS][i] += step * solver[Solver.PULL_SLOPES][j, i]
+    for k in range(own * own + count * count):
+        numbers[k] += step * slope(solver, own, count, j, k)
+    invert(numbers, own, solver[Solver.BLOCK], solver[Solver.INVERSE])
+    for i in range(count):
+        for k in range(count):
+            entry = solver[Solver.INVERSE][contacts[i, ContactColumn.COORDINATE], contacts[k, ContactColumn.COORDINATE]]
+            solver[Solver.COUPLING][i, k] = signs[i] * signs[k] * entry
+
+
+@jit
+def accumulation_shifts(where, state, env, model, contacts, work, solver, near, t, origin):
+    """By how much the end of an accumulation moves with each column, into `HELD_SHIFTS`: that of its last impact, and the
+    difference of what is then left with its gaps, rates, accelerations and numbers moved to both sides."""
+    own, count, first = where[Where.OWN], contacts.shape[0], State.COORDINATES + 2 * where[Where.DOF]
+    fill_slopes(where, state, env, model, solver)
+    pull_slopes(where, state, env, model, contacts, work, solver, t, origin)
+    gaps, rates, pulls = solver[Solver.GAPS].copy(), solver[Solver.RATES].copy(), solver[Solver.PULLS].copy()
+    numbers = solver[Solver.NUMBERS].copy()
+    for j in range(where[Where.COLUMNS]):
+        largest = 0.0  # the largest relative change along the column
+        for i in range(count):
+            if near >> i & 1:
+                largest = max(largest, abs(solver[Solver.PULL_SLOPES][j, i] / pulls[i]))
+                if rates[i] != 0.0:
+                    largest = max(largest, abs(lift_rate(where, state, model, contacts, j, i) / rates[i]))
+                if gaps[i] != 0.0:
+                    largest = max(largest, abs(lift(where, state, model, contacts, solver, j, i) / gaps[i]))
+        for k in range(own * own + count * count):
+            largest = max(largest, abs(slope(solver, own, count, j, k)))
+        change, step = 0.0, RELATIVE_STEP / max(largest, 1e-300)
+        for sign in (1.0, -1.0):
+            perturb(where, state, model, contacts, solver, j, sign * step)
+            left = frozen_accumulation(solver, own, count, near, np.inf)
+            change += sign * (left if left >= 0.0 else math.nan)
+            solver[Solver.GAPS][:], solver[Solver.RATES][:], solver[Solver.PULLS][:] = gaps, rates, pulls
+            solver[Solver.NUMBERS][:] = numbers
+        solver[Solver.HELD_SHIFTS][j] = state[first + j] + (0.5 * change / step if largest > 0.0 else 0.0)
+    perturb(where, state, model, contacts, solver, 0, 0.0)
+
+
+@lean_jit
+def rest_columns(where, state, env, model, contacts, solver, near):
+    """The columns as an accumulation of the contacts in `near` ends: they lose their speeds by impulses on them alone."""
+    own = where[Where.OWN]
+    for a in range(own):
+        solver[Solver.JUMP][a] = 0.0
+        for i in range(contacts.shape[0]):
+            gain = solver[Solver.INVERSE][a, contacts[i, ContactColumn.COORDINATE]] * model[ContactPart.SIGNS][i]
+            solver[Solver.JUMP][a] += gain * solver[Solver.IMPULSES][i]
+    impulse_columns(where, state, env, model, contacts, solver, near, 0)
+    hold_columns(where, state, contacts, solver, near)
+
+
+@lean_jit
+def project(where, state, model, contacts, solver, closed, first, right):
+    """Add to the `own` numbers of the state from `first` on M^-1 S z, such that the gaps in `closed` lose `right`, in `right`."""
+    own, count, signs = where[Where.OWN], contacts.shape[0], model[ContactPart.SIGNS]
+    acting(solver[Solver.COUPLING], right, count, closed, solver[Solver.BLOCK], solver[Solver.TRIED])
+    for a in range(own):
+        for i in range(count):
+            gain = solver[Solver.INVERSE][a, contacts[i, ContactColumn.COORDINATE]] * signs[i]
+            state[first + a] += gain * solver[Solver.TRIED][i]
+
+
+@jit
+def fall_back(where, state, env, model, contacts, work, solver, t, origin, closed, j):
+    """Column j of a start at closed contacts, see `start_columns`."""
+    own, count, dof, right = where[Where.OWN], contacts.shape[0], where[Where.DOF], solver[Solver.RIGHT]
+    u = State.COORDINATES + own * (1 + j)
+    z, given = u + dof, state[u : u + own].copy()
+    rates = state[z : z + own].copy()
+    for i in range(count):
+        right[i] = lift(where, state, model, contacts, solver, j, i)
+    project(where, state, model, contacts, solver, closed, u, right)
+    after, lost = state[u : u + own].copy(), np.zeros(own)
+    fallen = given - after  # K h
+    for sign in (0.5, -0.5):  # the parts of a_v K h and M' K h that change with the sign: without those of parameters
+        for a in range(own):
+            state[u + a], state[z + a] = 0.0, math.copysign(1.0, sign) * fallen[a]
+        expand(where, state, env, model, work, t, origin, 1.0, 0)
+        for a in range(own):
+            lost[a] += sign * work[Work.ACCELERATIONS][own * (1 + j) + a, 0]
+            state[u + a] = math.copysign(1.0, sign) * state[State.COORDINATES + dof + a]
+        fill_slopes(where, state, env, model, solver)
+        for a in range(own):
+            for b in range(own):
+                for c in range(own):
+                    lost[a] += sign * solver[Solver.INVERSE][a, b] * slope(solver, own, count, j, own * b + c) * fallen[c]
+    for a in range(own):
+        state[u + a], state[z + a] = after[a], rates[a] - lost[a]
+    for i in range(count):
+        right[i] = lift_rate(where, state, model, contacts, j, i)
+    project(where, state, model, contacts, solver, closed, z, right)
+    fill_slopes(where, state, env, model, solver)
+
+
+@lean_jit
+def start_columns(where, state, env, model, contacts, work, solver, t, origin, closed):
+    """The columns of a motion that starts with contacts closed, to the side on which their gaps open.
+
+    A gap h falls back, and bounces, within a time of the order of sqrt(h). Whatever the impulses are, the velocities
+    y = (1 - K S') v with K = M^-1 S (S' M^-1 S)^-1 of those contacts do not see them, so that to the first order in h
+
+        u+ = u - K h,    z+ = (1 - K S') (z - a_v K h) + K' h,
+
+    where K' is the rate of K. Where impacts lose nothing motions never come to rest, and there is no derivative.
+    """
+    own, count, dof = where[Where.OWN], contacts.shape[0], where[Where.DOF]
+    fill_slopes(where, state, env, model, solver)
+    for j in range(where[Where.COLUMNS]):
+        lifted, lossless = 0.0, False
+        for i in range(count):
+            if closed >> i & 1:
+                opened = abs(lift(where, state, model, contacts, solver, j, i))
+                size = max(opened, abs(lift_rate(where, state, model, contacts, j, i)))
+                lifted = max(lifted, size)
+                lossless = lossless or (size > 0.0 and restitution(solver, own, count, i, i) >= 1.0)
+        if lifted == 0.0:
+            continue
+        place = State.COORDINATES + own * (1 + j)
+        if lossless:
+            for a in range(own):
+                state[place + a] = state[place + dof + a] = math.nan
+            continue
+        fall_back(where, state, env, model, contacts, work, solver, t, origin, closed, j)
+    hold_columns(where, state, contacts, solver, closed)
+
+
+@lean_jit
+def decide_columns(where, state, env, model, contacts, work, solver, t, origin):
+    """Take the columns on from an event, or from the start, now that it is known which contacts are closed."""
+    if where[Where.COLUMNS] == 0:
+        return
+    if where[Where.LEAVE_BY] == 1:
+        first = env[0].size - where[Where.OWN]
+        for i in range(first, env[0].size):
+            env[0][i] = 1.0
+        start_columns(where, state, env, model, contacts, work, solver, t, origin, closed_bits(contacts))
+        hold_coordinates(where, env, contacts)
+    expand(where, state, env, model, work, t, origin, 1.0, 0)
+    move_columns(where, state, work, -1.0)
+    clear_shifts(where, state)
