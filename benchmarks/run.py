@@ -19,6 +19,7 @@ from machine import about
 from peers import MODULES, PROTOTYPE, Peer, firsts, load_peers
 from plot import draw
 from report import report
+from siconos import beside_siconos
 from tasks.derivatives import derivative_cost
 from tasks.process import run_child
 from tasks.smoothed import paper_way
@@ -86,8 +87,9 @@ def main() -> None:
     write_text(RESULTS / "benchmarks.json", json.dumps(results, indent=1) + "\n")
     write_bytes(RESULTS / "benchmarks.png", draw(results))
     print(write_text(RESULTS / "benchmarks.md", report(results)).read_text())
-    if set(chosen.only) == set(MODULES):  # AUTO is a peer too, in files of its own
+    if set(chosen.only) == set(MODULES):  # AUTO and Siconos are peers too, in files of their own
         beside_auto(head, chosen.quick)
+        beside_siconos(head, chosen.quick)
 
 
 if __name__ == "__main__":  # worker processes import this file

@@ -1,0 +1,44 @@
+"""Motions of both layers by Siconos, for the Python that has it: march.py EQUATIONS TASKS ANSWERS, two files of JSON.
+
+Moreau and Jean's time stepping with theta = 1/2, Newton's method in each step, a linear complementarity problem for the impulses.
+The loop over steps is Siconos' own, in C++; seconds are processor time of that loop alone. Nothing of saltus is imported here.
+"""
+
+import json
+import sys
+import time
+
+import numpy as np
+
+import siconos.kernel as sk
+
+
+def march(equations, task):
+    """The state at the end, and the seconds of each round."""
+    seconds = []
+    for _ in range(task["rounds"]):
+        layers = sk.LagrangianDS(np.array(task["opening"]), np.array(task["velocity"]))
+        layers.setzPtr(np.array(task["numbers"]))
+        layers.setComputeMassFunction(equations, "mass")
+        layers.setComputeFIntFunction(equations, "internal")
+        layers.setComputeJacobianFIntqFunction(equations, "internal_by_opening")
+        layers.setComputeJacobianFIntqDotFunction(equations, "internal_by_velocity")
+        model = sk.NonSmoothDynamicalSystem(0.0, task["duration"])
+        model.insertDynamicalSystem(layers)
+        for row, e in zip(np.eye(2), task["e"], strict=True):
+            model.link(sk.Interaction(sk.NewtonImpactNSL(e), sk.LagrangianLinearTIR(row[None, :])), layers)
+        steps = sk.TimeDiscretisation(0.0, task["duration"] / task["steps"])
+        simulation = sk.TimeStepping(model, steps, sk.MoreauJeanOSI(0.5), sk.LCP())
+        simulation.setNewtonTolerance(1e-12)
+        simulation.setNewtonMaxIteration(20)
+        start = time.process_time()
+        simulation.run()
+        seconds.append(time.process_time() - start)
+    return {"state": [*layers.q(), *layers.velocity()], "time": simulation.startingTime(), "seconds": seconds}
+
+
+if __name__ == "__main__":
+    with open(sys.argv[2]) as tasks:
+        answers = [march(sys.argv[1], task) for task in json.load(tasks)]
+    with open(sys.argv[3], "w") as file:
+        json.dump(answers, file)
