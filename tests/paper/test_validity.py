@@ -61,3 +61,16 @@ def test_both_layers_equations_along_simulated_motions_give_the_margin_of_the_br
     assert layer["simulated"].values == pytest.approx(layer["stored"].values, abs=1e-6)
     assert layer["simulated"].values.min() < -0.5 < 0.0 < layer["simulated"].values.max()
     assert ((layer["share"].values > 0) == (layer["simulated"].values < 0)).all()
+
+
+def test_the_least_reaction_is_found_just_before_the_impact_with_which_a_period_ends():
+    """There it is -3.044, and 3 % more wherever else: a period that begins at this impact shows it at its end alone."""
+    system = under_force(0.5, amplitude=2.9794825434786647)
+    orbit = saltus.find_orbit(system, theta=-0.14184655319090936, velocity=0.70495487203407, period=2)
+    theta, velocity = orbit.motion().at(4 * np.pi)  # a forcing period later
+    later = saltus.find_orbit(system, theta=theta, velocity=velocity, period=2)
+    value = system.get(AMPLITUDE)
+    found = saltus.continue_orbit(later, AMPLITUDE, (value - 1e-4, value + 1e-4))
+    layer = closed_layer(xr.DataTree.from_dict({"/": xr.Dataset(attrs={"bounds": [2.0, 4.0]}), "branch_000": found.to_xarray()}))
+    assert layer["stored"].values == pytest.approx(-3.0444, abs=1e-3)
+    assert layer["simulated"].values == pytest.approx(layer["stored"].values, rel=1e-6)

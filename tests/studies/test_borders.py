@@ -236,6 +236,22 @@ def test_a_motion_that_goes_on_is_told_with_its_state():
     assert orbit.amplitude == pytest.approx(found["last"]["amplitude"], rel=1e-7)
 
 
+def test_a_motion_that_more_than_doubles_between_two_cells_is_followed_to_its_end_by_short_steps():
+    """At Omega = 0.75, from V = -0.32 to -0.30: continuation of the orbit says where it goes."""
+    here = forced(0.075, 0.75).with_({V: -0.32})
+    orbit = find_orbit(here, theta=-0.00157792, velocity=0.04253646)
+    there = follow_stable(orbit, V, -0.30).points[-1]
+    assert there.parameter == -0.30
+    assert there.orbit.amplitude > 2 * orbit.amplitude
+    motion = np.zeros(1, MOTION)
+    motion["state"], motion["period"], motion["impact_count"] = orbit.state, 1, 2
+    motion["amplitude"] = motion["other"] = orbit.amplitude
+    start, end = ({H: np.array([0.075]), V: np.array([value])} for value in (-0.32, -0.30))
+    (found,) = trace(Ways(here, start, end, motion, periods=180, max_period=6, tol=1e-10), 1e-3)
+    assert ChangeOutcome(found["outcome"]) is ChangeOutcome.MISSED
+    assert found["last"]["amplitude"] == pytest.approx(there.orbit.amplitude, rel=1e-6)
+
+
 def test_a_motion_that_goes_on_into_a_cell_that_has_it_changes_nothing():
     whole, found = completed()
     kinds = {ChangeOutcome(int(ending["outcome"])) for ending in found.endings.values()}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,7 @@ class ClosedLayerSettings:
 
     motions: int = 12  # The number of stable motions of a diagram, spread evenly over its branches' points.
     instants: int = 4000  # The number of instants of an orbit's period at which the reaction is evaluated.
-    beside: float = 1e-9  # And as long before and after each impact, where it is often least, as a share of the period.
+    beside: float = 1e-9  # And as long after the beginning and before the end of each arc, where it is often least, as a share.
 
 
 SETTINGS = ClosedLayerSettings()
@@ -39,38 +41,62 @@ def closed_layer(spectrum: Any) -> Any:
         for i in np.flatnonzero((branch["stable"].values == 1) & within(spectrum, branch))
     ]
     chosen = [stable[k] for k in np.linspace(0, len(stable) - 1, min(SETTINGS.motions, len(stable))).astype(int)]
-    reactions = [_reaction(orbits_of(branch.isel(point=[i]))[0]) for branch, i in chosen]
+    found = [_Reaction(orbits_of(branch.isel(point=[i]))[0]) for branch, i in chosen]
     stored = np.array([float(branch["margin_reaction"][i]) for branch, i in chosen])
     return dataset(
         {
             "parameter": ("motion", np.array([float(branch["parameter"][i]) for branch, i in chosen]), "1", "of the diagram"),
             "stored": ("motion", stored, "1", "least reaction, as the branch holds it"),
-            "simulated": ("motion", np.array([r.min() for r in reactions]), "1", "least reaction along the simulated motion"),
-            "share": ("motion", np.array([(r[: SETTINGS.instants] < 0).mean() for r in reactions]), "1", "of time, below 0"),
+            "simulated": ("motion", np.array([one.least for one in found]), "1", "least reaction along the simulated motion"),
+            "share": ("motion", np.array([one.share for one in found]), "1", "of time, below 0"),
         },
         what="reaction of the closed layer in some stable motions",
     )
 
 
-def _reaction(orbit: PeriodicOrbit) -> np.ndarray:
-    """-R2 while the lower layer is open, else R1, along a simulated period: at even instants, then just beside impacts."""
-    model: Any = orbit.system.model
-    load = orbit.system.load
-    both = TwoLayer(
-        beta0=model.beta0,
-        damping=model.damping,
-        stiffness_ratio=model.stiffness_ratio,
-        mass_ratio=model.mass_ratio,
-        dissipation_ratio=model.dissipation_ratio,
-    )
-    motion = orbit.motion()
-    even = motion.start + orbit.duration * (np.arange(SETTINGS.instants) + 0.5) / SETTINGS.instants
-    beside = (motion.impacts.time + SETTINGS.beside * orbit.duration * np.array([[-1], [1]])).ravel()
-    times = np.concatenate([even, beside[(beside > motion.start) & (beside < motion.start + orbit.duration)]])
-    theta, velocity = (np.asarray(state, dtype=float) for state in motion.at(times))
-    side = np.sign(theta)
-    acceleration = model.acceleration(times, theta, velocity, side, load)
-    lower, upper = side > 0, side < 0
-    angles, rates, seconds = ((np.where(lower, x, 0.0), np.where(upper, x, 0.0)) for x in (theta, velocity, acceleration))
-    first, second = both.constraint_reactions(times, angles, rates, seconds, load)
-    return np.asarray(np.where(lower, -second, first))
+class _Reaction:
+    """-R2 while the lower layer is open, else R1, along a simulated period of an orbit."""
+
+    def __init__(self, orbit: PeriodicOrbit) -> None:
+        model: Any = orbit.system.model
+        names = ("beta0", "damping", "stiffness_ratio", "mass_ratio", "dissipation_ratio")
+        self.both = TwoLayer(**{name: getattr(model, name) for name in names})
+        self.orbit, self.motion = orbit, orbit.motion()
+
+    @property
+    def share(self) -> float:
+        """The share of the period in which it is below 0."""
+        instants = (np.arange(SETTINGS.instants) + 0.5) / SETTINGS.instants
+        return float((self.at(self.motion.start + self.orbit.duration * instants) < 0).mean())
+
+    @property
+    def least(self) -> float:
+        """Its least value: of all arcs, their ends among them, between neighbouring instants by minimisation."""
+        from scipy.optimize import minimize_scalar
+
+        motion, duration = self.motion, self.orbit.duration
+        last = motion.start + duration
+        bounds = np.unique(np.clip([motion.start, *motion.impacts.time, last], motion.start, last))
+        best, inset = np.inf, SETTINGS.beside * duration
+        for begin, end in pairwise(bounds):
+            if end - begin <= 4 * inset:
+                continue
+            number = max(3, math.ceil(SETTINGS.instants * (end - begin) / duration))
+            times = np.linspace(begin + inset, end - inset, number)
+            values = self.at(times)
+            k = int(values.argmin())
+            around = (times[max(k - 1, 0)], times[min(k + 1, number - 1)])
+            refined = minimize_scalar(lambda t: float(self.at(np.array([t]))[0]), bounds=around, method="bounded")
+            best = min(best, float(values[k]), float(refined.fun))
+        return best
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """The reaction at some times, from both rows of `eomnl`."""
+        load = self.orbit.system.load
+        theta, velocity = (np.asarray(state, dtype=float) for state in self.motion.at(times))
+        side = np.sign(theta)
+        acceleration = self.orbit.system.model.acceleration(times, theta, velocity, side, load)
+        lower, upper = side > 0, side < 0
+        angles, rates, seconds = ((np.where(lower, x, 0.0), np.where(upper, x, 0.0)) for x in (theta, velocity, acceleration))
+        first, second = self.both.constraint_reactions(times, angles, rates, seconds, load)
+        return np.asarray(np.where(lower, -second, first))

@@ -78,7 +78,10 @@ class TraceSettings:
     # From its own cell a motion starts without a second state to head on from, so that its basin is missed sooner: it is lost
     # there only from so near.
     first_halvings: int = 10
-    rounds: int = 24  # Steps of a motion: more than this takes but where it is lost from afar and found again from near, often.
+    # Steps of a motion: far more than most take. Where its size changes much between two cells, steps are short, and many.
+    rounds: int = 200
+    # A motion that is found again where it was lost from farther away is looked for within so many times the step that led there.
+    stride: float = 4.0
     stages: tuple[float, ...] = (1 / 20, 9 / 20)  # Shares of the forcing periods after which what is lost is not followed on.
     # States a number of periods apart that are as near as this share of the amplitude are of one motion that settles slowly, as
     # it does beside its special point.
@@ -170,7 +173,8 @@ def trace(ways: Ways, least: float) -> np.ndarray:
         going[on] = (trial[on] < 1.0) & (last["amplitude"][on] >= least)
         near = 0.5 ** np.where(last["share"] > 0.0, SETTINGS.halvings, SETTINGS.first_halvings)
         following[lost], going[lost] = found[~same], trial[lost] - last["share"][lost] > near[lost]
-        high[on], high[lost] = np.where(trial[on] < high[on], high[on], 1.0), trial[lost]
+        farther = np.minimum(last["share"] + SETTINGS.stride * (last["share"] - before["share"]), 1.0)
+        high[on], high[lost] = np.where(trial[on] < high[on], high[on], farther[on]), trial[lost]
         trial = np.where(high - last["share"] > near, 0.5 * (last["share"] + high), high)
     _wait(ways, result)
     result["outcome"] = np.where(going, ChangeOutcome.UNKNOWN, _outcomes(last, following, least))
