@@ -1,4 +1,4 @@
-"""Errata 35 to 38: what is printed fails, and holds as corrected, by two kinds of evidence that can each fail."""
+"""Errata 35 to 39: what is printed fails, and holds as corrected, by two kinds of evidence that can each fail."""
 
 import math
 
@@ -111,6 +111,39 @@ def test_erratum_37_motions_outside_the_printed_ranges_are_chaotic_by_another_in
 
 def test_the_exponent_of_a_periodic_motion_by_the_other_integrator_is_negative():
     assert exponent(0.6, 0.5, (0.8, 0.1), periods=40) < -0.01
+
+
+# --- erratum 39 ------------------------------------------------------------------------------------------------------------
+
+
+def followed(amplitude, state, periods):
+    """At Omega = 1, by SciPy from impact to impact: the states after each period, and the least speed of an impact and the least
+    abs(theta) of a turning point on the way."""
+    states, slowest, nearest = [np.array(state)], np.inf, np.inf
+    for _ in range(periods):
+        _, theta, velocity = crossings(*states[-1], 2 * math.pi, 1.0, amplitude, -0.5, 0.1)
+        touches = np.flatnonzero(theta[1:] == 0.0) + 1
+        turns = np.flatnonzero(velocity[1:] * velocity[:-1] < 0.0)
+        slowest = min(slowest, float(np.abs(velocity[touches]).min(initial=np.inf)))
+        nearest = min(nearest, float(np.abs(theta[turns]).min(initial=np.inf)))
+        states.append(np.array([theta[-1], velocity[-1]]))
+    return np.array(states), slowest, nearest
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "state", "period"),
+    [(1.7495, (-0.772341, -1.761583), 4), (1.7515, (0.527813, -1.829018), 8), (1.7522, (0.680624, -1.616595), 16)],
+)
+def test_erratum_39_the_first_chaos_at_the_primary_resonance_comes_by_doublings_without_grazing(amplitude, state, period):
+    """Periods 4, 8 and 16 up to Hhat = 1.7526, and chaos beyond it, in which no impact is slow and no turn near the contact."""
+    states, slowest, nearest = followed(amplitude, state, period)
+    assert np.abs(states[-1] - states[0]).max() < 1e-4
+    assert np.abs(states[period // 2] - states[0]).max() > 1e-3  # none of half the period
+    assert (slowest > 1.4, nearest > 0.5) == (True, True)
+    if period == 16:
+        assert exponent(1.0, 1.76, (0.717795, -1.604636)) > 0.05
+        _, slowest, nearest = followed(1.76, (0.717795, -1.604636), 60)
+        assert (slowest > 1.0, nearest > 0.3) == (True, True)
 
 
 # --- erratum 38 ------------------------------------------------------------------------------------------------------------

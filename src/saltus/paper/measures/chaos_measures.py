@@ -33,7 +33,7 @@ class ChaosCriteria:
 
 
 CRITERIA = ChaosCriteria()
-ROUTES = ("cascade", "grazing")  # the kinds of edges of bands by which the paper sees chaos reached
+EDGES = ("cascade", "grazing", "fold", "crisis", "bound")  # the kinds of edges of bands that are known; the paper names two
 
 
 def bands_of(spectrum: Any) -> list[dict[str, float]]:
@@ -149,17 +149,26 @@ def force_diagrams(panels: Panels) -> dict[str, Measured | None]:
 
 
 def _route(panels: Panels) -> Measured:
-    """Whether in every panel chaos is reached at the edge of a band by a cascade, and at another by a grazing."""
-    holds, rows = [], []
+    """As printed: in every panel chaos is reached by cascades and by grazings. Erratum 39: in one of them by cascades alone, as
+    far as it is known what happens at the edges of its bands."""
+    rows = []
     for frequency, tree in panels.items():
         born = [branch for _, branch in branches_of(tree) if "PD" in branch.attrs["end_kinds"]]
         periods = sorted({int(branch["period"][0]) for branch in born})
         edges = [str(kind) for edge in ("low_edge", "high_edge") for kind in tree["bands"][edge].values]
-        number = {kind: edges.count(kind) for kind in ROUTES}
-        holds.append(all(number.values()))
-        others = len(edges) - sum(number.values())
-        rows.append({"frequency": frequency, "others": others, "periods": [{"period": q} for q in periods], **number})
-    return measured(bool(holds) and all(holds), bool(holds) and all(row["cascade"] for row in rows), panels=rows)
+        number = {kind: edges.count(kind) for kind in EDGES}
+        rows.append(
+            {
+                "frequency": frequency,
+                "unknown": len(edges) - sum(number.values()),
+                "periods": [{"period": q} for q in periods],
+                "grazings": count(tree, "GR"),
+                **number,
+            }
+        )
+    cascades = bool(rows) and all(row["cascade"] for row in rows)
+    grazes = [bool(row["grazing"]) for row in rows]
+    return measured(cascades and all(grazes), cascades and any(grazes) and not all(grazes), panels=rows)
 
 
 def two_regions(panels: Panels) -> Measured:

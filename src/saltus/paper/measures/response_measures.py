@@ -100,23 +100,23 @@ def _knots_appear(panels: Panels) -> Measured:
     return measured(holds, panels=[*low, *middle])
 
 
-def _primary_resonance(spectrum: Any) -> dict[str, int]:
+def _primary_resonance(spectrum: Any) -> dict[str, Any]:
     branch = main_branch(spectrum)
     start = 2 / 3 * float(branch["parameter"][int(np.argmax(branch["amplitude"].values))])
-    place = branch["parameter"].values
-    beyond = place > start
-    unstable = int(((branch["stable"].values == 0) & beyond & ~_invisible(branch)).sum())
-    return {"knots": int((spectrum["knots"]["parameter"].values > start).sum()), "unstable": unstable}
+    parts = [(points, width) for points, width in _unstable_parts(branch) if branch["parameter"].values[points].max() > start]
+    seen = [points for points, width in parts if width >= CRITERIA.invisible]
+    return {
+        "knots": int((spectrum["knots"]["parameter"].values > start).sum()),
+        "unstable": int(sum((branch["parameter"].values[points] > start).sum() for points in seen)),
+        "hidden": [{"width": width} for _, width in parts if width < CRITERIA.invisible],
+    }
 
 
-def _invisible(branch: Any) -> np.ndarray:
-    """Which points lie on an unstable part that no picture shows: its ends are less than `CRITERIA.invisible` apart, (point,)."""
+def _unstable_parts(branch: Any) -> list[tuple[np.ndarray, float]]:
+    """The points of each unstable part of a branch, and the range of the parameter between the stable points about it."""
     place, unstable = branch["parameter"].values, branch["stable"].values == 0
     runs = np.split(np.arange(len(place)), np.flatnonzero(np.diff(unstable)) + 1)
-    narrow = [run for run in runs if np.ptp(place[max(run[0] - 1, 0) : run[-1] + 2]) < CRITERIA.invisible]
-    chosen = np.zeros(len(place), dtype=bool)
-    chosen[[i for run in narrow for i in run]] = True
-    return chosen & unstable
+    return [(run, float(np.ptp(place[max(run[0] - 1, 0) : run[-1] + 2]))) for run in runs if unstable[run[0]]]
 
 
 def _knots_differ(panels: Panels) -> Measured:
