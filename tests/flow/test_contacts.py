@@ -46,6 +46,9 @@ def random_case(i):
     """A system and a state of which something is asked at random; the seed is the case's number."""
     rng = np.random.default_rng(i)
     e = rng.uniform(0, 0.9, 2) * (rng.random(2) < 0.7)
+    extreme = np.random.default_rng([i, 1]).uniform(0, 1, (2, 2))  # in every fourth case e up to 1, or 1
+    if i % 4 == 1:
+        e = np.where(extreme[0] < 0.3, 1.0, extreme[1])
     system = layers(
         e=tuple(e),
         V=rng.uniform(-1.5, 0.3),
@@ -180,7 +183,50 @@ def test_random_motions_are_complementary_and_keep_the_balances():
 
 @pytest.mark.thorough
 def test_ten_thousand_random_motions_are_complementary_and_keep_the_balances():
-    assert sum(check_case(i) > 0 for i in range(10_000)) > 6000
+    """But for the few that bounce without loss on a contact which is pressed ever harder: these are refused by its name."""
+    impacts = refused = 0
+    for i in range(10_000):
+        try:
+            impacts += check_case(i) > 0
+        except MotionError as error:
+            assert "(e = 1)" in str(error) and i % 4 == 1
+            refused += 1
+    assert impacts > 6000
+    assert refused < 150
+
+
+def test_an_accumulation_on_each_layer_within_one_on_both_comes_to_rest_when_all_of_it_is_over():
+    """Each layer bounces to rest while the other one is in the air, and again: case 510. Asked twice, from two instants of it."""
+    system, x, v = random_case(510)
+    whole = moved(system, x, v, 7.0, tol=1e-12)
+    rest = next(event.time for event in whole.events if event.kind == EventKind.REST)
+    part = moved(system, x, v, rest - 5e-6, tol=1e-12)
+    assert len(part.impacts) > 400
+    rest_of_it = saltus.simulate(system, theta=part.position, velocity=part.velocity, time=part.time, duration=1.0, tol=1e-14)
+    assert next(event.time for event in rest_of_it.events if event.kind == EventKind.REST) == pytest.approx(rest, abs=1e-9)
+
+
+def test_impacts_in_turn_within_one_instant_end_though_the_gaps_vanish_as_squares():
+    """Case 9215: each pair of impacts squares the gap and leaves a quarter of the speed; the last gaps are no numbers any more."""
+    system, x, v = random_case(9215)
+    motion = moved(system, x, v, 3.0, tol=1e-10)
+    held = next(event for event in motion.events if event.kind == EventKind.HELD)
+    assert held.contact == "both"
+    same = [event for event in motion.events.of(EventKind.IMPACT) if abs(event.time - held.time) < 1e-12]
+    speeds = np.array([event.velocity_before[1] for event in same if event.contact == "upper"])
+    model, e = system.model, system.impact.e[1]
+    left = (
+        math.cos(2 * model.beta0) ** 2 * (1 + e) / (1 + model.mass_ratio) - e
+    )  # from upper to lower, which keeps nothing, and back
+    np.testing.assert_allclose(speeds[2:] / speeds[1:-1], left, rtol=1e-9)
+    assert check_case(9215) > 20
+
+
+def test_bouncing_without_loss_a_million_times_a_unit_of_time_is_refused_at_once_with_the_contact():
+    """Below 45 degrees the impulse on the upper layer presses the lower one: nothing of a bounce is lost."""
+    system = layers(e=(0.5, 1.0), V=-0.5, beta0=math.radians(40))
+    with pytest.raises(MotionError, match=r"more than 20000 impacts at 'upper' \(e = 1\)"):
+        moved(system, (0.0, 1e-15), (0.0, 0.0), 5.0)
 
 
 def test_impacts_that_get_smaller_end_in_rest_at_the_time_that_their_sum_has():

@@ -10,6 +10,7 @@ from saltus.errors import MotionError
 from saltus.flow.contacts.contact_events import ContactEvents
 from saltus.flow.dense_output import DenseOutput
 from saltus.flow.kernel_layout import Where
+from saltus.flow.memory_layout import EventCode
 from saltus.flow.motion import MotionEvents, Samples
 from saltus.flow.request import MotionRequest
 from saltus.flow.validity import Validity, ValidityCheck
@@ -22,6 +23,7 @@ class RecorderSettings:
     steps: int = 10_000_000  # The largest number of steps of a motion that is kept whole; they take about 2 GB.
     events: int = 20_000_000  # The largest number of events that are kept.
     rate: int = 1_000_000  # The most impacts in a unit of time: more are an accumulation that is not being resolved.
+    burst: int = 20_000  # The impacts at several contacts over which that rate is looked for: each takes a pass of the kernel.
     buffer: int = 4096  # The steps, and events, that one call of the kernel may record.
 
 
@@ -79,6 +81,12 @@ class Recorder:
         times = self._times[self._next : stop]
         self._samples.append((times, *piece.states(times)))
         self._next = max(stop, self._next)
+
+    def last_hit(self) -> list[int]:
+        """The contacts, by number, that the impacts in the last buffer closed."""
+        labels = self._events[-1][0]
+        bits = np.bitwise_or.reduce(labels[labels[:, 1] == EventCode.IMPACT, 2], initial=0)
+        return [i for i in range(len(self._contacts)) if bits >> i & 1]
 
     def all_events(self) -> MotionEvents:
         """Everything that happened."""

@@ -95,7 +95,8 @@ def follow(request: MotionRequest, progress: Progress) -> Followed:
 def _advance(system: System, run: Program, now: KernelState, recorder: Recorder, progress: Progress) -> int:
     """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended."""
     begin, end = now.time, now.end_time
-    checked_at, counted, unit = begin, 0, min(now.settings[Setting.LENGTH] or 1.0, 1.0)
+    many = MOST.burst if system.model.contacts else MOST.rate
+    checked_at, counted, unit = begin, 0, min(now.settings[Setting.LENGTH] or 1.0, 1.0) * many / MOST.rate
     progress(0.0, WHAT)
     while True:
         status = now.advance(run, recorder.steps, recorder.events)
@@ -106,11 +107,11 @@ def _advance(system: System, run: Program, now: KernelState, recorder: Recorder,
         if status not in (Status.FULL, Status.PAUSED):
             _refuse(system, status, now)
             return status
-        if recorder.total > counted + MOST.rate:
+        if recorder.total > counted + many:
             if time < checked_at + unit:
                 raise MotionError(
-                    f"more than {MOST.rate} impacts from time {checked_at:.6g} to {time:.6g}: they accumulate too slowly "
-                    "to be followed; raise the loss at impact, or ask for a shorter time"
+                    f"more than {many} impacts{_at_contacts(system, recorder)} from time {checked_at:.6g} to {time:.6g}: they "
+                    "accumulate too slowly to be followed; raise the loss at impact, or ask for a shorter time"
                 )
             checked_at, counted = time, recorder.total
         if recorder.total > MOST.events:
@@ -118,6 +119,14 @@ def _advance(system: System, run: Program, now: KernelState, recorder: Recorder,
                 f"more than {MOST.events} impacts before time {time:.6g}, too many to be kept; ask for a shorter time, or use "
                 "simulate_many, which only counts them"
             )
+
+
+def _at_contacts(system: System, recorder: Recorder) -> str:
+    """Where the last impacts were, and what the law leaves of a speed there; empty for a model with one contact."""
+    if not system.model.contacts:
+        return ""
+    matrix, hit = system.impact.restitution_matrix(system.model), recorder.last_hit()
+    return " at " + " and ".join(f"{system.model.contacts[i].name!r} (e = {float(matrix[i][i]):g})" for i in hit)
 
 
 def _refuse(system: System, status: int, now: KernelState) -> None:

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, complementary, invert
-from saltus.flow.contacts.contact_layout import MOST_IMPACTS, VANISHED, ContactColumn, ContactPart, Solver
+from saltus.flow.contacts.contact_layout import FINISHED, MOST_IMPACTS, VANISHED, ContactColumn, ContactPart, Solver
 from saltus.flow.kernel_layout import CHATTER_SPEED, SLOW, Where
 from saltus.flow.memory_layout import State
 from saltus.taylor import jit, lean_jit
@@ -228,7 +228,12 @@ def closed_pulls(solver, own, count, near, b, x, u, pull):
 
 @lean_jit
 def time_to_close(x, u, a):
-    """When x + u t + a t^2 / 2 falls to 0 from above, t > 0; infinite if it never does."""
+    """When x + u t + a t^2 / 2 falls to 0 from above; infinite if it never does.
+
+    A gap of 0 that closes is one that was too small for a number: impacts that let it shrink by its square each time do that.
+    """
+    if x == 0.0 and u < 0.0:
+        return 0.0
     if x == 0.0:
         return -2.0 * u / a if a < 0.0 and u > 0.0 else np.inf
     square = u * u - 2.0 * a * x
@@ -239,9 +244,10 @@ def time_to_close(x, u, a):
 
 @lean_jit
 def frozen_accumulation(solver, own, count, near, limit):
-    """The time in which the contacts in `near` come to rest if their accelerations stay as they are; -1 if that takes longer.
+    """The time in which the contacts in `near` lose all speed if their accelerations stay as they are.
 
-    Between its impacts each gap then moves on a parabola. No other contact may close meanwhile.
+    Between its impacts each gap then moves on a parabola. No other contact may close meanwhile. Less than 0 if they do not lose
+    it within `limit`: minus the number of impacts that were followed. Which of them stay closed is decided afterwards.
     """
     time, first, b, pull = 0.0, 0.0, solver[Solver.PULLS], solver[Solver.FALLING_PULLS]
     x, u = solver[Solver.FALLING_GAPS], solver[Solver.FALLING_RATES]
@@ -250,17 +256,17 @@ def frozen_accumulation(solver, own, count, near, limit):
         if not near >> i & 1:
             limit = min(limit, 0.1 * time_to_close(x[i], u[i], b[i]))
         first = max(first, abs(u[i]) if near >> i & 1 else 0.0)
-    for _ in range(MOST_IMPACTS):
+    for followed in range(MOST_IMPACTS):
         still = closed_pulls(solver, own, count, near, b, x, u, pull)
         flight = np.inf
         for i in range(count):
             if near >> i & 1 and not (still >> i & 1 and pull[i] <= 0.0):
                 flight = min(flight, time_to_close(x[i], u[i], pull[i]))
         if flight == np.inf:
-            return time if still == near and max_rate(u, pull, near, still, count) == 0.0 else -1.0
+            return time if still == near and max_rate(u, pull, near, still, count) == 0.0 else -1.0 - followed
         time += flight
         if not time <= limit:
-            return -1.0
+            return -1.0 - followed
         height, hit = 0.0, still
         for i in range(count):
             if near >> i & 1:
@@ -271,11 +277,16 @@ def frozen_accumulation(solver, own, count, near, limit):
                 if x[i] <= 1e-12 * height and u[i] < 0.0:
                     x[i], hit = 0.0, hit | 1 << i
         if impact_impulses(solver, own, count, hit, u) < 0:
-            return -1.0
+            return -1.0 - followed
+        done = True
         for i in range(count):
             if x[i] == 0.0 and u[i] <= VANISHED * first:
                 u[i] = 0.0
-    return -1.0
+            if near >> i & 1 and u[i] * u[i] + 2.0 * abs(b[i]) * x[i] > (FINISHED * first) ** 2:
+                done = False
+        if done:
+            return time
+    return -1.0 * MOST_IMPACTS
 
 
 @lean_jit

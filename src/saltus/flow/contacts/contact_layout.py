@@ -12,6 +12,7 @@ class ContactColumn(IntEnum):
     CLOSED = 1  # whether it does: its gap and the gap's rate are then exactly 0
     SKIP = 2  # of its guard, how many of the first Taylor coefficients are known to be 0 at the start of a step
     RELEASED = 3  # 1 where its reaction has just reached 0 from above, so that it is known to be 0
+    WAITS = 4  # how many of its impacts are left until it is asked again whether an accumulation ends soon
 
 
 class ContactPart(IntEnum):
@@ -65,4 +66,7 @@ VIOLATED = 1e-12  # The largest share of its right-hand side by which a compleme
 MOST_IMPACTS = 100_000  # that an accumulation is followed for: e = 0.9996 needs so many for 16 digits
 APART = 1e-9  # Contacts close together in motions beside one if the derivatives of their instants differ by less than this share.
 RELATIVE_STEP = 1e-4  # of differences of an accumulation's duration: their error is its square, and 1e-12 by rounding
-VANISHED = 1e-16  # Impacts that are slower than the first one of an accumulation by this factor end it.
+VANISHED = 1e-16  # A contact whose impacts are slower than the first one of an accumulation by this factor rests.
+FINISHED = 1e-14  # All that is slower than that by this factor is over: accumulations of one contact within those of another
+# are cut off at VANISHED, and near that scale the cuts would keep the other one going.
+TRIED_AGAIN = 32  # Of the impacts that were followed ahead in vain, one in so many has to come before they are followed again.

@@ -32,7 +32,7 @@ from saltus.flow.contacts.contact_impacts import (
     smaller_set,
     solver_arrays,
 )
-from saltus.flow.contacts.contact_layout import NEAR, ROUNDING, ContactColumn, ContactPart, ImpactDetail, Solver
+from saltus.flow.contacts.contact_layout import NEAR, ROUNDING, TRIED_AGAIN, ContactColumn, ContactPart, ImpactDetail, Solver
 from saltus.flow.contacts.contact_tangent import (
     accumulation_shifts,
     closing_columns,
@@ -171,11 +171,13 @@ def end_accumulation_of(where, state, settings, env, model, contacts, work, solv
     count, own, tol = contacts.shape[0], where[Where.OWN], settings[Setting.TOLERANCE]
     if not couple(where, state, env, model, contacts, solver):
         return t
-    slowest = np.inf
+    slowest, last = slow_impacts(tol), -1
     for i in range(count):
-        if solver[Solver.RATES][i] > 0.0 and solver[Solver.GAPS][i] == 0.0:
-            slowest = min(slowest, solver[Solver.RATES][i])
-    if slowest > slow_impacts(tol):
+        if 0.0 < solver[Solver.RATES][i] <= slowest and solver[Solver.GAPS][i] == 0.0:
+            slowest, last = solver[Solver.RATES][i], i
+    if last < 0 or contacts[last, ContactColumn.WAITS] > 0:
+        if last >= 0:
+            contacts[last, ContactColumn.WAITS] -= 1
         return t
     change = free_pulls(where, state, env, model, contacts, work, solver, t, origin)
     near = near_contacts(solver, count, slow_impacts(tol))
@@ -185,10 +187,12 @@ def end_accumulation_of(where, state, settings, env, model, contacts, work, solv
     left, moving = frozen_accumulation(solver, own, count, near, limit), 0
     if left < 0.0:
         near = smaller_set(solver, contacts, near)
-        left = frozen_accumulation(solver, own, count, near, limit) if near > 0 else -1.0
+        again = frozen_accumulation(solver, own, count, near, limit) if near > 0 else -1.0
+        left = again if again >= 0.0 else left + again
     for i in range(count):
         moving |= (1 << i) if near >> i & 1 and solver[Solver.RATES][i] != 0.0 else 0
     if left < 0.0:
+        contacts[last, ContactColumn.WAITS] = int(-left) // TRIED_AGAIN
         return t
     record_contact_event(where, state, contacts, events, EventCode.HELD, moving, t + left)
     if where[Where.COLUMNS] > 0:
