@@ -67,7 +67,8 @@ def test_diagrams_tell_their_folds(saltus, study, tmp_path):
     # the project's reference, from two independent codes: folds at Hhat = 0.5
     for fold in ("0.848485", "0.908811"):
         assert f"LP {fold}" in result.stdout
-    assert files(tmp_path / "out") == [f"response_spectrum.{end}" for end in ("nc", "pdf", "png")]
+    assert files(tmp_path / "out") == [f"response_spectrum.{end}" for end in ("nc", "pdf", "png", "zarr")]
+    assert status(tmp_path / "out" / "response_spectrum.zarr").complete
     tree = xarray.open_datatree(tmp_path / "out" / "response_spectrum.nc", engine="h5netcdf")
     assert tree.attrs["kind"] == "response_spectrum"
     tree.close()
@@ -245,9 +246,7 @@ def test_an_interrupted_chart_goes_on_where_it_was(started, saltus, study, tmp_p
     np.testing.assert_array_equal(open_store(store)["amplitude"], whole["amplitude"])
 
 
-@pytest.mark.parametrize(
-    "asks", ["[response_spectrum]\nstarts = 200\n", "[attractors]\nstarts = 1000000\n", "[phase_portrait]\nduration = 1e5\n"]
-)
+@pytest.mark.parametrize("asks", ["[attractors]\nstarts = 1000000\n", "[phase_portrait]\nduration = 1e5\n"])
 def test_an_interrupt_leaves_nothing_half_written(started, study, tmp_path, asks):
     text = CONSTANT if "portrait" in asks else FORCED
     command = [sys.executable, "-m", "saltus", "run", study(text + asks), "-o", tmp_path / "out"]
@@ -259,6 +258,23 @@ def test_an_interrupt_leaves_nothing_half_written(started, study, tmp_path, asks
     assert process.returncode == 130
     assert err.splitlines()[-1] == "saltus: interrupted; no file was left half-written"
     assert not (tmp_path / "out").exists()
+
+
+def test_an_interrupted_diagram_says_that_its_store_keeps_its_parts(started, study, tmp_path):
+    asks = FORCED + "[response_spectrum]\nstarts = 200\n"
+    process = started(
+        [sys.executable, "-m", "saltus", "run", study(asks), "-o", tmp_path / "out"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    while "searching" not in process.stderr.readline():
+        pass
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.splitlines()[-1].endswith("response_spectrum.zarr keeps its parts: run the same again to go on")
+    assert not status(tmp_path / "out" / "response_spectrum.zarr").complete
 
 
 def test_a_cluster_computes_the_same_chart(saltus, study, tmp_path):

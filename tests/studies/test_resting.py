@@ -12,6 +12,7 @@ from saltus.branch_tables import branches_of
 from saltus.orbits import orbits_of
 from saltus.studies import bifurcation_diagram
 from saltus.studies.diagram.diagram_dataset import confirmed
+from saltus.studies.diagram.diagram_work import DiagramWork
 
 SLOW = forced(H=0.15, W=0.2, e=0.3)
 CRITICAL = 0.5 / math.tan(math.radians(80))  # Hcr: below it the load does not pull the contact open
@@ -41,7 +42,7 @@ def test_a_family_that_rests_comes_back_bit_for_bit(tmp_path):
 
 def test_a_family_that_rests_is_confirmed_over_its_whole_period():
     """The release alone is the same for every orbit: that of another amplitude starts there too, and moves otherwise."""
-    (data,) = confirmed([family()])
+    (data,) = confirmed([family()], DiagramWork(SLOW, AMPLITUDE))
     assert data["stable"].all()
     assert data["defect"].max() < 1e-10
     assert data["kept"].max() < 1e-8

@@ -94,18 +94,18 @@ def run(
     plot: Annotated[bool, typer.Option(help="Draw what is computed.")] = True,
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786, for charts and basins."),
+        typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786, for diagrams, charts and basins."),
     ] = None,
     fresh: Annotated[
-        bool, typer.Option("--fresh", help="Begin anew where a chart or basins of another study, model or version are.")
+        bool, typer.Option("--fresh", help="Begin anew where a diagram, chart or basins of another study, model or version are.")
     ] = False,
 ) -> None:
     r"""Answer all that a study asks: a motion, a diagram, a chart, basins, ...
 
     The study's tables say what: \[simulate], \[phase_portrait],
     \[response_spectrum], \[bifurcation_diagram], \[attractors], \[basins],
-    \[stability_chart]. All is checked before anything is computed. A chart,
-    or basins, that were stopped go on where they were. A model of your own is
+    \[stability_chart]. All is checked before anything is computed. Diagrams,
+    charts and basins that were stopped go on where they were. A model of your own is
     Python code, and is run.
 
     Example: [cyan]saltus run study.toml --output runs/first[/]

@@ -10,6 +10,8 @@ from rich.console import Console
 
 from saltus.errors import ParameterError, SaltusError
 
+PARTIAL = {"basin_cells": "the cells of basins", "diagram": "the parts of a diagram"}  # what stores keep beside a netCDF file
+
 
 def plot_store(path: Path, output: Path | None) -> None:
     """Draw the result at `path` (netCDF, or the Zarr store of a sweep) beside it, or into the folder `output`.
@@ -88,8 +90,8 @@ def _open_store(path: Path) -> Any:
     read_plan(path)
     data = open_store(path)
     check_memory(str(path), float(data.nbytes), "its arrays")
-    if kind_of(data) == "basin_cells":
-        raise ParameterError(f"{path} keeps the cells of basins alone; plot {path.with_suffix('.nc').name} beside it")
+    if kind_of(data) in PARTIAL:
+        raise ParameterError(f"{path} keeps {PARTIAL[kind_of(data)]} alone; plot {path.with_suffix('.nc').name} beside it")
     return data
 
 

@@ -13,7 +13,8 @@ from saltus.progress import Progress
 if TYPE_CHECKING:
     from saltus.config import Ask, Study
 
-SWEPT = ("basins", "stability_chart")  # computed chunk by chunk into a store, from which a run that was stopped goes on
+DIAGRAMS = ("response_spectrum", "bifurcation_diagram")
+SWEPT = ("basins", "stability_chart", *DIAGRAMS)  # computed in parts into a store, from which a run that was stopped goes on
 
 
 def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None, fresh: bool = False) -> None:
@@ -67,7 +68,8 @@ def check_scheduler(study: Study, scheduler: str) -> None:
     if "://" not in scheduler:
         raise ParameterError(f"--scheduler must be an address such as tcp://host:8786, got {scheduler!r}")
     if not any(ask.kind in SWEPT for ask in study.asks):
-        raise ParameterError("--scheduler is for [stability_chart] and [basins], of which the study has none; leave it out")
+        known = "diagrams, [stability_chart] and [basins]"
+        raise ParameterError(f"--scheduler is for {known}, of which the study has none; leave it out")
     unused: Any = None
     next(on_cluster(unused, deque(), scheduler), None)  # connects, and has no chunk to compute
 
@@ -89,7 +91,11 @@ def answer(study: Study, ask: Ask, output: Path, plot: bool, scheduler: str | No
 
 def computed(study: Study, ask: Ask, output: Path, progress: Progress, scheduler: str | None) -> Any:
     """The Dataset or DataTree that answers a question."""
-    more = {"store": output / f"{ask.kind}.zarr", "scheduler": scheduler} if ask.kind in SWEPT else {}
+    from saltus.flow import available_cores
+
+    more: dict[str, Any] = {"store": output / f"{ask.kind}.zarr", "scheduler": scheduler} if ask.kind in SWEPT else {}
+    if ask.kind in DIAGRAMS and scheduler is None and type(study.system.model).__module__.startswith("saltus."):
+        more["workers"] = available_cores()  # other processes do not know a model of one's own
     data = study.answer(ask, ask.function, progress=progress, **more)
     return data.to_xarray() if ask.kind == "attractors" else data
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ from saltus.errors import ParameterError
 if TYPE_CHECKING:
     from saltus.sweep import StoreStatus
 
-PARTS = "parts"  # the folder of a store in which further work on its result is kept
+SEARCH = "diagram"  # the kind of a store of which nobody knows beforehand how many parts there will be
 BAR_WIDTH = 40  # columns of the bar
 FAILURES_NAMED = 5  # failed chunks that are named
 
@@ -30,25 +30,27 @@ def print_status(path: Path, verify: bool = False) -> None:
     Raises:
         ParameterError: there is no store of a sweep at `path`, or what was verified is damaged.
     """
-    from saltus.sweep import damage, status
+    from saltus.sweep import damage, parts_of, status
 
     if verify and not (path / "zarr.json").is_file() and (path.suffix != ".zarr" or not path.exists()):
         print_verified(path)
         return
     found = status(path, verify=verify)
+    further = list(parts_of(path, verify))
     console = Console(highlight=False)
     console.print(Text(f"{found.kind[:1].upper()}{found.kind[1:].replace('_', ' ')} ", style="bold"), end="")
     console.print(f"in {path}", markup=False, soft_wrap=True)
-    if console.is_terminal:
+    if console.is_terminal and found.kind != SEARCH:
         console.print(ProgressBar(total=found.total, completed=found.done, width=BAR_WIDTH), "", sep="\n")
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
-    for head, text in (*rows(found), *parts(path)):
+    for head, text in (*rows(found), *parts(further)):
         table.add_row(head, Text(text))
     console.print(table)
-    if found.damaged:
-        raise ParameterError(f"{damage(found)}; start the sweep again, and what they held is computed anew")
+    damaged = next((each for each in (found, *further) if each.damaged), None)
+    if damaged is not None:
+        raise ParameterError(f"{damage(damaged)}; start the sweep again, and what they held is computed anew")
     console.print(ending(found), markup=False, soft_wrap=True)
     if verify:
         console.print("Every file is what was written.", markup=False)
@@ -61,7 +63,7 @@ def print_verified(path: Path) -> None:
         ParameterError: with all that is damaged; there is no result at `path`.
     """
     from saltus.files import checked_content, has_checksum
-    from saltus.sweep import damage, status
+    from saltus.sweep import damage, parts_of, status
 
     found = [path] if path.is_file() else [*sorted(path.rglob("*.nc")), *sorted(path.rglob("*.zarr"))]
     console, wrong = Console(highlight=False), list[str]()
@@ -70,8 +72,8 @@ def print_verified(path: Path) -> None:
     for file in found:
         try:
             if file.is_dir():
-                store = status(file, verify=True)
-                said, bad = "sound", damage(store) if store.damaged else ""
+                stores = (status(file, verify=True), *parts_of(file, verify=True))
+                said, bad = "sound", next((damage(store) for store in stores if store.damaged), "")
             else:
                 checked_content(file)
                 said, bad = "sound" if has_checksum(file.read_bytes()) else "has no checksum: another program wrote it", ""
@@ -86,8 +88,9 @@ def print_verified(path: Path) -> None:
 
 def rows(found: StoreStatus) -> Iterator[tuple[str, str]]:
     """The lines of the table: heads and values."""
-    yield "chunks", f"{found.done} of {found.total} done ({100 * found.done // found.total} %)"
-    yield "grid", ", ".join(f"{size} along {name}" for name, size in found.sizes.items())
+    if found.kind != SEARCH:
+        yield "chunks", f"{found.done} of {found.total} done ({100 * found.done // found.total} %)"
+        yield "grid", ", ".join(f"{size} along {name}" for name, size in found.sizes.items())
     yield "size", size(found.bytes)
     yield "begun", moment(found.started)
     yield "last written", moment(found.updated) if found.updated else "nothing yet"
@@ -99,15 +102,15 @@ def rows(found: StoreStatus) -> Iterator[tuple[str, str]]:
         yield "", f"and {found.failed - FAILURES_NAMED} more"
 
 
-def parts(path: Path) -> Iterator[tuple[str, str]]:
-    """The lines of the further work whose stores are kept within a store, such as that on the borders of a chart."""
-    from saltus.sweep import status
-
-    folder = path / PARTS
-    for part in sorted(folder.iterdir()) if folder.is_dir() else ():
-        if (part / "zarr.json").is_file():
-            found = status(part)
-            yield f"{part.name.split('_')[0]} of borders", f"{found.done} of {found.total} chunks done"
+def parts(found: Iterable[StoreStatus]) -> Iterator[tuple[str, str]]:
+    """The lines of the parts that are kept within a store, such as the work on the borders of a chart: how many of each kind."""
+    kinds: dict[str, list[StoreStatus]] = {}
+    for part in found:
+        name = part.path.name.split("_")[0]
+        kinds.setdefault(f"{name} of borders" if part.kind == "chart_borders" else name, []).append(part)
+    for kind, own in kinds.items():
+        count = f"{len(own)} parts, " if len(own) > 1 else ""
+        yield kind, f"{count}{sum(part.done for part in own)} of {sum(part.total for part in own)} chunks done"
 
 
 def ending(found: StoreStatus) -> str:

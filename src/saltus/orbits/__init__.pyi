@@ -5,6 +5,7 @@ from .from_dataset import orbits_of
 from .near_returns import orbits_near_returns, solved_near
 from .newton import solve
 from .orbit import PeriodicOrbit
+from .orbits_as_bytes import as_bytes, from_bytes
 from .problem import Problem
 from .resting import RestingOrbit
 from .search import EVEN, Search, initial_states, search_orbits, within_window
@@ -14,7 +15,7 @@ from .special_curve_continuation import continue_special
 from .special_point import OrbitEnd, SpecialKind, SpecialPoint
 from .switching import Cascade, doubling_cascade, switch_branch
 from .symmetry import is_symmetric, keeps_symmetry
-from .verify import defects, same_orbit
+from .verify import closing_distances, closing_rows, defects, same_orbit
 
 __all__ = [
     "EVEN",
@@ -30,12 +31,16 @@ __all__ = [
     "SpecialCurve",
     "SpecialKind",
     "SpecialPoint",
+    "as_bytes",
+    "closing_distances",
+    "closing_rows",
     "continue_orbit",
     "continue_special",
     "defects",
     "doubling_cascade",
     "find_orbit",
     "follow_stable",
+    "from_bytes",
     "initial_states",
     "is_symmetric",
     "keeps_symmetry",

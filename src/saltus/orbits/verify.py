@@ -11,6 +11,7 @@ from saltus.flow import simulate_many
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.public_functions import answered
+from saltus.systems import System
 
 
 def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> bool:
@@ -39,31 +40,44 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
     for orbit in orbits:
         check_kind("orbits", orbit, PeriodicOrbit, source="find_orbit or search_orbits")
     check_count("rounds", rounds, 1)
-    result = np.full(len(orbits), np.inf)
-    groups: dict[int, list[int]] = {}
-    for i, orbit in enumerate(orbits):
-        groups.setdefault(orbit.period, []).append(i)
-    for periods, places in groups.items():
-        result[places] = _defects([orbits[i] for i in places], rounds * periods, tol)
-    return result
-
-
-def _defects(orbits: list[PeriodicOrbit], periods: int, tol: float) -> np.ndarray:
+    if not orbits:
+        return np.zeros(0)
     problem = orbits[0].problem
-    system, values = problem.system, np.array([orbit.solution.values for orbit in orbits])
-    names = system.model.coordinates
-    starts = [orbit.start() for orbit in orbits]
-    begin: dict[str, Any] = {name: np.array([start[name] for start in starts], dtype=float) for name in names}
-    velocity: Any = np.array([start["velocity"] for start in starts], dtype=float)
-    times = np.array([start.get("time", 0.0) for start in starts])
-    columns = velocity if velocity.ndim == 1 else tuple(velocity.T)
-    varied = dict(zip(problem.paths[:1], values.T, strict=False))
-    result = simulate_many(system, **begin, velocity=columns, time=times, parameters=varied, periods=periods, sample=(), tol=tol)
-    apart = np.max([np.abs(result[name].values - begin[name]) for name in names], axis=0)
-    after = result["velocity"].values if velocity.ndim == 1 else None
-    if after is None:
-        ends = np.stack([result[f"{name}_velocity"].values for name in names], axis=1)
-        return np.asarray(np.maximum(apart, np.abs(ends - velocity).max(axis=1)))
-    before = np.array([orbit.speeds[0] if orbit.signature.sides else np.inf for orbit in orbits])
-    either = np.minimum(np.abs(after - velocity), np.abs(np.abs(after) - before))
-    return np.asarray(np.maximum(apart, either))
+    return closing_distances(problem.system, next(iter(problem.paths), None), closing_rows(orbits, rounds), tol)
+
+
+def closing_rows(orbits: list[PeriodicOrbit], rounds: int = 1) -> np.ndarray:
+    """What `closing_distances` needs of each orbit, (n, m): the parameter along the common path, if there is one, coordinates and
+    velocities at the start, its time, the speed before its first impact (-1 without impacts), and the forcing periods."""
+    rows = []
+    for orbit in orbits:
+        start, names = orbit.start(), orbit.system.model.coordinates
+        velocities = np.atleast_1d(start["velocity"])
+        speed = orbit.speeds[0] if orbit.signature.sides else -1.0
+        ends = [start.get("time", 0.0), speed, rounds * orbit.period]
+        rows.append([*orbit.solution.values[:1], *(start[name] for name in names), *velocities, *ends])
+    return np.array(rows, dtype=float).reshape(len(orbits), -1)
+
+
+def closing_distances(system: System, path: str | None, rows: np.ndarray, tol: float = 1e-13) -> np.ndarray:
+    """The distance of orbits from themselves some periods later, by rows as `closing_rows` gives them, (n,)."""
+    names, count = system.model.coordinates, len(system.model.coordinates)
+    result = np.full(len(rows), np.inf)
+    for periods in np.unique(rows[:, -1]):
+        places = rows[:, -1] == periods
+        *columns, times, speeds, _ = rows[places].T
+        varied, states = ({path: columns[0]}, columns[1:]) if path is not None else ({}, columns)
+        begin, velocities = dict(zip(names, states, strict=False)), states[count:]
+        velocity: Any = velocities[0] if count == 1 else tuple(velocities)
+        ends = simulate_many(
+            system, **begin, velocity=velocity, time=times, parameters=varied, periods=int(periods), sample=(), tol=tol
+        )
+        apart = np.max([np.abs(ends[name].values - begin[name]) for name in names], axis=0)
+        if count == 1:
+            after, before = ends["velocity"].values, np.where(speeds < 0.0, np.inf, speeds)
+            either = np.minimum(np.abs(after - velocity), np.abs(np.abs(after) - before))
+        else:
+            after = np.stack([ends[f"{name}_velocity"].values for name in names])
+            either = np.abs(after - np.array(velocities)).max(axis=0)
+        result[places] = np.maximum(apart, either)
+    return result

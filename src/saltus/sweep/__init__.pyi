@@ -1,23 +1,32 @@
 from .chunk_results import Failure
 from .cluster import on_cluster
-from .execution import SweepInterrupted, run
+from .execution import SweepInterrupted, check_run, run
+from .parts import Part, Parts, parts_of, text_rows
 from .plan import Plan, Variable
-from .store import BEGIN_ANEW, check_store, open_store, remove_store
+from .store import BEGIN_ANEW, check_store, open_store, opened, remove_store
 from .store_status import StoreStatus, damage, read_plan, status
+from .workers import Workers
 
 __all__ = [
     "BEGIN_ANEW",
     "Failure",
+    "Part",
+    "Parts",
     "Plan",
     "StoreStatus",
     "SweepInterrupted",
     "Variable",
+    "Workers",
+    "check_run",
     "check_store",
     "damage",
     "on_cluster",
     "open_store",
+    "opened",
+    "parts_of",
     "read_plan",
     "remove_store",
     "run",
     "status",
+    "text_rows",
 ]

@@ -22,6 +22,8 @@ from saltus.sweep.store import Store, opened
 if TYPE_CHECKING:
     import xarray
 
+    from saltus.sweep.workers import Workers
+
 Outcomes = Iterator[tuple[Index, Any]]
 
 NOTE_EVERY = 1.0  # s: the list of failures is not written more often than that
@@ -37,7 +39,7 @@ def run(
     plan: Plan,
     store: Path | str | None = None,
     *,
-    workers: int | None = None,
+    workers: int | Workers | None = None,
     scheduler: str | None = None,
     progress: Progress = silent,
     retries: int = 1,
@@ -51,7 +53,8 @@ def run(
         plan: what is computed.
         store: a folder for a Zarr v3 store; it is made, or gone on with if it is of the same plan. None keeps all in memory.
         workers: how many processes compute chunks at once; None computes one chunk after the other in this one, which is right
-            for functions that use all cores themselves. Scripts need `if __name__ == "__main__":` around a run with workers.
+            for functions that use all cores themselves. `Workers` are kept from one run to the next. Scripts need
+            `if __name__ == "__main__":` around a run with workers.
         scheduler: the address of a Dask scheduler, such as "tcp://host:8786", whose workers compute the chunks.
         progress: called before the first chunk and after each with the share of the chunks that are done, and in words with their
             number and about how many seconds are left.
@@ -66,7 +69,10 @@ def run(
         SweepError: chunks failed for good, the store cannot be written, another run writes to it, or the cluster does not answer.
         SweepInterrupted: Ctrl-C. In all these cases the chunks written before are kept.
     """
-    path = _check(plan, store, workers, scheduler, progress, retries)
+    if not isinstance(plan, Plan):
+        raise ParameterError(f"plan must be a Plan, got {plan!r:.80}", "plan")
+    check_count("retries", retries, 0)
+    path = check_run(store, workers, scheduler, progress)
     with nullcontext(MemoryResults(plan)) if path is None else opened(plan, path) as results:
         sweep = _SweepRun(plan, results, progress, retries)
         try:
@@ -93,7 +99,7 @@ class _SweepRun:
         self.failures: dict[Index, Failure] = {}
         self.noted = -NOTE_EVERY
 
-    def fill(self, workers: int | None, scheduler: str | None) -> None:
+    def fill(self, workers: int | Workers | None, scheduler: str | None) -> None:
         """Compute and write until nothing is left that may be tried."""
         self.start = time.monotonic()
         self._report_progress()
@@ -148,17 +154,22 @@ class _SweepRun:
         self.progress(self.done / self.total, f"{self.done} of {self.total} chunks{estimate}" if self.total > 1 else "computing")
 
 
-def _outcomes(plan: Plan, queue: deque[Index], workers: int | None, scheduler: str | None) -> Any:
+def _outcomes(plan: Plan, queue: deque[Index], workers: int | Workers | None, scheduler: str | None) -> Any:
     """Take chunks from the queue until it is empty, and give what became of each, in any order."""
     if scheduler is not None:
         from saltus.sweep.cluster import on_cluster
 
         return on_cluster(plan, queue, scheduler)
-    if workers is not None:
-        from saltus.sweep.workers import in_processes
+    if isinstance(workers, int):
+        return _in_processes(plan, queue, workers)
+    return _here(plan, queue) if workers is None else workers.outcomes(plan, queue)
 
-        return in_processes(plan, queue, workers)
-    return _here(plan, queue)
+
+def _in_processes(plan: Plan, queue: deque[Index], count: int) -> Outcomes:
+    from saltus.sweep.workers import Workers
+
+    with Workers(count) as workers:
+        yield from workers.outcomes(plan, queue)
 
 
 def _here(plan: Plan, queue: deque[Index]) -> Outcomes:
@@ -167,13 +178,14 @@ def _here(plan: Plan, queue: deque[Index]) -> Outcomes:
         yield index, attempt(plan.function, plan.arguments, plan.block(index))
 
 
-def _check(plan: Any, store: Any, workers: Any, scheduler: Any, progress: Any, retries: Any) -> Path | None:
-    """The store's path, if the arguments have a meaning."""
-    if not isinstance(plan, Plan):
-        raise ParameterError(f"plan must be a Plan, got {plan!r:.80}", "plan")
-    check_count("retries", retries, 0)
+def check_run(store: Any, workers: Any, scheduler: Any, progress: Any) -> Path | None:
+    """The path of the store, if what says where chunks are kept and who computes them has a meaning.
+
+    Raises:
+        ParameterError: it has none.
+    """
     if workers is not None:
-        check_count("workers", workers, 1)
+        check_count("workers", getattr(workers, "count", workers), 1)
     if scheduler is not None and (not isinstance(scheduler, str) or "://" not in scheduler):
         raise ParameterError(f"scheduler must be an address such as 'tcp://host:8786', got {scheduler!r}", "scheduler")
     if scheduler is not None and workers is not None:

@@ -82,6 +82,11 @@ class Store:
                 "are kept: when that is put right, run the same again and it goes on from there"
             ) from error
 
+    def drop(self, index: Index) -> None:
+        """Remove a chunk, which is then computed again."""
+        for name, variable in self.plan.variables.items():
+            files.chunk_file(self.path, name, index, len(variable.extra)).unlink(missing_ok=True)
+
     def note(self, failures: Iterable[Failure]) -> None:
         """Keep a list of the chunks that failed beside the arrays, for `status`; without any, the file is gone."""
         entries = [{"index": f.index, "place": f.place, "error": f.error, "attempts": f.attempts} for f in failures]

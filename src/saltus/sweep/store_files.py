@@ -80,9 +80,9 @@ def finish(part: Path, path: Path) -> None:
 
 def sweep_up(path: Path) -> None:
     """Remove what killed runs left half-written, in the store at `path` and beside it. The caller has the lock."""
-    for part in path.rglob(f".*{PART}"):  # only who has the lock writes here
+    for part in list(path.rglob(f".*{PART}")):  # only who has the lock writes here
         with contextlib.suppress(OSError):
-            part.unlink()
+            shutil.rmtree(part) if part.is_dir() else part.unlink()
     for part in path.parent.glob(f".{path.name}.*{PART}"):
         with contextlib.suppress(OSError):
             if time.time() - part.stat().st_mtime > STALE:

@@ -18,35 +18,55 @@ from saltus.sweep.plan import Plan
 READY = "ready"
 
 
-def in_processes(plan: Plan, queue: deque[Index], workers: int) -> Iterator[tuple[Index, Any]]:
-    """Compute the chunks in the queue in `workers` processes, and give what became of each as it comes.
+class Workers:
+    """Up to `count` processes that compute chunks, begun as they are needed and kept from one sweep to the next.
 
-    A process that dies (killed, out of memory) fails its own chunk alone, and another takes its place.
-
-    Raises:
-        SweepError: a process ends before it can compute.
+    A context manager, at whose end they end.
     """
-    pool = [_Worker() for _ in range(min(workers, len(queue)))]
-    try:
-        while queue or any(worker.index is not None for worker in pool):
-            for worker in pool:
-                if worker.index is None and queue:
-                    worker.take(plan, queue.popleft())
-            busy = {worker.connection: worker for worker in pool if worker.index is not None}
-            for connection in wait(list(busy)):
-                worker = busy[connection]  # type: ignore[index]
-                outcome = worker.receive()
-                if outcome == READY:
-                    worker.ready = True
-                    continue
-                index, worker.index = worker.index, None
-                if worker.dead:
-                    pool[pool.index(worker)] = _Worker()
-                assert index is not None
-                yield index, outcome
-    finally:
-        for worker in pool:
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.pool: list[_Worker] = []
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for worker in self.pool:
             worker.stop()
+        self.pool.clear()
+
+    def outcomes(self, plan: Plan, queue: deque[Index]) -> Iterator[tuple[Index, Any]]:
+        """Compute the chunks in the queue, and give what became of each as it comes.
+
+        A process that dies (killed, out of memory) fails its own chunk alone, and another takes its place.
+
+        Raises:
+            SweepError: a process ends before it can compute.
+        """
+        pool = self.pool
+        pool += [_Worker() for _ in range(min(self.count, len(queue)) - len(pool))]
+        try:
+            while queue or any(worker.index is not None for worker in pool):
+                for worker in pool:
+                    if worker.index is None and queue:
+                        worker.take(plan, queue.popleft())
+                busy = {worker.connection: worker for worker in pool if worker.index is not None}
+                for connection in wait(list(busy)):
+                    worker = busy[connection]  # type: ignore[index]
+                    outcome = worker.receive()
+                    if outcome == READY:
+                        worker.ready = True
+                        continue
+                    index, worker.index = worker.index, None
+                    if worker.dead:
+                        pool[pool.index(worker)] = _Worker()
+                    assert index is not None
+                    yield index, outcome
+        finally:
+            for worker in [worker for worker in pool if worker.index is not None]:  # of no use any more
+                pool.remove(worker)
+                worker.stop()
 
 
 class _Worker:

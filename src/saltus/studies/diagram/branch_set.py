@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, continue_orbit, switch_branch
+from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint
 from saltus.progress import Progress
+from saltus.studies.diagram.diagram_work import DiagramWork, Request
 from saltus.studies.diagram.placement import PlacedBranch
 
 BRANCHING = (SpecialKind.PD, SpecialKind.BPC)  # at which other families are born
@@ -37,7 +39,7 @@ SETTINGS = BranchSettings()
 class BranchSet:
     """The branches known so far, and up to which period, how far and how finely they are followed."""
 
-    path: str
+    work: DiagramWork
     bounds: tuple[float, float]
     max_period: int
     step: float
@@ -57,6 +59,10 @@ class BranchSet:
         waiting = [] if while_stable else [orbit]
         while waiting:
             waiting += self._follow(waiting.pop(0))
+
+    def prepare(self, orbits: Sequence[tuple[PeriodicOrbit, bool]]) -> None:
+        """Follow orbits that lie on no known branch at once, each whether it is while they are stable."""
+        self.work.prepare([self.request(orbit, stable) for orbit, stable in orbits if not self.knows(orbit)])
 
     def grow(self, progress: Progress) -> None:
         """Follow what is born on the branches, on the widest first."""
@@ -85,7 +91,12 @@ class BranchSet:
         return any(other.holds(inner, value) for other in self.placed if id(other) not in self.partial)
 
     def _continued(self, orbit: PeriodicOrbit, while_stable: bool = False) -> Branch:
-        return continue_orbit(orbit, self.path, self._range(orbit.period), step=self.step, while_stable=while_stable)
+        return self.work.follow([self.request(orbit, while_stable)])[0][0]
+
+    def request(self, start: PeriodicOrbit | SpecialPoint, while_stable: bool = False) -> Request:
+        """What is asked for to follow an orbit, or what is born at a special point."""
+        period = _period_born(start) if isinstance(start, SpecialPoint) else start.period
+        return Request(start, self._range(period), self.step, while_stable)
 
     def _follow(self, orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
         """Follow an orbit unless it lies on a known branch; returns orbits of the branches on which its own ends."""
@@ -99,11 +110,15 @@ class BranchSet:
     def _grow(self, branch: Branch) -> None:
         """Follow all that is born on a branch."""
         narrow = self._width(branch) < SETTINGS.narrow * (self.bounds[1] - self.bounds[0])
-        for special in filter(self._is_branching, branch.special):
-            if _is_parent(special, branch) or self._is_followed(special):
+        own = [special for special in filter(self._is_branching, branch.special) if not _is_parent(special, branch)]
+        visible = {id(special): special.amplitude >= SETTINGS.visible * branch.amplitudes.max() for special in own}
+        if not narrow:  # a branch often ends at the next special point: every other one is followed ahead
+            ahead = [special for special in own if visible[id(special)] and not self._is_followed(special)]
+            self.work.prepare([self.request(special) for special in ahead[: max(0, self.most - len(self.placed)) : 2]])
+        for special in own:
+            if self._is_followed(special):
                 continue
-            visible = special.amplitude >= SETTINGS.visible * branch.amplitudes.max()
-            if narrow or not visible or len(self.placed) >= self.most:
+            if narrow or not visible[id(special)] or len(self.placed) >= self.most:
                 self.left += 1
             else:
                 self.placed += map(PlacedBranch, self._born_at(special))
@@ -125,7 +140,7 @@ class BranchSet:
 
     def _born_at(self, special: SpecialPoint) -> list[Branch]:
         """The branches that begin at a special point and are not known."""
-        born = switch_branch(special, self._range(_period_born(special)), step=self.step, both=False)
+        born = self.work.follow([self.request(special)])[0]
         return [branch for branch in born if not self.knows(branch.points[len(branch.points) // 2].orbit)]
 
     def _is_followed(self, special: SpecialPoint) -> bool:
@@ -141,7 +156,7 @@ class BranchSet:
     def _range(self, period: int) -> tuple[float, float]:
         """How far a family is followed: where the range ends, or beyond for those that may be loops."""
         low, high = self.bounds
-        reach = SETTINGS.beyond_frequency if self.path == "load.frequency" else SETTINGS.beyond
+        reach = SETTINGS.beyond_frequency if self.work.path == "load.frequency" else SETTINGS.beyond
         return (low, high) if period == 1 else (low, max(high, reach * high))
 
 

@@ -10,13 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from saltus.attractors import JUDGEMENT, Judged, JudgementSettings, SettledLater, Unsettled, judge_unsettled
+from saltus.attractors import JUDGEMENT, Judged, JudgementSettings, SettledLater, Unsettled
 from saltus.checks import Rectangle, check_count, check_window
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.checks import check_diagram
 from saltus.studies.diagram.bands import Bands, Tried, bands_of
-from saltus.studies.diagram.simulated import SimulatedMotions, simulate_from, starts_at
+from saltus.studies.diagram.diagram_work import DiagramWork
+from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
 
 
@@ -113,7 +114,7 @@ def chaotic_bands(
     values, area = np.linspace(*bounds, count), check_window(window, system)
     states = starts_at(system, values, starts, area, seed).reshape(-1, 2)
     first = part_of(progress, 0.0, 0.2, "looking for chaos")
-    begun = simulate_from(system, path, np.repeat(values, starts), states, SETTINGS.settling, first)
+    begun = DiagramWork(system, path).simulate(np.repeat(values, starts), states, SETTINGS.settling, first)
     return resolve_bands(system, path, bounds, begun, special, progress=part_of(progress, 0.2, 1.0))[0]
 
 
@@ -125,12 +126,15 @@ def resolve_bands(
     special: Iterable[Seed] = (),
     settings: ChaosSettings = SETTINGS,
     progress: Progress = silent,
+    work: DiagramWork | None = None,
 ) -> tuple[Bands, SimulatedMotions]:
     """The bands of chaos between two values, and all motions that were simulated to find them, those of `begun` left out.
 
-    `begun` is an ensemble over values between the bounds; `special` are special points, where more is looked for.
+    `begun` is an ensemble over values between the bounds; `special` are special points, where more is looked for. `work` says
+    who computes what takes long, if it is not this process.
     """
-    search = _BandSearch(system, path, float(bounds[1] - bounds[0]), sorted(special, key=lambda seed: seed.value), settings)
+    work = work or DiagramWork(system, path)
+    search = _BandSearch(work, float(bounds[1] - bounds[0]), sorted(special, key=lambda seed: seed.value), settings)
     search.take(begun)
     search.spread()
     search.beside_special_points(bounds)
@@ -204,8 +208,7 @@ class _Place:
 class _BandSearch:
     """Motions of one system at ever more values of one of its parameters."""
 
-    system: System
-    path: str
+    work: DiagramWork
     span: float
     special: Sequence[Seed]
     settings: ChaosSettings
@@ -226,7 +229,7 @@ class _BandSearch:
         column = np.repeat(np.asarray(values, dtype=float), [len(states) for states in starts])
         if len(column):
             states = np.concatenate(starts)
-            self.take(simulate_from(self.system, self.path, column, states, self.settings.settling), care)
+            self.take(self.work.simulate(column, states, self.settings.settling), care)
 
     def take(self, motions: SimulatedMotions, care: int = 0) -> None:
         """Add motions to what is known, and judge those that have not settled."""
@@ -245,14 +248,13 @@ class _BandSearch:
 
     def _judge(self, values: np.ndarray, states: np.ndarray, care: int) -> None:
         """Judge what has not settled at these values, of which states (n, m, 2) are given, and follow what then settles."""
-        settings = self.settings.judgements[care]
-        judged = judge_unsettled(self.system, states, {self.path: values}, settings=settings)
+        judged = self.work.judge(values, states, self.settings.judgements[care])
         for row, value in enumerate(values):
             self.place(float(value)).judge(judged, row, care)
         found = _some(judged.settled, self.settings.neighbours)
         if len(found.question):
             column = values[found.question]
-            self._settle(simulate_from(self.system, self.path, column, found.state, self.settings.settling))
+            self._settle(self.work.simulate(column, found.state, self.settings.settling))
 
     def _settle(self, motions: SimulatedMotions) -> None:
         self.further.append(motions)

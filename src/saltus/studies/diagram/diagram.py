@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from saltus.studies.checks import check_diagram
 from saltus.studies.diagram.branch_set import BranchSet
 from saltus.studies.diagram.diagram_dataset import diagram_tree
 from saltus.studies.diagram.diagram_search import DiagramSearch
+from saltus.studies.diagram.diagram_work import diagram_plan, diagram_work
 from saltus.studies.diagram.effort import EFFORTS, read_effort
 from saltus.systems import System
 
@@ -47,6 +49,9 @@ def _check(
     switch: bool,
     step: float,
     bands: bool,
+    store: Any,
+    workers: int | None,
+    scheduler: str | None,
     progress: object,
     **counts: int,
 ) -> None:
@@ -58,11 +63,12 @@ def _check(
     for name, answer in (("switch", switch), ("bands", bands)):
         check_kind(name, answer, bool)
     _values(bounds, values, 1)
-    check_window(window, system)
-    if not callable(progress):
-        raise ParameterError(
-            f"progress must be a function of the fraction done and of what is being done, got {progress!r}", "progress"
-        )
+    area = check_window(window, system)
+    from saltus.sweep import check_run, check_store
+
+    place = check_run(store, workers, scheduler, progress)
+    if place is not None:
+        check_store(diagram_plan(system, path, bounds, area, counts["seed"]), place)
 
 
 @checked_by(_check)
@@ -81,6 +87,9 @@ def bifurcation_diagram(
     switch: bool = True,
     step: float = STEP,
     bands: bool = True,
+    store: Any = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
     progress: Progress = silent,
 ) -> xarray.DataTree:
     """All branches of periodic orbits along a parameter that a simulation finds, and bands of chaos (Figs. 11 to 13).
@@ -90,50 +99,54 @@ def bifurcation_diagram(
     judged to be chaotic, or left undecided. Then random motions say what share of the states ends on something that the diagram
     does not have; what they show is followed as well. Orbits of up to `repelling` forcing periods that repel, and what is born at
     every PD and BPC, are followed besides, those of more than one forcing period beyond the bounds, to where they close or end.
-    Every orbit is confirmed by the event-driven flow over a period, the stable ones over 20.
+    Every orbit is confirmed by the event-driven flow over a period, stable ones over 20.
 
     Args:
         system: what moves.
-        path, bounds: dotted path of the parameter, and its range.
-        effort: how much is tried, see `Effort`: "quick", "standard" or "thorough".
+        path, bounds, effort: dotted path of the parameter, its range, and how much is tried, see `Effort`.
         max_period: the longest period, in forcing periods, that is followed.
         values: where is simulated, by default evenly, as many as the effort says. If given, what is random is not followed.
         starts, window, seed: how many initial states at each value, by default as the effort says, where, and their seed.
         repelling, switch: up to which period repelling orbits are searched for; whether what is born at special points is.
         step, bands: the longest step along a branch; whether chaos is looked for.
-        progress: called with the fraction done and what is being done.
+        store: where all that takes long is kept, so that a search that was stopped, or one of more values or starts, goes on.
+        workers, scheduler, progress: who computes it, and what is told of it, see `saltus.sweep.run`.
 
     Returns:
         A DataTree: the branches in `branches`, `points`, `special` and `orbits` (`branch_of` gives one), `attractors`,
         `unplaced`, `bands`, `exponents`, `stroboscopic` and `search`; docs/orbits.md lists their variables and attributes.
 
     Raises:
-        ParameterError: an argument without meaning.
+        ParameterError: an argument without meaning; SweepError: as `saltus.sweep.run`.
     """
     low, high = check_bounds(bounds)
     tried = EFFORTS[read_effort(effort)]
     tried = replace(tried, starts=tried.starts if starts is None else starts, samples=tried.samples if values is None else 1)
     grid, area = _values((low, high), values, tried.values), check_window(window, system)
-    branches = BranchSet(path, (low, high), max_period, step, switch, tried.branches)
-    search = DiagramSearch(system.with_({path: 0.5 * (low + high)}), path, (low, high), grid, area, seed, tried, branches)
     progress(0.0, "searching")
-    search.simulate(part_of(progress, 0.0, SHARES.search, "searching"))
-    _follow(search, repelling, part_of(progress, SHARES.search, SHARES.branches))
-    if bands:
-        search.look_for_chaos(part_of(progress, SHARES.branches, SHARES.bands, "looking for chaos"))
-    search.estimate(follow=values is None)
-    progress(SHARES.bands, "confirming")
-    tree = diagram_tree(search, effort=str(read_effort(effort)), max_period=max_period)
+    plan, middle = diagram_plan(system, path, (low, high), area, seed), system.with_({path: 0.5 * (low + high)})
+    with diagram_work(middle, path, plan, None if store is None else Path(store), workers, scheduler) as work:
+        branches = BranchSet(work, (low, high), max_period, step, switch, tried.branches)
+        search = DiagramSearch(work, (low, high), grid, area, seed, tried, branches)
+        _search(search, repelling, bands, values is None, progress)
+        tree = diagram_tree(search, effort=str(read_effort(effort)), max_period=max_period)
     progress(1.0, "done")
     return tree
 
 
-def _follow(search: DiagramSearch, repelling: int, progress: Progress) -> None:
-    """Follow what the simulation shows, what repels, what is born on these, and what motions from neighbouring values add."""
-    search.follow(progress)
+def _search(search: DiagramSearch, repelling: int, bands: bool, follow: bool, progress: Progress) -> None:
+    """Simulate, and follow what that shows, what repels, what is born on these, what motions from neighbouring values add, and
+    what settles in bands of chaos; then see what random motions end on, and `follow` it."""
+    search.simulate(part_of(progress, 0.0, SHARES.search, "searching"))
+    following = part_of(progress, SHARES.search, SHARES.branches)
+    search.follow(following)
     search.repel(repelling)
-    search.branches.grow(progress)
-    search.carry_on(progress)
+    search.branches.grow(following)
+    search.carry_on(following)
+    if bands:
+        search.look_for_chaos(part_of(progress, SHARES.branches, SHARES.bands, "looking for chaos"))
+    search.estimate(follow)
+    progress(SHARES.bands, "confirming")
 
 
 @checked_by(bifurcation_diagram.check)

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.branch_tables import branch_tables
-from saltus.orbits import Branch, PeriodicOrbit, RestingOrbit, defects
+from saltus.orbits import Branch, PeriodicOrbit, RestingOrbit, closing_rows
 from saltus.provenance import provenance
 from saltus.studies.diagram.attractors_found import Place
 from saltus.studies.diagram.band_edges import explained
 from saltus.studies.diagram.bands import band_dataset
 from saltus.studies.diagram.diagram_search import DiagramSearch
+from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.systems import System
 from saltus.theory import amplitude_limits
 
@@ -57,7 +58,7 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
         samples_tried=search.missed.samples,
     )
     order = sorted(range(len(branches)), key=lambda i: (branches[i].points[0].orbit.period, -len(branches[i].points)))
-    nodes = {"/": xarray.Dataset(attrs=attributes), **branch_tables(confirmed([branches[i] for i in order]))}
+    nodes = {"/": xarray.Dataset(attrs=attributes), **branch_tables(confirmed([branches[i] for i in order], search.work))}
     chaos = search.chaos
     bands = {"bands": band_dataset()} if chaos is None else explained(system, chaos, branches).to_datasets()
     found = {"attractors": _attractors(search), "unplaced": _unplaced(search)}
@@ -77,7 +78,7 @@ def _limits(system: System, path: str, bounds: tuple[float, float]) -> list[floa
     return low if low == high else []
 
 
-def confirmed(branches: list[Branch]) -> list[xarray.Dataset]:
+def confirmed(branches: list[Branch], work: DiagramWork) -> list[xarray.Dataset]:
     """The datasets of branches with their orbits' distances from themselves by direct simulation (`kept`: 20 periods, if stable).
 
     An orbit that its multipliers call stable, but that does not stay where it is, is not called so; `unconfirmed` counts these.
@@ -86,8 +87,8 @@ def confirmed(branches: list[Branch]) -> list[xarray.Dataset]:
     ends = np.cumsum([0, *(len(branch.orbits) for branch in branches)])
     orbits = [orbit for branch in branches for orbit in branch.orbits]
     stable = np.flatnonzero(np.concatenate([np.zeros(0), *(data["stable"].values for data in found)]))
-    defect, kept = _distances(orbits, 1), np.full(len(orbits), np.nan)
-    kept[stable] = _distances([orbits[i] for i in stable], CONFIRMATION.rounds)
+    defect, kept = _distances(orbits, 1, work), np.full(len(orbits), np.nan)
+    kept[stable] = _distances([orbits[i] for i in stable], CONFIRMATION.rounds, work)
     for data, first, last in zip(found, ends, ends[1:], strict=False):
         here = kept[first:last]
         lost = np.isfinite(here) & ~(here < CONFIRMATION.distance)
@@ -99,13 +100,14 @@ def confirmed(branches: list[Branch]) -> list[xarray.Dataset]:
     return found
 
 
-def _distances(orbits: list[PeriodicOrbit], rounds: int) -> np.ndarray:
+def _distances(orbits: list[PeriodicOrbit], rounds: int, work: DiagramWork) -> np.ndarray:
     """The distance of each orbit from itself after `rounds` of its periods, by the event-driven flow: all at once in lanes."""
     result = np.empty(len(orbits))
     rests = np.array([isinstance(orbit, RestingOrbit) for orbit in orbits], dtype=bool)
     result[rests] = [_moved(orbit, rounds) for orbit in orbits if isinstance(orbit, RestingOrbit)]
     if not rests.all():
-        result[~rests] = defects([orbit for orbit, rest in zip(orbits, rests, strict=True) if not rest], rounds)
+        others = [orbit for orbit, rest in zip(orbits, rests, strict=True) if not rest]
+        result[~rests] = work.distances(closing_rows(others, rounds))
     return result
 
 

@@ -5,21 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from saltus.checks import Window
 from saltus.flow import motions_from, stroboscopic
-from saltus.orbits import keeps_symmetry, orbits_near_returns, solved_near, within_window
+from saltus.orbits import PeriodicOrbit, keeps_symmetry, orbits_near_returns, solved_near, within_window
 from saltus.progress import Progress, silent
 from saltus.studies.diagram.attractors_found import AttractorsFound, Place
 from saltus.studies.diagram.band_edges import seeds_of
 from saltus.studies.diagram.bands import Bands
 from saltus.studies.diagram.branch_set import BranchSet
 from saltus.studies.diagram.chaos_search import resolve_bands
+from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EffortSettings
 from saltus.studies.diagram.placement import PlacedBranch, placed, stable_motions
-from saltus.studies.diagram.simulated import SimulatedMotions, simulate_from, starts_at
+from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
 
 
@@ -69,8 +71,7 @@ class MissedShare:
 class DiagramSearch:
     """One search: what was simulated and followed so far."""
 
-    system: System  # with the parameter in the middle of its range
-    path: str
+    work: DiagramWork  # of the system with the parameter in the middle of its range
     bounds: tuple[float, float]
     grid: np.ndarray  # values of the parameter
     window: Window
@@ -80,6 +81,7 @@ class DiagramSearch:
     found: AttractorsFound = field(init=False)
     chaos: Bands | None = None
     missed: MissedShare = field(default_factory=MissedShare)
+    prepared: set[int] = field(default_factory=set)  # rows of motions that were followed with others at once
 
     def simulate(self, progress: Progress = silent) -> None:
         """The simulation of the diagram: motions from the starts at every value of the grid."""
@@ -89,7 +91,17 @@ class DiagramSearch:
 
     def simulated(self, values: np.ndarray, states: np.ndarray, progress: Progress = silent) -> SimulatedMotions:
         """Motions from states (n, 2) at values (n,), as long as the effort says."""
-        return simulate_from(self.system, self.path, values, states, self.effort.periods, progress)
+        return self.work.simulate(values, states, self.effort.periods, progress)
+
+    @property
+    def system(self) -> System:
+        """What moves."""
+        return self.work.system
+
+    @property
+    def path(self) -> str:
+        """The parameter."""
+        return self.work.path
 
     @cached_property
     def mirrored(self) -> bool:
@@ -103,9 +115,11 @@ class DiagramSearch:
             rows = self.found.open
             if not rows.size:
                 return
-            for run in self.found.families(rows):
-                row = int(run[len(run) // 2])
+            runs = self.found.families(rows)
+            for number, run in enumerate(runs):
+                row = _middle(run)
                 if not self._is_placed(row, self.branches.placed[self.found.looked[row] :]):
+                    self._prepare(runs[number:])
                     self.found.place[row] = self._follow(row, while_stable=self._is_narrow(run))
                 known = len(self.branches.placed)
                 progress(known / (known + len(rows)), f"following, {known} branches")
@@ -128,11 +142,33 @@ class DiagramSearch:
         span, gap = np.ptp(self.found.motions.value[run]), np.diff([self.bounds[0], *self.grid, self.bounds[1]]).max()
         return bool(span + 2.0 * gap < SETTINGS.narrow * (self.bounds[1] - self.bounds[0]))
 
-    def _follow(self, row: int, while_stable: bool) -> Place:
-        """Follow a simulated motion; returns where it then stands."""
+    def _prepare(self, runs: list[np.ndarray]) -> None:
+        """Follow the first of some runs of motions and others at once that are hardly on the same branch.
+
+        Of motions that are stable in a wide range one of each period is taken, as two such may well be on one branch.
+        """
+        if self.work.at_once == 1 or _middle(runs[0]) in self.prepared:
+            return
+        chosen: dict[Any, tuple[int, bool]] = {}
+        for run in runs:
+            row, narrow = _middle(run), self._is_narrow(run)
+            key = row if narrow else (int(self.found.motions.period[row]),)
+            wanted = len(chosen) < self.work.at_once and key not in chosen and row not in self.prepared
+            if wanted and not self._is_placed(row, self.branches.placed[self.found.looked[row] :]):
+                chosen[key] = row, narrow
+        self.prepared.update(row for row, _ in chosen.values())
+        orbits = [(orbit, narrow) for row, narrow in chosen.values() if (orbit := self._orbit(row)) is not None]
+        self.branches.prepare([(orbit, narrow and orbit.stable) for orbit, narrow in orbits])
+
+    def _orbit(self, row: int) -> PeriodicOrbit | None:
+        """The orbit near a simulated motion."""
         motions = self.found.motions
         system = self.system.with_({self.path: float(motions.value[row])})
-        orbit = solved_near(system, self.path, motions.last[row], int(motions.period[row]))
+        return solved_near(system, self.path, motions.last[row], int(motions.period[row]))
+
+    def _follow(self, row: int, while_stable: bool) -> Place:
+        """Follow a simulated motion; returns where it then stands."""
+        orbit = self._orbit(row)
         if orbit is None:
             return Place.NO_ORBIT
         known = len(self.branches.placed)
@@ -189,7 +225,7 @@ class DiagramSearch:
         kept = np.unique(motions.value, return_index=True)[1], self.found.rows, np.flatnonzero(motions.unsettled)
         begun = motions.only(np.unique(np.concatenate(kept)))  # each attractor once, and every value
         self.chaos, further = resolve_bands(
-            self.system, self.path, self.bounds, begun, special, settings=self.effort.chaos, progress=progress
+            self.system, self.path, self.bounds, begun, special, self.effort.chaos, progress, self.work
         )
         self.found.add(further)
         self.follow(silent)
@@ -222,6 +258,11 @@ class DiagramSearch:
         """Which values lie in a band of chaos, (n,)."""
         bands = () if self.chaos is None else self.chaos.bands
         return np.array([any(band.low <= value <= band.high for band in bands) for value in values.tolist()], dtype=bool)
+
+
+def _middle(run: np.ndarray) -> int:
+    """The motion of a run that is followed for all of them."""
+    return int(run[len(run) // 2])
 
 
 def _filled(groups: list[np.ndarray], count: int, kept: int) -> np.ndarray:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,6 +40,7 @@ class SimulatedMotions:
     """Motions along one parameter, a row for each."""
 
     value: np.ndarray  # (n,) of the parameter
+    periods: np.ndarray  # (n,): forcing periods that it was followed, when last it was
     last: np.ndarray  # (n, 2): coordinate and velocity at the end, at phase 0
     outcome: np.ndarray  # (n,): an `Outcome`
     period: np.ndarray  # (n,): forcing periods after which it repeats itself; 0 where it does not
@@ -80,6 +83,9 @@ class SimulatedMotions:
         return SimulatedMotions(*(np.concatenate([getattr(one, part.name) for one in every]) for part in fields(self)))
 
 
+Follow = Callable[[np.ndarray, np.ndarray, int, Progress], SimulatedMotions]
+
+
 def starts_at(system: System, values: np.ndarray, count: int, window: Window, seed: int) -> np.ndarray:
     """(values, count, 2): states spread over the window at each value, every other one drawn in towards the contact.
 
@@ -96,24 +102,33 @@ def starts_at(system: System, values: np.ndarray, count: int, window: Window, se
 
 
 def simulate_from(
-    system: System, path: str, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent
+    system: System,
+    path: str,
+    values: np.ndarray,
+    states: np.ndarray,
+    periods: int,
+    progress: Progress = silent,
+    follow: Follow | None = None,
 ) -> SimulatedMotions:
-    """Follow motions from states (n, 2) at phase 0 at values (n,) of the parameter until they settle or the time is up."""
-    ends = _followed(system, path, values, states, periods, progress)
-    found = _motions(system, values, ends)
+    """Follow motions from states (n, 2) at phase 0 at values (n,) of the parameter until they settle or the time is up.
+
+    `follow` is what `followed` of the system along the path gives, where it is computed elsewhere.
+    """
+    follow = follow or partial(followed, system, path)
+    found = follow(values, states, periods, progress)
     slow = np.flatnonzero(found.unsettled & _is_slow(found))
     if slow.size:
-        later = _followed(system, path, values[slow], found.last[slow], SETTINGS.patience * periods)
-        further = _motions(system, values[slow], later)
+        further = follow(values[slow], found.last[slow], SETTINGS.patience * periods, silent)
         for part in fields(found):
             getattr(found, part.name)[slow] = getattr(further, part.name)
     return found
 
 
-def _followed(
+def followed(
     system: System, path: str, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent
-) -> Recurrence:
-    return find_recurrence(
+) -> SimulatedMotions:
+    """Follow motions from states (n, 2) at values (n,) for so many forcing periods at most, each whatever the others are."""
+    ends = find_recurrence(
         system,
         states,
         max(periods, SETTINGS.kept),
@@ -125,6 +140,7 @@ def _followed(
         tol=SETTINGS.tol,
         progress=progress,
     )
+    return _motions(system, values, ends)
 
 
 def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedMotions:
@@ -139,6 +155,7 @@ def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedM
     shown = ends.within_period & ~ends.rest[:, None]
     return SimulatedMotions(
         value=np.array(values, dtype=float),
+        periods=ends.periods,
         last=ends.last,
         outcome=outcome,
         period=period,

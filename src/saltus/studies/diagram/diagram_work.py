@@ -1,0 +1,296 @@
+"""What takes long in the search of a diagram, in this process or as parts that a store remembers and that others compute.
+
+Each part is a pure function of its inputs, which are JSON: motions and how they end, the judgement of what has not settled, an
+orbit followed along the parameter, and how far an orbit is from itself after some of its periods. A search that runs again finds
+in its store what was computed before it was stopped.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.attractors import Judged, JudgementSettings, SettledLater, judge_unsettled
+from saltus.flow import Outcome
+from saltus.orbits import (
+    Branch,
+    PeriodicOrbit,
+    SpecialPoint,
+    as_bytes,
+    closing_distances,
+    continue_orbit,
+    from_bytes,
+    switch_branch,
+)
+from saltus.progress import Progress, silent
+from saltus.provenance import check_provenance, identity, provenance
+from saltus.studies.diagram.simulated import SETTINGS, SimulatedMotions, followed, simulate_from
+from saltus.systems import System
+
+if TYPE_CHECKING:
+    from saltus.sweep import Parts, Plan
+
+HERE = "saltus.studies.diagram.diagram_work"
+KEPT = SETTINGS.kept
+NUMBERS = ("periods", "outcome", "period", "impact_count", "highest", "lowest")  # of a motion, one each, before its states
+JUDGED = ("verdict", "doubt", "exponent", "error", "gone", "life", "period")  # of a judgement
+WHOLE = (*NUMBERS[1:4], "verdict", "doubt", "gone")  # which of these are whole numbers
+COMPANIONS, SETTLED, ALIKE = 24, 32, 4  # the most states, settled motions, and such of one period that are kept of a judgement
+BRANCH_BYTES = 1 << 20  # the most of a branch: one of 200 points has 12 000
+
+
+@dataclass(frozen=True)
+class Request:
+    """A branch that is asked for: of what, how far, how finely, and whether only while its orbits are stable."""
+
+    start: PeriodicOrbit | SpecialPoint  # an orbit to be followed, or a special point at which branches are born
+    bounds: tuple[float, float]
+    step: float
+    while_stable: bool = False
+
+    def to_json(self) -> dict[str, Any]:
+        """The request as an input of a part."""
+        numbers = {"bounds": list(self.bounds), "step": self.step, "while_stable": self.while_stable}
+        return numbers | {"start": base64.b64encode(as_bytes(self.start)).decode()}
+
+    def branches(self, path: str) -> list[Branch]:
+        """The branches."""
+        if isinstance(self.start, SpecialPoint):
+            return list(switch_branch(self.start, self.bounds, step=self.step, both=False))
+        return [continue_orbit(self.start, path, self.bounds, step=self.step, while_stable=self.while_stable)]
+
+
+@dataclass
+class DiagramWork:
+    """The functions that a search calls for what takes long."""
+
+    system: System
+    path: str
+    parts: Parts | None = None  # None: everything is computed here, and nothing remembered
+    at_once: int = 1  # branches that are followed at once, some of which may turn out not to be needed
+    # Of motions that are known to end: the forcing periods that they were given, and those after which they ended.
+    ended: dict[tuple[float, ...], tuple[int, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for given, row in () if self.parts is None else self.parts.remembered(_parts()["motions"]):
+            self._note(given, row)
+
+    def simulate(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent) -> SimulatedMotions:
+        """`simulate_from` states at values of the parameter."""
+        return simulate_from(self.system, self.path, values, states, periods, progress, self._followed)
+
+    def _followed(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress) -> SimulatedMotions:
+        if self.parts is None:
+            return followed(self.system, self.path, values, states, periods, progress)
+        begun = np.column_stack([values, states]).tolist()
+        inputs = [[*row, self._time(tuple(row), periods)] for row in begun]
+        rows = self.parts.rows(_parts()["motions"], inputs, progress)
+        for given, row in zip(inputs, rows, strict=True):
+            self._note(given, row)
+        return _motions(values, np.array(rows))
+
+    def _time(self, begun: tuple[float, ...], periods: int) -> int:
+        """The time that a motion was given that is known to end within `periods`, as it does so however much it is given."""
+        given, end = self.ended.get(begun, (periods, 0.0))
+        return given if end <= periods else periods
+
+    def _note(self, given: list[float], row: np.ndarray) -> None:
+        if row[1] in (Outcome.REST, Outcome.PERIODIC, Outcome.ENDED):
+            self.ended.setdefault(tuple(given[:3]), (int(given[3]), float(row[0])))
+
+    def judge(self, values: np.ndarray, states: np.ndarray, settings: JudgementSettings) -> Judged:
+        """`judge_unsettled` of states (n, m, 2) at values (n,) of the parameter."""
+        if self.parts is None:
+            found = judge_unsettled(self.system, states, {self.path: values}, settings=settings)
+            return replace(found, settled=_some(found.settled))
+        numbers = asdict(settings)
+        given = [of_one[np.isfinite(of_one).all(axis=-1)].tolist() for of_one in states]
+        inputs = [{"value": v, "states": s, "settings": numbers} for v, s in zip(values.tolist(), given, strict=True)]
+        return _judged(np.array(self.parts.rows(_parts()["judgements"], inputs)), settings.companions)
+
+    def follow(self, requests: Sequence[Request]) -> list[list[Branch]]:
+        """The branches of each request, those that are not known `at_once`."""
+        if self.parts is None:
+            return [request.branches(self.path) for request in requests]
+        texts = self.parts.texts(_parts()["branches"], [request.to_json() for request in requests])
+        return [from_bytes(text) if text else request.branches(self.path) for request, text in zip(requests, texts, strict=True)]
+
+    def prepare(self, requests: Sequence[Request]) -> None:
+        """Compute branches that may be asked for, at once, if there is somebody to do so."""
+        if self.at_once > 1 and self.parts is not None:
+            self.parts.rows(_parts()["branches"], [request.to_json() for request in requests])
+
+    def distances(self, starts: np.ndarray) -> np.ndarray:
+        """`closing_distances` of orbits, (n,), of rows as `closing_rows` gives them."""
+        if self.parts is None or not len(starts):
+            return closing_distances(self.system, self.path, starts)
+        return np.array(self.parts.rows(_parts()["distances"], starts.tolist()))[:, 0]
+
+
+def _parts() -> dict[str, Any]:
+    """The kinds of parts."""
+    from saltus.sweep import Part
+
+    numbers, judged = len(NUMBERS) + 2 + 3 * KEPT, len(JUDGED) + 2 * COMPANIONS + 3 * SETTLED
+    kinds = [
+        Part("motions", f"{HERE}:motions", numbers, chunk=1000),
+        Part("judgements", f"{HERE}:judgements", judged, chunk=16),
+        Part("branches", f"{HERE}:branches", BRANCH_BYTES, chunk=1, dtype="u1", threaded=False),
+        Part("distances", f"{HERE}:distances", 1, chunk=2000),
+    ]
+    return {part.name: part for part in kinds}
+
+
+@contextmanager
+def diagram_work(
+    system: System, path: str, plan: Plan, store: Path | None, workers: int | None, scheduler: str | None
+) -> Iterator[DiagramWork]:
+    """The work of a diagram, remembered in a store if one is given, and computed by other processes or by a cluster.
+
+    Raises:
+        ParameterError, SweepError: as `saltus.sweep.run`.
+    """
+    from saltus.sweep import Parts, SweepInterrupted, Workers, opened
+
+    if store is None and workers is None and scheduler is None:
+        yield DiagramWork(system, path)
+        return
+    with ExitStack() as stack:
+        kept = None if store is None else stack.enter_context(opened(plan, store))
+        processes = stack.enter_context(Workers(workers)) if workers is not None else None
+        if kept is not None:
+            kept.drop((0,))
+        common = {"system": system.to_json(), "path": path, **identity(system)}
+        at_once = AT_ONCE if workers is not None or scheduler is not None else 1
+        try:
+            yield DiagramWork(system, path, Parts(common, store, processes, scheduler), at_once)
+        except KeyboardInterrupt:
+            keeps = (
+                "nothing is kept without a store" if store is None else f"{store} keeps its parts: run the same again to go on"
+            )
+            raise SweepInterrupted(f"interrupted; {keeps}") from None
+        if kept is not None:
+            kept.write((0,), finished({}, {"diagram": np.zeros(1)}))
+
+
+AT_ONCE = 8  # branches: the same number whoever computes them, so that what is kept does not depend on that
+
+
+def diagram_plan(system: System, path: str, bounds: tuple[float, float], window: Any, seed: int) -> Plan:
+    """What the store of a diagram is of: searches that differ in anything else have parts in common, and may share one."""
+    from saltus.sweep import Plan, Variable
+
+    about = {"kind": "diagram", "path": path, "bounds": list(bounds), "window": np.ravel(window).tolist()}
+    mark = Variable(dtype="i1", attrs={"long_name": "1 once a search has come to its end"})
+    return Plan(
+        function=f"{HERE}:finished",
+        axes={"diagram": np.zeros(1)},
+        variables={"finished": mark},
+        attrs=provenance(system, seed=seed, title="bifurcation diagram computed by saltus", **about),
+    )
+
+
+def finished(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """The mark of a search that has come to its end."""
+    return {"finished": np.ones(len(block["diagram"]), dtype=np.int8)}
+
+
+def _given(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> tuple[System, list[Any]]:
+    """The system, and the inputs that a chunk is of."""
+    system = System.from_json(arguments["system"])
+    check_provenance(arguments, system, "this diagram")
+    return system, [arguments["inputs"][row] for row in np.asarray(block["row"], dtype=int)]
+
+
+def motions(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """How motions from [value, coordinate, velocity] end within so many forcing periods, the fourth number."""
+    system, inputs = _given(arguments, block)
+    begun = np.array(inputs, dtype=float)
+    result = np.empty((len(begun), len(NUMBERS) + 2 + 3 * KEPT))
+    for periods in np.unique(begun[:, 3]):
+        rows = begun[:, 3] == periods
+        found = followed(system, arguments["path"], begun[rows, 0], begun[rows, 1:3], int(periods))
+        columns = [getattr(found, name)[:, None] for name in NUMBERS]
+        result[rows] = np.concatenate([*columns, found.last, found.states.reshape(len(found), -1), found.peaks], axis=1)
+    return {"result": result}
+
+
+def _motions(values: np.ndarray, rows: np.ndarray) -> SimulatedMotions:
+    """Motions as they were kept."""
+    rows = rows.reshape(len(values), -1)
+    n, columns = len(NUMBERS), dict(zip(NUMBERS, rows.T, strict=False))
+    columns |= {name: columns[name].astype(int) for name in NUMBERS if name in WHOLE}
+    columns["outcome"] = columns["outcome"].astype(np.int8)
+    columns |= {"value": np.array(values, dtype=float), "last": rows[:, n : n + 2].copy()}
+    states, peaks = np.split(rows[:, n + 2 :], [2 * KEPT], axis=1)
+    return SimulatedMotions(states=states.reshape(-1, KEPT, 2), peaks=peaks, **columns)
+
+
+def judgements(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """The judgements of what has not settled at values of the parameter, all by the same settings."""
+    system, inputs = _given(arguments, block)
+    result = np.full((len(inputs), len(JUDGED) + 2 * COMPANIONS + 3 * SETTLED), np.nan)
+    numbers = inputs[0]["settings"]
+    settings = JudgementSettings(**numbers | {"runs": tuple(numbers["runs"])})
+    states = np.full((len(inputs), max(len(given["states"]) for given in inputs), 2), np.nan)
+    for to_fill, given in zip(states, inputs, strict=True):
+        to_fill[: len(given["states"])] = given["states"]
+    found = judge_unsettled(system, states, {arguments["path"]: np.array([g["value"] for g in inputs])}, settings=settings)
+    n, later = len(JUDGED), _some(found.settled)
+    result[:, :n] = np.stack([getattr(found, name) for name in JUDGED], axis=1)
+    result[:, n : n + 2 * settings.companions] = found.states.reshape(len(inputs), -1)
+    for row in range(len(inputs)):
+        own = later.question == row
+        settled = np.column_stack([later.period[own], later.state[own]])
+        result[row, n + 2 * COMPANIONS :][: settled.size] = settled.ravel()
+    return {"result": result}
+
+
+def _some(settled: SettledLater) -> SettledLater:
+    """Some of what companions of each question have settled on, of every period some: as many as are kept."""
+    order = np.lexsort((settled.state[:, 0], settled.period, settled.question))
+    question, period = settled.question[order], settled.period[order]
+    alike = np.arange(len(order)) - np.searchsorted(_pairs(question, period), _pairs(question, period))
+    order = order[alike < ALIKE]
+    question = settled.question[order]
+    order = order[np.arange(len(order)) - np.searchsorted(question, question) < SETTLED]
+    return SettledLater(settled.question[order], settled.state[order], settled.period[order])
+
+
+def _pairs(question: np.ndarray, period: np.ndarray) -> np.ndarray:
+    """Two whole numbers as one, in the same order."""
+    return np.asarray(question * (1 + period.max(initial=0)) + period)
+
+
+def _judged(rows: np.ndarray, companions: int) -> Judged:
+    """Judgements as they were kept."""
+    n, columns = len(JUDGED), dict(zip(JUDGED, rows.T, strict=False))
+    columns |= {name: columns[name].astype(int) for name in JUDGED if name in WHOLE}
+    settled = rows[:, n + 2 * COMPANIONS :].reshape(len(rows), SETTLED, 3)
+    question, place = np.nonzero(np.isfinite(settled[..., 0]))
+    later = SettledLater(question, settled[question, place, 1:], settled[question, place, 0].astype(int))
+    return Judged(states=rows[:, n : n + 2 * companions].reshape(len(rows), -1, 2), settled=later, **columns)
+
+
+def branches(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Branches, as bytes."""
+    from saltus.sweep import text_rows
+
+    _, inputs = _given(arguments, block)
+    found = []
+    for given in inputs:
+        start, bounds = from_bytes(base64.b64decode(given["start"])), tuple(given["bounds"])
+        found.append(Request(start, bounds, given["step"], given["while_stable"]).branches(arguments["path"]))
+    return {"result": text_rows([as_bytes(each) for each in found], BRANCH_BYTES)}
+
+
+def distances(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """How far orbits are from themselves after some of their periods."""
+    system, inputs = _given(arguments, block)
+    return {"result": closing_distances(system, arguments["path"], np.array(inputs, dtype=float))[:, None]}

@@ -1,0 +1,154 @@
+"""Parts of a search that decides by what it finds what it computes next: each row of them is computed once and remembered.
+
+Such a search has no plan of its own, but what takes long in it are pure functions of JSON, computed for many inputs at once. Each
+such call is a sweep of its own whose chunks are kept in a folder that is named by a digest of what is computed. A search that was
+stopped runs again, and finds what it had; another search of the same folder finds what they have in common.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.errors import ParameterError, SweepError
+from saltus.progress import Progress, silent
+from saltus.sweep.execution import run
+from saltus.sweep.plan import Plan, Variable
+from saltus.sweep.store import open_store
+from saltus.sweep.store_status import StoreStatus, status
+
+if TYPE_CHECKING:
+    from saltus.sweep.workers import Workers
+
+PARTS = "parts"  # the folder of a store in which its parts are kept
+
+
+@dataclass(frozen=True)
+class PartsSettings:
+    """When other processes are worth their beginning."""
+
+    # Seconds for which this process computes what others could, before they are begun: each takes some to load what it needs.
+    patience: float = 4.0
+
+
+SETTINGS = PartsSettings()
+
+
+@dataclass(frozen=True)
+class Part:
+    """A kind of parts: which function computes it, and the row of numbers that it gives for each input.
+
+    The function is that of a `Plan`: `arguments["inputs"]` has all inputs, `block["row"]` says which of them are meant, and it
+    returns {"result": array (rows, width)}.
+    """
+
+    name: str
+    function: str
+    width: int
+    chunk: int  # rows that are computed together
+    dtype: str = "f8"  # "u1" for text, filled up with zeros
+    threaded: bool = True  # whether it uses all cores itself, so that it is left to this process where there is no cluster
+
+
+class Parts:
+    """The parts of one search, in memory, or remembered in the folder `parts` of a store."""
+
+    def __init__(
+        self,
+        common: Mapping[str, Any],
+        store: Path | None = None,
+        workers: Workers | None = None,
+        scheduler: str | None = None,
+    ) -> None:
+        self.common = dict(common)  # arguments of all functions
+        self.folder = None if store is None else store / PARTS
+        self.workers, self.scheduler = workers, scheduler
+        self.spent = 0.0  # s on what other processes could compute
+        self.known: dict[str, tuple[Any, np.ndarray]] = {}  # each input with its row, by the kind and a digest of the input
+        for found in parts_of(store) if store is not None else ():
+            if found.complete:
+                self._remember(found.path)
+
+    def rows(self, part: Part, inputs: Sequence[Any], progress: Progress = silent) -> list[np.ndarray]:
+        """The row of numbers of each input; only those that are not known are computed."""
+        keys = [_key(part.name, given) for given in inputs]
+        missing = {key: given for key, given in zip(keys, inputs, strict=True) if key not in self.known}
+        if missing:
+            plan = self._plan(part, list(missing.values()))
+            folder = None if self.folder is None else self.folder / f"{part.name}_{_digest(plan.describe())[:16]}"
+            alone = part.threaded or len(missing) == 1 or self.spent < SETTINGS.patience
+            begun = time.monotonic()
+            found = run(plan, folder, workers=None if alone else self.workers, scheduler=self.scheduler, progress=progress)[
+                "result"
+            ].values
+            self.spent += 0.0 if part.threaded else time.monotonic() - begun
+            self._keep(part.name, missing.values(), found)
+        return [self.known[key][1] for key in keys]
+
+    def texts(self, part: Part, inputs: Sequence[Any], progress: Progress = silent) -> list[bytes]:
+        """The text of each input, of a part of dtype "u1"."""
+        return [row.tobytes() for row in self.rows(part, inputs, progress)]
+
+    def _plan(self, part: Part, inputs: list[Any]) -> Plan:
+        return Plan(
+            function=part.function,
+            arguments={**self.common, "inputs": inputs},
+            axes={"row": np.arange(len(inputs))},
+            chunk={"row": part.chunk},
+            variables={"result": Variable(dtype=part.dtype, extra=(("number", part.width),))},
+            attrs={"kind": part.name},
+        )
+
+    def _remember(self, folder: Path) -> None:
+        """Take in the rows of a part; of one that is damaged, or of another function, nothing, and it is computed again."""
+        from saltus.sweep.store_status import read_plan
+
+        try:
+            arguments = read_plan(folder)["arguments"]
+            rows = open_store(folder)["result"].values
+        except (ParameterError, SweepError):
+            return
+        if {name: value for name, value in arguments.items() if name != "inputs"} == self.common:
+            self._keep(folder.name.rsplit("_", 1)[0], arguments["inputs"], rows)
+
+    def _keep(self, name: str, inputs: Iterable[Any], rows: np.ndarray) -> None:
+        for given, row in zip(inputs, rows, strict=True):
+            self.known[_key(name, given)] = given, _trimmed(row)
+
+    def remembered(self, part: Part) -> Iterator[tuple[Any, np.ndarray]]:
+        """Every input of a kind that is known, with its row."""
+        return (entry for key, entry in self.known.items() if key.startswith(f"{part.name} "))
+
+
+def text_rows(texts: Sequence[bytes], width: int) -> np.ndarray:
+    """Texts as the rows of a part of dtype "u1"; one that is longer than a row is left out."""
+    kept = [text if len(text) <= width else b"" for text in texts]
+    return np.stack([np.frombuffer(text.ljust(width, b"\0"), np.uint8) for text in kept])
+
+
+def parts_of(store: Path, verify: bool = False) -> Iterator[StoreStatus]:
+    """How far the parts in a store are; to `verify` reads all of them."""
+    folder = store / PARTS
+    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
+        if (path / "zarr.json").is_file():
+            yield status(path, verify=verify)
+
+
+def _trimmed(row: np.ndarray) -> np.ndarray:
+    """A row; of a text without the zeros with which it is filled up."""
+    return row if row.dtype != np.uint8 else np.trim_zeros(row, "b").copy()
+
+
+def _key(name: str, given: Any) -> str:
+    return f"{name} {_digest(given)}"
+
+
+def _digest(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()

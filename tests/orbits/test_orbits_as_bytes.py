@@ -1,0 +1,78 @@
+"""Orbits, special points and branches as bytes: what comes back is the same bit for bit, and nothing else is made of bytes."""
+
+import base64
+import pickle
+import zlib
+
+import numpy as np
+import pytest
+import xarray as xr
+from shared_systems import forced
+
+import saltus
+from saltus.errors import ParameterError
+from saltus.orbits import as_bytes, from_bytes, switch_branch
+
+FREQUENCY = "load.frequency"
+
+
+LOSSY = {"load.horizontal.amplitude": 0.15, "load.frequency": 0.2, "impact.e": 0.3}
+FAMILIES = {"through folds and grazings": ({}, (0.25, 1.0)), "resting": (LOSSY, (0.19, 0.21))}
+
+
+def family(name):
+    changes, bounds = FAMILIES[name]
+    return saltus.continue_orbit(saltus.find_orbit(forced().with_(changes), theta=0.3), FREQUENCY, bounds)
+
+
+def assert_same(branch, back):
+    """Places, tangents and equations of all points, what joins them, and the datasets."""
+    for one, other in zip(branch.points, back.points, strict=True):
+        np.testing.assert_array_equal(one.place, other.place)
+        np.testing.assert_array_equal(one.tangent, other.tangent)
+        for name, values in vars(one.orbit.solution.equations).items():
+            if not name.startswith("_"):
+                np.testing.assert_array_equal(values, getattr(other.orbit.solution.equations, name))
+    joined = [[each.is_joined(i) for i in range(len(each.points) - 1)] for each in (branch, back)]
+    assert joined[0] == joined[1]
+    xr.testing.assert_identical(branch.to_xarray(), back.to_xarray())
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_branch_comes_back_bit_for_bit(name):
+    branch = family(name)
+    content = as_bytes(branch)
+    back = from_bytes(content)
+    assert_same(branch, back)
+    assert as_bytes(back) == content
+
+
+def test_what_is_born_at_a_special_point_that_came_back_is_the_same():
+    branch = family("through folds and grazings")
+    special = next(point for point in branch.special if point.kind == "BPC")
+    born, again = (switch_branch(point, (0.25, 1.0), both=False) for point in (special, from_bytes(as_bytes(special))))
+    for one, other in zip(born, again, strict=True):
+        assert_same(one, other)
+
+
+class Harmful:
+    """What a pickle may do: call any function."""
+
+    def __reduce__(self):
+        return print, ("harm",)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"nothing",
+        zlib.compress(b"nothing"),
+        zlib.compress(pickle.dumps(Harmful())),
+        zlib.compress(pickle.dumps(base64.b64decode)),
+    ],
+)
+def test_bytes_of_anything_else_are_refused_and_run_nothing(content, capsys):
+    with pytest.raises(ParameterError, match="of no orbits"):
+        from_bytes(content)
+    assert capsys.readouterr().out == ""

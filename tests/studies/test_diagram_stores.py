@@ -1,0 +1,196 @@
+"""Diagrams kept in parts: killed and gone on with, extended, computed by several processes and by a cluster, always the same."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from diagram_script import BOUNDS, FREQUENCY, diagram
+from shared_systems import forced
+from typer.testing import CliRunner
+
+from saltus import provenance
+from saltus.cli.app import app
+from saltus.errors import ParameterError, SweepError
+from saltus.files import write_dataset
+from saltus.flow import Outcome
+from saltus.provenance import identity
+from saltus.studies import response_spectrum
+from saltus.studies.diagram import diagram_work
+from saltus.sweep import Parts, SweepInterrupted, parts, parts_of, status
+
+SCRIPT = Path(__file__).with_name("diagram_script.py")
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """The diagram without a store."""
+    return diagram()
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """A folder with the store of the diagram and its netCDF file."""
+    return computed(tmp_path_factory.mktemp("kept"))
+
+
+def computed(folder, **options):
+    write_dataset(folder / "diagram.nc", diagram(store=folder / "diagram.zarr", **options))
+    return folder
+
+
+def files(folder):
+    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
+def counts(store):
+    """How many inputs were computed of each kind of parts."""
+    found = {}
+    for part in parts_of(store):
+        found[part.kind] = found.get(part.kind, 0) + part.sizes["row"]
+    return found
+
+
+def test_a_store_changes_no_number_and_remembers_all_of_them(alone, kept, monkeypatch):
+    store = kept / "diagram.zarr"
+    assert status(store).complete
+    assert min(counts(store)[kind] for kind in ("motions", "branches", "judgements", "distances")) > 0
+    monkeypatch.setattr(parts, "run", None)  # nothing is left to compute
+    xr.testing.assert_identical(diagram(store=store), alone)
+
+
+def test_killed_at_several_moments_a_search_goes_on_to_the_same_bytes(kept, tmp_path):
+    chunks = sum(part.total for part in parts_of(kept / "diagram.zarr"))
+    for count in (1, 6, chunks // 3, chunks // 3 + 1):
+        command = [sys.executable, str(SCRIPT), str(tmp_path / "diagram.zarr"), str(count)]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        died = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+        assert died.returncode == -signal.SIGKILL, died.stderr
+        assert not status(tmp_path / "diagram.zarr").complete
+    assert files(computed(tmp_path)) == files(kept)
+
+
+def test_one_and_two_processes_give_the_same_bytes(alone, tmp_path, monkeypatch):
+    monkeypatch.setattr(parts, "SETTINGS", parts.PartsSettings(patience=0.0))
+    one, two = (tmp_path / name for name in ("one", "two"))
+    for folder, workers in ((one, 1), (two, 2)):
+        folder.mkdir()
+        computed(folder, workers=workers)
+    assert files(one) == files(two)
+    xr.testing.assert_identical(diagram(store=two / "diagram.zarr", workers=2), alone)
+
+
+def test_a_cluster_of_which_a_worker_dies_gives_the_same_diagram(alone, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    store, struck = tmp_path / "diagram.zarr", []
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1"
+    ) as cluster:
+
+        def kill(_, what):
+            if "following" in what and not struck:
+                struck.append(next(worker.process.pid for worker in cluster.workers.values()))
+                os.kill(struck[0], signal.SIGKILL)
+
+        there = diagram(store=store, scheduler=cluster.scheduler_address, progress=kill)
+    assert struck
+    xr.testing.assert_identical(there, alone)
+    xr.testing.assert_identical(diagram(store=store), alone)
+
+
+def test_more_values_and_starts_extend_a_store_and_equal_a_fresh_search(kept, tmp_path):
+    store, more = tmp_path / "diagram.zarr", {"values": np.linspace(*BOUNDS, 5), "starts": 6}
+    shutil.copytree(kept / "diagram.zarr", store)
+    before = counts(store)
+    extended = diagram(store=store, **more)
+    after = counts(store)
+    xr.testing.assert_identical(extended, diagram(**more))
+    fresh = tmp_path / "fresh.zarr"
+    diagram(store=fresh, **more)
+    assert all(after[kind] <= before[kind] + number for kind, number in counts(fresh).items())
+    assert after["motions"] <= before["motions"] + counts(fresh)["motions"] - 3 * 4  # 3 values with 4 starts are the same
+
+
+def test_a_motion_that_has_settled_is_the_same_however_long_it_is_given():
+    system, values = forced(2.0), np.array([1.3, 1.35, 1.45, 1.6])
+    states = np.array([[0.3, 0.0], [1.0, 0.2], [0.3, 0.0], [-1.0, 0.0]])
+    common = {"system": system.to_json(), "path": FREQUENCY, **identity(system)}
+    work, direct = (diagram_work.DiagramWork(system, FREQUENCY, made) for made in (Parts(common), None))
+    work.simulate(values, states, 200)
+    rows = [(given[3], row[1]) for given, row in work.parts.remembered(diagram_work._parts()["motions"])]
+    moving = sum(outcome == Outcome.MOVING for time, outcome in rows if time == 200)
+    assert 0 < moving < len(values)
+    longer, fresh = work.simulate(values, states, 400), direct.simulate(values, states, 400)
+    for field in fields(fresh):
+        np.testing.assert_array_equal(getattr(longer, field.name), getattr(fresh, field.name))
+    assert sum(given[3] == 400 for given, _ in work.parts.remembered(diagram_work._parts()["motions"])) == moving
+
+
+@pytest.mark.parametrize(
+    ("changes", "differs"),
+    [
+        ({"system": forced(2.1)}, "system.load.horizontal.amplitude is 2.0 there and 2.1 here"),
+        ({"window": ((-2.0, 2.0), (-2.0, 2.0))}, r"attrs.window is \[-1.5, 1.5, -1.5, 1.5\] there"),
+        ({"bounds": (1.2, 1.6)}, r"attrs.bounds is \[1.3, 1.6\] there"),
+        ({"seed": 1}, "attrs.seed is 0 there and 1 here"),
+    ],
+)
+def test_the_store_of_another_diagram_is_refused(kept, changes, differs):
+    options = {"system": forced(2.0), "bounds": BOUNDS} | changes
+    with pytest.raises(ParameterError, match=differs) as told:
+        response_spectrum(store=kept / "diagram.zarr", **options)
+    assert told.value.parameter == "store"
+    assert "--fresh" in str(told.value)
+
+
+def test_the_store_of_another_version_is_refused(kept, monkeypatch):
+    monkeypatch.setattr(provenance, "RESULT_VERSION", provenance.RESULT_VERSION + 1)
+    with pytest.raises(ParameterError, match="result_version"):
+        diagram(store=kept / "diagram.zarr")
+
+
+def test_a_second_search_of_one_store_is_refused_while_the_first_runs(tmp_path):
+    def second(_, what):
+        if "following" in what:
+            diagram(store=tmp_path / "diagram.zarr")
+
+    with pytest.raises(SweepError, match="another run is writing"):
+        diagram(store=tmp_path / "diagram.zarr", progress=second)
+
+
+def test_an_interrupt_says_what_is_kept(tmp_path):
+    def stop(_, what):
+        if "following" in what:
+            raise KeyboardInterrupt
+
+    with pytest.raises(SweepInterrupted, match=r"diagram.zarr keeps its parts: run the same again to go on"):
+        diagram(store=tmp_path / "diagram.zarr", progress=stop)
+
+
+def test_status_counts_the_parts_and_verifies_them(kept, tmp_path):
+    store = tmp_path / "diagram.zarr"
+    shutil.copytree(kept / "diagram.zarr", store)
+    told = CliRunner().invoke(app, ["status", "--verify", str(store)])
+    assert told.exit_code == 0, told.output
+    for kind in counts(store):
+        assert re.search(rf"{kind} +(\d+ parts, )?\d+ of \d+ chunks done", told.output)
+    assert "The sweep is complete" in told.output
+    chunk = next(store.glob("parts/branches_*/result/c/0/0"))
+    chunk.write_bytes(chunk.read_bytes()[:-1] + b"\0")
+    told = CliRunner().invoke(app, ["status", "--verify", str(store)])
+    assert told.exit_code == 2
+    assert "1 damaged or missing file" in told.output
+
+
+def test_a_damaged_part_is_computed_again(kept, tmp_path):
+    shutil.copytree(kept, tmp_path / "again")
+    chunk = next((tmp_path / "again").glob("diagram.zarr/parts/motions_*/result/c/0/0"))
+    chunk.write_bytes(chunk.read_bytes()[:-1] + b"\0")
+    assert files(computed(tmp_path / "again")) == files(kept)
