@@ -23,6 +23,7 @@ class CaptureSettings:
 
     cells: int = 16  # The number of intervals into which the forcing period is divided.
     batch: int = 8192  # Parameter sets at once where the time has no cells: their arrays then stay in the cache.
+    rest_cells: int = 64  # The same for what is at rest, where a bound is one evaluation and its width is the load's in a cell.
     cell_batch: int = 512  # Parameter sets at once where the time has cells, for the same reason.
     one: float = 1e-14  # A product of impact factors this close to 1 is 1: no law states its numbers more exactly.
     # The largest speeds over which the corrected invariant is bounded, as shares of the first guess; they are tried in turn.
@@ -95,6 +96,34 @@ def proved_speeds(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray
         leaves = Leaves([Interval(c[None, part]) for c in columns], records)
         result[part] = law.capture(leaves, result[part].size)
     return result
+
+
+def keeps_rest(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Whether a system with several contacts stays at rest for ever once all of them are closed, proved for columns of numbers.
+
+    It is proved where interval bounds of every contact's reaction, l = -r(t, q, 0) along its sign at rest, are positive over the
+    whole forcing period. Nothing is proved where a coordinate has no contact or two of them, or under a load by records.
+
+    Returns:
+        (n,), or (1,) for numbers alone.
+    """
+    traced = trace(system)
+    arrays = (given.get(path, np.asarray(value)) for path, value in system.parameters.items())
+    columns = np.broadcast_arrays(*map(np.atleast_1d, arrays))
+    size = columns[0].size if columns else 1
+    if traced.records or sorted(traced.held) != list(range(traced.dof)):
+        return np.zeros(size, dtype=bool)
+    state = {Expr("coordinate", (), i): position for i, position in zip(traced.held, traced.positions, strict=True)}
+    state |= {Expr(op, (), i): number(0.0) for op in ("velocity", "acceleration") for i in range(traced.dof)}
+    always = Leaves([Interval(c[None, :]) for c in columns], [])
+    frequency = next((i for i, path in enumerate(traced.parameters) if path == "load.frequency"), None)
+    time = Interval(-1e300, 1e300)
+    if frequency is not None:
+        edges = np.arange(CAPTURE.rest_cells + 1)[:, None] * (2 * np.pi / CAPTURE.rest_cells)
+        time = Interval(edges[:-1], edges[1:] * (1 + SLACK)) / always.parameters[frequency]
+    pushes = enclose([substitute(reaction, state) for reaction in traced.reactions], replace(always, time=time))
+    lowest = [np.broadcast_to(push.lo, (CAPTURE.rest_cells, size)).min(axis=0) for push in pushes]
+    return np.asarray(np.min(lowest, axis=0) > 0.0)
 
 
 def _record_ranges(system: System, traced: Trace) -> list[Interval]:

@@ -100,8 +100,13 @@ def kernel_module() -> ModuleType:
 @cache
 def load_contacts_kernel() -> Callable[..., int]:
     """The kernel for models with several contacts, `advance_contacts` of `contacts/contacts_kernel.py`."""
+    return entry_point(contacts_module().advance_contacts)
+
+
+def contacts_module() -> ModuleType:
+    """The module of the scalar kernel for models with several contacts."""
     parts = (contact_layout, complementarity, contact_impacts, contact_tangent, contacts_kernel)
-    return entry_point(load_module("contacts", _text(kernel_layout, roots, steps, *parts)).advance_contacts)
+    return load_module("contacts", _text(kernel_layout, roots, steps, *parts))
 
 
 @cache

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.systems import System, check_system
+from saltus.systems import Load, Model, System, check_system
 
 RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: the contact acceleration has no narrower peak
 
@@ -18,19 +18,32 @@ class Release:
     """A root of a contact acceleration at which it begins to pull: from then on rest cannot be kept."""
 
     time: float  # in [0, T)
-    side: int  # on which the gap then opens
+    side: int  # on which the gap then opens; with several contacts the number of one, from 1 on
     peak: float  # the greatest pull before it presses again: 0 where the release is only touched, and lost
 
 
 def contact_pull(system: System, side: int) -> Callable[[Any], Any]:
     """The second derivative of the gap of a system at rest at contact on a side, as a function of time: a_s of numerics 1.
 
-    Rest presses there while it is negative.
+    Rest presses there while it is negative. With several contacts `side` is the number of one, from 1 on, and it is the force
+    along its sign with all of them closed.
     """
     model, load = system.model, system.load
+    if model.contacts:
+        held, names = model.contacts[side - 1], model.coordinates
+        place = {contact.coordinate: float(contact.position) for contact in model.contacts}
+        position, i = [place.get(name, 0.0) for name in names], names.index(held.coordinate)
+        return lambda t: held.sign * np.asarray(_force_at_rest(model, t, position, load)[i], dtype=float)
     contact = float(model.contact)
     rate = float(model.gap(contact + 1.0, side)) - float(model.gap(contact, side))
     return lambda t: rate * np.asarray(model.acceleration(t, contact, 0.0, float(side), load), dtype=float)
+
+
+def _force_at_rest(model: Model, t: Any, position: list[float], load: Load) -> list[Any]:
+    """r(t, q, 0), as a list."""
+    if len(position) == 1:
+        return [model.force(t, position[0], 0.0, load)]
+    return list(model.force(t, tuple(position), (0.0,) * len(position), load))
 
 
 def load_releases(system: System) -> tuple[Release, ...]:
@@ -39,10 +52,11 @@ def load_releases(system: System) -> tuple[Release, ...]:
     For load (i) of the metainterface with equal layers those of side +1 are at sin(Omega t) = Hcr / Hhat, with
     Hcr = abs(V / tan(beta0)), and those of side -1 half a period later.
     """
-    check_system(system, "load_releases")
+    check_system(system, "load_releases", several_contacts=True)
     if system.load.period is None:
         return ()
-    found = [release for side in system.model.sides for release in _of_side(system, side)]
+    sides = system.model.sides or range(1, 1 + len(system.model.contacts))
+    found = [release for side in sides for release in _of_side(system, side)]
     return tuple(sorted(found, key=lambda release: release.time))
 
 

@@ -71,12 +71,14 @@ class LanePart(IntEnum):
     ENDED_POSITION = 6  # at the end of the last forcing period
     ENDED_VELOCITY = 7
     PARAMETERS = 8
-    CONSTANTS = 9
-    RECORDS = 10
-    POSITIONS = 11  # from here on Taylor series, each of SERIES_LENGTH slots
-    VELOCITIES = 12
-    ACCELERATIONS = 13
-    MARGINS = 14
+    FREE = 9  # 1 for each coordinate that no contact holds, else 0, of a model with several
+    CONTACTS = 10  # their positions
+    CONSTANTS = 11
+    RECORDS = 12
+    POSITIONS = 13  # from here on Taylor series, each of SERIES_LENGTH slots
+    VELOCITIES = 14
+    ACCELERATIONS = 15
+    MARGINS = 16  # with the reactions of several contacts before them
 
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

@@ -250,10 +250,17 @@ def _outcome(system: System, result: xarray.Dataset, varied: bool) -> np.ndarray
     outcome = np.full(stop.shape, Outcome.MOVING, dtype=np.int8)
     held = (result["side"].values == 0) & np.isin(stop, (Stop.HORIZON, Stop.REST))
     if held.any():
-        outcome[held] = Outcome.HELD if varied or load_releases(system) else Outcome.REST
+        outcome[held] = Outcome.HELD if varied or not _rest_lasts(system) else Outcome.REST
     outcome[stop == Stop.CAPTURED] = Outcome.REST
     outcome[~np.isin(stop, (Stop.HORIZON, Stop.REST, Stop.SETTLED, Stop.CAPTURED))] = Outcome.ENDED
     return outcome
+
+
+def _rest_lasts(system: System) -> bool:
+    """Whether the load never pulls where everything is at rest; of several contacts each must hold one coordinate."""
+    contacts, names = system.model.contacts, system.model.coordinates
+    known = not contacts or sorted(contact.coordinate for contact in contacts) == sorted(names)
+    return known and not load_releases(system)
 
 
 def _with_periods(found: Recurrence, compiled: Any, max_period: int, settings: RecurrenceSettings) -> Recurrence:

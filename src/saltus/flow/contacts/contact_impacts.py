@@ -10,8 +10,8 @@ import math
 import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, complementary, invert
-from saltus.flow.contacts.contact_layout import FINISHED, MOST_IMPACTS, VANISHED, ContactColumn, ContactPart, Solver
-from saltus.flow.kernel_layout import CHATTER_SPEED, SLOW, Where
+from saltus.flow.contacts.contact_layout import FINISHED, MOST_FROZEN_IMPACTS, VANISHED, ContactColumn, ContactPart, Solver
+from saltus.flow.kernel_layout import CHATTER_SPEED, SLOW, Mode, Where
 from saltus.flow.memory_layout import State
 from saltus.taylor import jit, lean_jit
 
@@ -256,7 +256,7 @@ def frozen_accumulation(solver, own, count, near, limit):
         if not near >> i & 1:
             limit = min(limit, 0.1 * time_to_close(x[i], u[i], b[i]))
         first = max(first, abs(u[i]) if near >> i & 1 else 0.0)
-    for followed in range(MOST_IMPACTS):
+    for followed in range(MOST_FROZEN_IMPACTS):
         still = closed_pulls(solver, own, count, near, b, x, u, pull)
         flight = np.inf
         for i in range(count):
@@ -286,7 +286,7 @@ def frozen_accumulation(solver, own, count, near, limit):
                 done = False
         if done:
             return time
-    return -1.0 * MOST_IMPACTS
+    return -1.0 * MOST_FROZEN_IMPACTS
 
 
 @lean_jit
@@ -349,3 +349,12 @@ def bring_to_rest(where, state, model, contacts, solver, near):
 def slow_impacts(tol):
     """The speed below which an impact may be the end of an accumulation, as with one contact."""
     return max(SLOW * math.sqrt(tol), CHATTER_SPEED)
+
+
+@lean_jit
+def is_smooth(where, contacts):
+    """Whether a motion goes on smoothly: nothing is known of its guards but that gaps which have just opened are 0."""
+    smooth = where[Where.MODE] == Mode.ARC
+    for i in range(contacts.shape[0]):
+        smooth = smooth and contacts[i, ContactColumn.SKIP] <= 1 - contacts[i, ContactColumn.CLOSED]
+    return smooth

@@ -63,7 +63,7 @@ NEAR = (
 )  # Contacts close together if when one does the other's gap is no larger than this share of what it was in the step.
 ROUNDING = 2.0**-6  # of a gap, in NEAR times the contact's position
 VIOLATED = 1e-12  # The largest share of its right-hand side by which a complementarity problem may be violated by rounding.
-MOST_IMPACTS = 100_000  # that an accumulation is followed for: e = 0.9996 needs so many for 16 digits
+MOST_FROZEN_IMPACTS = 100_000  # that an accumulation is followed for: e = 0.9996 needs so many for 16 digits
 APART = 1e-9  # Contacts close together in motions beside one if the derivatives of their instants differ by less than this share.
 RELATIVE_STEP = 1e-4  # of differences of an accumulation's duration: their error is its square, and 1e-12 by rounding
 VANISHED = 1e-16  # A contact whose impacts are slower than the first one of an accumulation by this factor rests.

@@ -24,6 +24,7 @@ from saltus.flow.contacts.contact_impacts import (
     frozen_accumulation,
     hold_coordinates,
     impact_impulses,
+    is_smooth,
     near_contacts,
     push,
     record_contact_event,
@@ -347,7 +348,9 @@ def advance_contacts(where, state, settings, env, model, contacts, steps, events
     work, solver = work_arrays(where), solver_arrays(where[Where.OWN], contacts.shape[0], where[Where.COLUMNS])
     couple(where, state, env, model, contacts, solver)
     hold_coordinates(where, env, contacts)
-    for _ in range(BATCH):
+    for batch in range(BATCH):
+        if where[Where.UNTIL_SMOOTH] > 0 and batch > 0 and is_smooth(where, contacts):
+            return Status.SMOOTH
         if where[Where.STEPS] >= steps[1].shape[0] - 4 or where[Where.EVENTS] >= events[1].shape[0] - 4:
             return Status.FULL
         origin = where[Where.PERIOD] * settings[Setting.LENGTH]

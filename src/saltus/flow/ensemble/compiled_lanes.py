@@ -12,16 +12,24 @@ from typing import Any
 
 from saltus.flow import contact_side, kernel_layout, memory_layout, roots
 from saltus.flow import function_types as scalar_types
-from saltus.flow.compiled import kernel_module
+from saltus.flow.compiled import contacts_module, kernel_module
+from saltus.flow.contacts import complementarity, contact_impacts, contact_layout
 from saltus.flow.ensemble import (
+    contact_function_types,
+    contacts_handoff,
+    contacts_of_lane,
     driver,
     forcing_periods,
     function_types,
     lane_layout,
+    lane_state,
     lane_steps,
+    meeting,
+    one_contact,
     sampling,
     scalar_fallback,
     scalar_handoff,
+    several_contacts,
 )
 from saltus.flow.ensemble.lane_functions import Slots, lane_functions_text, slots_of
 from saltus.taylor import (
@@ -38,7 +46,8 @@ from saltus.taylor import (
     records,
 )
 
-_WRITTEN_BY = digest(*(inspect.getsource(module) for module in (scalar_types, function_types, lane_vectors)))
+_TYPES = (scalar_types, function_types, contact_function_types, lane_vectors)
+_WRITTEN_BY = digest(*(inspect.getsource(module) for module in _TYPES))
 _SIGNATURES = f"""
 from saltus.flow.ensemble.function_types import *
 from saltus.taylor.lane_vectors import *
@@ -48,36 +57,51 @@ from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit, p
 
 
 @cache
-def load_driver() -> Callable[..., None]:
-    """The driver of all lanes, `run_lanes` of `driver.py`; it works without Python's lock."""
-    return entry_point(load_module("lanes", _driver_text()).run_lanes)
+def load_driver(several: bool = False) -> Callable[..., None]:
+    """The driver of all lanes, `run_lanes` of `driver.py`, for models with several contacts or others; without Python's lock."""
+    return entry_point(load_module("lanes", _driver_text(several)).run_lanes)
 
 
-def _driver_text() -> str:
-    return _text(memory_layout, kernel_layout, lane_layout, contact_side, records, lane_steps, sampling, forcing_periods, driver)
+def _driver_text(several: bool) -> str:
+    step = (contact_layout, complementarity, contact_impacts, contacts_of_lane, several_contacts) if several else (one_contact,)
+    common = (memory_layout, kernel_layout, lane_layout, contact_side, records, lane_steps, meeting, sampling)
+    return _text(several, *common, *step, forcing_periods, driver)
 
 
-def _text(*modules: ModuleType) -> str:
+def _text(several: bool, *modules: ModuleType) -> str:
     """One source of the compiled parts of several files, for vectors of this machine's width."""
-    return generated_header(_SIGNATURES) + "".join(compiled_part(module) for module in modules)
+    types = "from saltus.flow.ensemble.contact_function_types import *\n" if several else ""
+    return generated_header(_SIGNATURES + types) + "".join(compiled_part(module) for module in modules)
 
 
-def compile_driver_aside() -> subprocess.Popen[bytes] | None:
-    """Where the driver is not on disk yet, a process that compiles it, as this one has much else to compile; else None."""
-    if load_driver.cache_info().currsize or is_compiled(module_name("lanes", _driver_text())):
+@cache
+def compile_driver_aside(several: bool) -> subprocess.Popen[bytes] | None:
+    """Where the driver is not on disk yet, a process that compiles it, as this one has much else to compile; else None.
+
+    The same for every further call, which finds that process ended.
+    """
+    if is_compiled(module_name("lanes", _driver_text(several))):
         return None
     try:
         found = f"import sys; sys.path[:] = {sys.path!r}; "  # as this process has come to know it
-        return subprocess.Popen([sys.executable, "-c", f"{found}from {__name__} import load_driver; load_driver()"])
+        call = f"{found}from {__name__} import load_driver; load_driver({several})"
+        return subprocess.Popen([sys.executable, "-c", call])
     except OSError:
         return None
 
 
 @cache
-def load_helpers() -> tuple[Any, ...]:
-    """What the driver calls for one lane: `lane_root`, `turning_range` and `scalar_motion`."""
-    module = load_module("lane_helpers", _text(kernel_layout, lane_layout, roots, scalar_fallback, scalar_handoff))
-    return tuple(pointer(getattr(module, name)) for name in ("lane_root", "turning_range", "scalar_motion"))
+def load_helpers(several: bool = False) -> tuple[Any, ...]:
+    """What the driver calls for one lane: `lane_root`, `turning_range`, `scalar_motion`, and impacts at several contacts."""
+    names = ["lane_root", "turning_range", "scalar_motion"]
+    parts = [kernel_layout, lane_layout, roots, scalar_fallback, lane_state]
+    if several:
+        names.append("contacts_impact")
+        parts += [contact_layout, complementarity, contact_impacts, contacts_of_lane, contacts_handoff]
+    else:
+        parts.append(scalar_handoff)
+    module = load_module("lane_helpers", _text(several, *parts))
+    return tuple(pointer(getattr(module, name)) for name in names)
 
 
 def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
@@ -87,20 +111,20 @@ def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
 
 
 @cache
-def load_advance() -> Any:
+def load_advance(several: bool = False) -> Any:
     """The scalar kernel, which the driver calls for one lane."""
-    return pointer(kernel_module().advance)
+    return pointer(contacts_module().advance_contacts if several else kernel_module().advance)
 
 
-def compile_everything() -> None:
+def compile_everything(several: bool = False) -> None:
     """Compile the driver, its helpers and the scalar kernel, or load them where they are on disk."""
-    load_driver()
-    load_helpers()
-    load_advance()
+    load_driver(several)
+    load_helpers(several)
+    load_advance(several)
 
 
-def compile_beside(driver: subprocess.Popen[bytes]) -> None:
+def compile_beside(driver: subprocess.Popen[bytes], several: bool) -> None:
     """Compile what the driver needs while another process compiles the driver, and wait for that."""
-    load_helpers()
-    load_advance()
+    load_helpers(several)
+    load_advance(several)
     driver.wait()

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.flow.motion_dataset import rate_name
+
 if TYPE_CHECKING:
     import xarray
 
@@ -19,9 +21,10 @@ def stop_names(dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
 
 
 def stroboscopic(system: System, dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
-    """The states (coordinate, velocity) at the ends of the forcing periods that were kept, in the order of time.
+    """The states (coordinates, then velocities) at the ends of the forcing periods that were kept, in the order of time.
 
-    The shape is that of the ensemble, then (periods, 2); states are nan where a motion had fewer periods than were kept.
+    The shape is that of the ensemble, then (periods, d); states are nan where a motion had fewer periods than were kept.
     """
-    name = system.model.coordinates[0]
-    return np.stack([dataset[f"sampled_{name}"].values, dataset["sampled_velocity"].values], axis=-1)
+    names = system.model.coordinates
+    states = [*names, *(rate_name(name, names) for name in names)]
+    return np.stack([dataset[f"sampled_{name}"].values for name in states], axis=-1)

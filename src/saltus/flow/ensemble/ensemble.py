@@ -72,7 +72,7 @@ def simulate_many(
     Raises:
         ParameterError: an argument without meaning. A trajectory that cannot go on raises nothing: `stop` says so.
     """
-    check_system(system, "simulate_many")
+    check_system(system, "simulate_many", several_contacts=sensitivities is None)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     wanted = Wanted(
         tol=tol,
@@ -98,7 +98,7 @@ def _run(
     progress: Progress,
 ) -> xarray.Dataset:
     """Compile what is not there yet, run the trajectories, and write their dataset."""
-    driver = compile_driver_aside()
+    driver = compile_driver_aside(bool(system.model.contacts))
     run = program(system, wanted.limits, wanted.paths)
     if system.model.sides:
         check_contact(system)
@@ -112,7 +112,7 @@ def _run(
     check_memory("last", 16.0 * len(wanted.sample) * kept * inputs.size, f"samples of {kept} periods of {inputs.size} motions")
     lanes = compiled_lanes(system, run, wanted, kept)
     if driver is not None:
-        compile_beside(driver)
+        compile_beside(driver, bool(system.model.contacts))
     ends = lanes.run(jobs, threads, progress, total=float(np.sum(spans + 1)))
     return to_dataset(system, inputs, wanted, jobs, ends)
 
@@ -120,14 +120,18 @@ def _run(
 def _capture(system: System, columns: dict[str, np.ndarray], limits: tuple[str, ...]) -> Any:
     """The speed below which each trajectory is proved to be captured, computed once for equal parameters.
 
+    With several contacts it is asked only once all are closed and nothing moves: it is 0 or infinite.
+
     Raises:
         ParameterError: a margin to stop at besides the model's own, which a captured motion may still reach.
     """
-    from saltus.bounds import proved_speeds
+    from saltus.bounds import keeps_rest, proved_speeds
 
     asked = [name for name in limits if name not in system.model.stops]
     if asked:
         raise ParameterError(f'until="rest" proves nothing about {asked[0]}; leave out either it or stop_at')
+    if system.model.contacts:
+        return np.where(keeps_rest(system, columns), math.inf, 0.0)
     if not system.model.sides:
         return 0.0
     varied = {path: values for path, values in columns.items() if values.ndim}
@@ -163,7 +167,7 @@ def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> L
         program=run,
         slots=slots,
         functions=functions,
-        parameters=np.array([value for _, value in numbers(system)] or [0.0]),
+        parameters=run.env[0] if run.trace.signs else np.array([value for _, value in numbers(system)] or [0.0]),
         records=(run.env[2], run.env[3]),
         tol=wanted.tol,
         kept=kept if wanted.sample else 1,

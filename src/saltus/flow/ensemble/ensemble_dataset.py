@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from saltus.flow.ensemble.inputs import Inputs
     from saltus.flow.ensemble.threads import Ends, Jobs
-    from saltus.systems import Model, System
+    from saltus.systems import Contact, Model, System
 
 STOPS = {
     Status.DONE: Stop.HORIZON,
@@ -36,7 +36,19 @@ STOPS = {
 
 # What a dataset has besides the coordinates and velocities of the model and what is called after those.
 FIXED = (
-    *("time", "side", "stop", "limit", "recurrence_period", "impact_count", "grazings", "periods", "chatter_speed", "derivative"),
+    *(
+        "time",
+        "side",
+        "closed_contacts",
+        "stop",
+        "limit",
+        "recurrence_period",
+        "impact_count",
+        "grazings",
+        "periods",
+        "chatter_speed",
+        "derivative",
+    ),
     *("least_speed", "overall_least_speed", "period_impact_count", "start_time"),
 )
 DIMENSIONS = ("period", "state", "column")
@@ -60,8 +72,8 @@ def to_dataset(system: System, inputs: Inputs, wanted: Wanted, jobs: Jobs, ends:
     import xarray
 
     writer = _Writer(system.model, inputs)
-    _add_ends(writer, jobs, ends)
-    _add_stops(writer, ends, wanted)
+    _add_ends(writer, jobs, ends, system.model.contacts)
+    _add_stops(writer, ends, wanted, bool(system.model.singularity))
     _add_samples(writer, ends, wanted.sample)
     if wanted.paths is not None:
         _add_derivatives(writer, jobs, ends, wanted.paths, wanted.periods)
@@ -90,7 +102,7 @@ class _Writer:
         self.variables[name] = xarray.Variable((*self.dims, *extra), reshaped, attributes, fastpath=True)
 
 
-def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends) -> None:
+def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends, contacts: tuple[Contact, ...]) -> None:
     """The states at the end, and what happened until then."""
     rows = jobs.states.shape[1] // 2
     for i, (name, rate) in enumerate(zip(writer.names, writer.rates, strict=True)):
@@ -99,7 +111,12 @@ def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends) -> None:
     length, local = jobs.numbers[:, JobNumber.PERIOD_LENGTH], ends.numbers[:, EndNumber.TIME]
     writer.add("time", ends.of(EndLabel.PERIOD) * length + local, "1", "dimensionless time tau at the end")
     held = np.isin(ends.of(EndLabel.MODE), (Mode.REST, Mode.CHATTER))
-    writer.add("side", np.where(held, 0, ends.of(EndLabel.SIDE)).astype(np.int8), "1", "side at the end, 0 at rest")
+    side, names = ends.of(EndLabel.SIDE), [contact.name for contact in contacts]
+    if names:
+        flags = {"flag_masks": np.array([1 << i for i in range(len(names))], dtype=np.int8), "flag_meanings": " ".join(names)}
+        writer.add("closed_contacts", (side - 1).astype(np.int8), "1", "contacts that are closed at the end", **flags)
+        side = np.ones_like(side)
+    writer.add("side", np.where(held, 0, side).astype(np.int8), "1", "side at the end, 0 at rest")
     writer.add("impact_count", ends.of(EndLabel.IMPACTS), "1", "impacts")
     writer.add("grazings", ends.of(EndLabel.GRAZINGS), "1", "touches of the contact without an impact")
     if (length > 0).all():
@@ -136,13 +153,15 @@ def _is_coordinate(name: str, values: np.ndarray, inputs: Inputs) -> bool:
     return bool(np.array_equal(values_there.values.reshape(-1), values))
 
 
-def _add_stops(writer: _Writer, ends: Ends, wanted: Wanted) -> None:
+def _add_stops(writer: _Writer, ends: Ends, wanted: Wanted, singular: bool) -> None:
     """Why each trajectory ended."""
     reasons, members = ends.of(EndLabel.STATUS), tuple(Stop)
     codes = np.full(reasons.shape, -1, dtype=np.int8)
     for reason, stop in STOPS.items():
         codes[reasons == reason] = members.index(stop)
     codes[(reasons == Status.DONE) & (ends.of(EndLabel.MODE) == Mode.REST)] = members.index(Stop.REST)
+    if singular:  # the model says what it means that its steps shrink to nothing
+        codes[reasons == Status.STALLED] = members.index(Stop.SINGULAR)
     comment = "; ".join(f"{stop}: {stop.meaning}" for stop in Stop)
     writer.add("stop", codes, "1", "why it ended", **_flags(members), comment=comment)
     if wanted.limits:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.contact_side import side_of_state
 from saltus.flow.ensemble.lane_layout import (
     MOST_IMPACTS,
     Code,
@@ -23,6 +22,7 @@ from saltus.flow.ensemble.lane_layout import (
     Slot,
 )
 from saltus.flow.ensemble.lane_steps import row_count
+from saltus.flow.ensemble.one_contact import begin_contact
 from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE, recurrence_period
 from saltus.flow.kernel_layout import Mode, Status
 from saltus.flow.memory_layout import LanePart
@@ -35,7 +35,7 @@ from saltus.taylor import get, inline_jit, lean_jit, load, put, store
 def fill(lane, i, code, sizes, at, m, flags, lanes, jobs, tables):
     """Put trajectory i into a lane."""
     state, numbers, labels, parameters = jobs
-    label, number, constants, geometry, _, agreements = lanes
+    label, number, constants, agreements = lanes[0], lanes[1], lanes[2], lanes[5]  # in the places of `LaneArray`
     label[lane, LaneLabel.TRAJECTORY], label[lane, LaneLabel.LAST_PERIOD] = i, labels[i, JobLabel.LAST_PERIOD]
     label[lane, LaneLabel.LEAVE_BY], label[lane, LaneLabel.PIECE] = labels[i, JobLabel.LEAVE_BY], labels[i, JobLabel.PIECE]
     label[lane, LaneLabel.HELD] = label[lane, LaneLabel.SKIP] = label[lane, LaneLabel.GRAZINGS] = 0
@@ -43,17 +43,15 @@ def fill(lane, i, code, sizes, at, m, flags, lanes, jobs, tables):
     agreements[lane, :] = 0
     env = (parameters[i], constants[lane], tables[0], tables[1])
     code[Code.CONSTANTS](parameters[i], constants[lane])
-    code[Code.GEOMETRY](env, geometry[lane])
     half = state.shape[1] // 2
     put_all(m, at[LanePart.POSITION], lane, state[i, :half])
     put_all(m, at[LanePart.VELOCITY], lane, state[i, half:])
     put_all(m, at[LanePart.PARAMETERS], lane, parameters[i])
     put_all(m, at[LanePart.CONSTANTS], lane, constants[lane])
-    put_all(m, Slot.CONTACT, lane, geometry[lane])
     begin_time(lane, m, numbers[i], labels[i])
     begin_overall(lane, m)
     begin_records(lane, at, m)
-    mode, side = side_of_state(sizes[Size.SIDES], state[i, 0], state[i, half], geometry[lane])
+    mode, side = begin_contact(lane, code, sizes, at, m, lanes, env, state[i], labels[i, JobLabel.PIECE])
     label[lane, LaneLabel.MODE] = mode
     put(m, Slot.SIDE, lane, float(side))
     bit = 1 << lane
@@ -183,7 +181,7 @@ def keep_sample(lane, sizes, at, m, lanes, results):
 @inline_jit
 def end_period(lane, sizes, at, m, lanes, results):
     """Keep a forcing period that is over; returns the period with which the trajectory repeats itself, or 0."""
-    labels, numbers, _, _, states, agreements = lanes
+    labels, numbers, states, agreements = lanes[0], lanes[1], lanes[4], lanes[5]  # in the places of `LaneArray`
     if sizes[Size.EVERY_END] > 0:
         keep_sample(lane, sizes, at, m, lanes, results)
     if sizes[Size.SETTLE] == 0:

@@ -18,6 +18,7 @@ class Slots:
     rows: int  # coordinates, those of the sensitivities included
     own: int  # the model's
     parameters: int
+    contacts: int  # of a model with several
     constants: int
     records: int
     stops: int
@@ -25,7 +26,8 @@ class Slots:
     @cached_property
     def places(self) -> dict[LanePart, int]:
         """The first slot of each part."""
-        sizes = [self.rows] * 8 + [self.parameters, self.constants, self.records * RECORD_WIDTH]
+        sizes = [self.rows] * 8 + [self.parameters, self.own if self.contacts else 0, self.contacts, self.constants]
+        sizes += [self.records * RECORD_WIDTH]
         sizes += [rows * SERIES_LENGTH for rows in (self.rows, self.rows, self.own, self.stops)]
         return {part: FIRST_PART + sum(sizes[:part]) for part in LanePart}
 
@@ -40,10 +42,11 @@ def slots_of(trace: Trace) -> Slots:
     return Slots(
         rows=len(trace.acceleration),
         own=trace.dof,
-        parameters=max(1, len(trace.parameters)),
+        parameters=max(0 if trace.signs else 1, len(trace.parameters)),
+        contacts=len(trace.signs),
         constants=max(1, len(constants(trace))),
         records=len(trace.records),
-        stops=len(trace.margins),
+        stops=len(trace.reactions) + len(trace.margins),
     )
 
 
@@ -55,9 +58,10 @@ def lane_functions_text(trace: Trace) -> str:
 
 def _leaves(slots: Slots, time: LaneSlot, position: LanePart, velocity: LanePart) -> dict[str, tuple[str, int]]:
     """Where the lanes' memory has the leaves of a trace, of one of the times and states in it."""
-    parts = {"coordinate": position, "velocity": velocity, "parameter": LanePart.PARAMETERS, "constant": LanePart.CONSTANTS}
+    parts = {"coordinate": position, "velocity": velocity, "parameter": LanePart.PARAMETERS, "free": LanePart.FREE}
+    parts |= {"constant": LanePart.CONSTANTS, "record": LanePart.RECORDS}
     numbers = {"time": time, "record_time": LaneSlot.NOW, "origin": LaneSlot.ORIGIN, "side": LaneSlot.SIDE}
-    first = {op: slots.places[part] for op, part in (parts | {"record": LanePart.RECORDS}).items()}
+    first = {op: slots.places[part] for op, part in parts.items()}
     return {op: ("m", int(slot)) for op, slot in (first | numbers).items()}
 
 

@@ -46,6 +46,7 @@ class Slot(IntEnum):
     PASSED_TOGETHER = 28  # forcing periods below this number are ended for all lanes at once
     NEXT_CHECK = 29  # the number of impacts at which it is checked next that they do not accumulate without end
     LAST_CHECK = 30  # the time at which that was last checked
+    NEW_SPEED = 31  # of an impact, before it, of a model with several contacts
 
 
 class Size(IntEnum):
@@ -65,6 +66,7 @@ class Size(IntEnum):
     SETTLE = 11  # whether a trajectory ends when it repeats itself
     ENDS_ASKED = 12  # whether the ends of forcing periods are asked for at all
     EVERY_END = 13  # whether each of them is looked at
+    CONTACTS = 14  # of a model with several; their coordinates stand behind, then their signs
 
 
 class LaneSetting(IntEnum):
@@ -81,9 +83,10 @@ class LaneArray(IntEnum):
     LABELS = 0  # see `LaneLabel`
     NUMBERS = 1  # see `LaneNumber`
     CONSTANTS = 2  # of the structure
-    GEOMETRY = 3  # of its contact
+    GEOMETRY = 3  # of its contact; of several, what `matrices` gives
     STATES = 4  # the last stroboscopic states, of which the oldest is overwritten
     AGREEMENTS = 5  # for each q, how many states in a row agreed with those q forcing periods before
+    CONTACTS = 6  # of a model with several, the scalar kernel's array `contacts`
 
 
 class LaneLabel(IntEnum):
@@ -120,6 +123,7 @@ class Helper(IntEnum):
     FIRST_ROOT = 0
     TURNING_RANGE = 1
     SCALAR_MOTION = 2
+    IMPACT = 3  # of a model with several contacts
 
 
 class Code(IntEnum):
@@ -129,7 +133,7 @@ class Code(IntEnum):
     IMPACT = 1
     FIELD = 2
     CONSTANTS = 3
-    GEOMETRY = 4
+    GEOMETRY = 4  # or `matrices`
 
 
 class JobArray(IntEnum):
@@ -187,3 +191,4 @@ class EndLabel(IntEnum):
 
 MOST_IMPACTS = 1e6  # of a unit of time, or of a shorter forcing period: more are an accumulation that is not being resolved
 NO_ROOT, TOUCH = -1.0, -2.0  # instead of the time of a lane's root
+FAST = 1e300  # A state beyond this has left the range of numbers.

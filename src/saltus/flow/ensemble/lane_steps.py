@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.ensemble.lane_layout import Code, Size
+from saltus.flow.ensemble.lane_layout import Code, Size, Slot
 from saltus.flow.kernel_layout import DEFECT, SMALLEST
 from saltus.flow.memory_layout import SERIES_LENGTH, LanePart
 from saltus.taylor import (
@@ -24,6 +24,7 @@ from saltus.taylor import (
     mask,
     maximum,
     minimum,
+    replace,
     rough_exp2,
     rough_inverse,
     rough_log2,
@@ -126,12 +127,14 @@ def upper_half(m, series, order, log_size, log_tol):
 
 
 @inline_jit
-def sweep(m, at, order, start, h):
-    """Position from `start` on, velocity and acceleration at h, and B = h^2 sum_{j>=2} abs(a_j) h^j.
+def sweep(m, at, row, order, start, h):
+    """Position from `start` on, velocity and acceleration at h of a coordinate, and B = h^2 sum_{j>=2} abs(a_j) h^j.
 
     B bounds how far the second derivative in u = t/h strays from that of the cubic q_0 + ... + q_3 h^3 u^3.
     """
-    positions, velocities, accelerations = at[LanePart.POSITIONS], at[LanePart.VELOCITIES], at[LanePart.ACCELERATIONS]
+    before = row * SERIES_LENGTH
+    positions, velocities = at[LanePart.POSITIONS] + before, at[LanePart.VELOCITIES] + before
+    accelerations = at[LanePart.ACCELERATIONS] + before
     x, v, a = load(m, positions + order), load(m, velocities + order), load(m, accelerations + order - 1)
     bend = absolute(a)
     x, v = fma(x, h, load(m, positions + order - 1)), fma(v, h, load(m, velocities + order - 1))
@@ -145,9 +148,9 @@ def sweep(m, at, order, start, h):
 
 
 @inline_jit
-def motion_at(m, at, order, start, h):
-    """Position from `start` on, velocity, acceleration, and half its rate of change, at h."""
-    positions, velocities = at[LanePart.POSITIONS], at[LanePart.VELOCITIES]
+def motion_at(m, at, row, order, start, h):
+    """Position from `start` on, velocity, acceleration, and half its rate of change of a coordinate, at h."""
+    positions, velocities = at[LanePart.POSITIONS] + row * SERIES_LENGTH, at[LanePart.VELOCITIES] + row * SERIES_LENGTH
     x, v, a, jerk = load(m, positions + order), load(m, velocities + order), splat(0.0), splat(0.0)
     for k in range(order - 1, 0, -1):
         jerk, a = fma(jerk, h, a), fma(a, h, v)
@@ -228,7 +231,7 @@ def first_guess(cubic, f, slope, pull):
 
 
 @inline_jit
-def only_root(m, at, order, h, start, sign, cubic, end, chosen):
+def only_root(m, at, row, order, h, start, sign, cubic, end, chosen):
     """The root in (0, h] of gaps that have one there, not negative at 0 (if zero, then growing) and negative at h.
 
     Moves as in `root_move` from `first_guess`, with bisection where one leaves the bracket; `sign` is 1 or -1. A lane stays where
@@ -240,7 +243,7 @@ def only_root(m, at, order, h, start, sign, cubic, end, chosen):
     tau = select(mask(bits(tau > 0.0) & bits(tau <= h)), tau, 0.5 * h)  # the guess may have gone astray
     speed, active = v, chosen
     for _ in range(60):
-        x, v, a, jerk = motion_at(m, at, order, start, tau)
+        x, v, a, jerk = motion_at(m, at, row, order, start, tau)
         inverse = rough_inverse(v)
         inverse = inverse * (2.0 - v * inverse)
         before = mask(bits(sign * x > 0.0))
@@ -293,3 +296,19 @@ def series_true(code, m, at, sizes, tol, h, size):
             slope = fma(slope, h, load(m, series + k))
         defect = maximum(defect, absolute(load(m, at[LanePart.AFTER_VELOCITY] + row) - slope))
     return bits(defect * h <= (DEFECT * tol) * size)
+
+
+@inline_jit
+def commit(at, m, moved, hit, speed):
+    """Make the new state of the lanes in `moved` their state, and what is after an impact that of those in `hit`.
+
+    `speed` is that of the impacts.
+    """
+    going, impact = mask(moved), mask(hit)
+    replace(m, Slot.NOW, going, load(m, Slot.NEW_TIME))
+    replace(m, Slot.SIDE, impact, load(m, Slot.NEW_SIDE))
+    replace(m, Slot.LEAST_SPEED, impact, minimum(load(m, Slot.LEAST_SPEED), speed))
+    replace(m, Slot.IMPACTS, impact, load(m, Slot.IMPACTS) + 1.0)
+    for row in range(2 * row_count(at)):  # positions, then velocities, lie one behind the other
+        new = select(impact, load(m, at[LanePart.AFTER_POSITION] + row), load(m, at[LanePart.NEW_POSITION] + row))
+        replace(m, at[LanePart.POSITION] + row, going, new)

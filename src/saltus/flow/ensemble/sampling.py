@@ -42,7 +42,7 @@ def turning_value(m, at, order, low, high, v0, chosen):
     h, tau = high - low, 0.5 * (low + high)
     active, start = chosen, load(m, at[LanePart.POSITION])
     for _ in range(MOST_MOVES):
-        _, v, a, _ = motion_at(m, at, order, start, tau)
+        _, v, a, _ = motion_at(m, at, 0, order, start, tau)
         before = mask(bits(v * v0 > 0.0))
         low, high = select(before, tau, low), select(before, high, tau)
         following = tau - v / a

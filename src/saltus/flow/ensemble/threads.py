@@ -113,7 +113,7 @@ class Lanes:
         )
         controls = [np.zeros(2, dtype=np.int64) for _ in range(threads)]
         waiting, lock = chunks(n, threads), threading.Lock()
-        compile_everything()  # here, not in each thread
+        compile_everything(self.several)  # here, not in each thread
         progress(0.0, WHAT)
         with ThreadPoolExecutor(threads) as pool:
             try:  # an interrupt while they are begun must stop them too, or the pool would wait for their end
@@ -129,6 +129,11 @@ class Lanes:
                 worker.result()
         progress(1.0, WHAT)
         return ends
+
+    @property
+    def several(self) -> bool:
+        """Whether the model has several contacts."""
+        return bool(self.program.structure.signs)
 
     @property
     def own(self) -> int:
@@ -156,15 +161,16 @@ class Lanes:
         samples = np.full((len(states), self.kept, 2 * self.own + 4), np.nan)
         results = (ends.states[rows], ends.numbers[rows], ends.labels[rows], samples)
         chunk = (states, jobs.numbers[rows], jobs.labels[rows], parameters)
-        load_driver()(*fixed, memory, chunk, self.records, results, control)
+        load_driver(self.several)(*fixed, memory, chunk, self.records, results, control)
         ends.samples[rows] = samples[:, :, self.sampled]
 
     def _arguments(self) -> tuple[Any, ...]:
         """What every call of the driver is given: functions, sizes, places and settings."""
-        structure = self.program.structure
-        module, scalar = structure.module, structure.functions
-        code = (*self.functions, pointer(module.constants), pointer(module.geometry))
-        sizes = np.zeros(len(Size), dtype=np.int64)
+        structure, trace = self.program.structure, self.program.trace
+        module, scalar = structure.module, self.program.model if self.several else structure.functions
+        code = (*self.functions, pointer(module.constants), pointer(module.matrices if self.several else module.geometry))
+        contacts = np.array([len(trace.signs), *trace.held, *trace.signs], dtype=np.int64)
+        sizes = np.concatenate([np.zeros(Size.CONTACTS, dtype=np.int64), contacts])
         given = {
             Size.OWN: module.OWN,
             Size.COLUMNS: module.COLUMNS,
@@ -185,7 +191,7 @@ class Lanes:
         slowest = max(SLOW * math.sqrt(self.tol), CHATTER_SPEED)
         settings = np.array([self.tol, SHORTEST, slowest])  # in the places of `LaneSetting`
         places = np.array(list(self.slots.places.values()), dtype=np.int64)
-        return code, (load_advance(), scalar), load_helpers(), sizes, places, settings
+        return code, (load_advance(self.several), scalar), load_helpers(self.several), sizes, places, settings
 
     def _memory(self) -> np.ndarray:
         """The lanes' memory; vectors lie within one line of the cache each, or every load would touch two."""

@@ -1,0 +1,34 @@
+"""The types of the lanes' functions for models with several contacts, in the place of those in `function_types.py`."""
+
+from __future__ import annotations
+
+from numba import types
+
+from saltus.flow.ensemble.function_types import (
+    JOBS,
+    LANE_FIELD,
+    LANE_IMPACT,
+    LANE_ROOT,
+    LANE_SERIES,
+    RESULTS,
+    TABLES,
+    TURNING_RANGE,
+)
+from saltus.flow.function_types import ADVANCE_CONTACTS, CONSTANTS, CONTACT_MODEL, MATRICES
+from saltus.taylor import pointers
+
+_f, _i = types.float64, types.int64
+_f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
+_i1, _i2, _i3 = (types.Array(_i, n, "C") for n in (1, 2, 3))
+
+LANES = types.Tuple((_i2, _f2, _f2, _f2, _f3, _i2, _i3))
+_SOLVER = types.Tuple((_f1, *4 * (_f2,), *12 * (_f1,), _f2))
+SPACE = types.Tuple((_f1, _f1, _i1, _f1, _i2, _SOLVER))
+with pointers():
+    CODE = types.Tuple([types.FunctionType(s) for s in (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS, MATRICES)])
+    SCALAR = types.Tuple((types.FunctionType(ADVANCE_CONTACTS), CONTACT_MODEL))
+    SCALAR_MOTION = types.UniTuple(_i, 2)(_i, SCALAR, _i1, _i1, _f1, _i1, _f1, LANES, _f2, TABLES, _f1, _i1)
+    CONTACTS_IMPACT = _i(_i, _i, SCALAR, _i1, _i1, _f1, _f1, LANES, _f2, TABLES, SPACE)
+    _helpers = (LANE_ROOT, TURNING_RANGE, SCALAR_MOTION, CONTACTS_IMPACT)
+    HELPERS = types.Tuple([types.FunctionType(signature) for signature in _helpers])
+RUN_LANES = types.void(CODE, SCALAR, HELPERS, _i1, _i1, _f1, _f1, JOBS, TABLES, RESULTS, _i1)

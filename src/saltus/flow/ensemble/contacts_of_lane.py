@@ -1,0 +1,38 @@
+"""Which contacts of a lane are closed, of a model with several.
+
+Its compiled part goes into one module with that of `several_contacts.py`, and with that of `contacts_handoff.py`.
+"""
+
+from __future__ import annotations
+
+from saltus.flow.contacts.contact_layout import ContactColumn
+from saltus.flow.ensemble.lane_layout import Size, Slot
+from saltus.flow.memory_layout import LanePart
+from saltus.taylor import get, lean_jit, put
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@lean_jit
+def tell_closed(lane, at, m, contacts):
+    """Tell the model's functions which coordinates of a lane are free; returns its closed contacts as bits."""
+    closed = 0
+    for d in range(at[LanePart.VELOCITY] - at[LanePart.POSITION]):
+        put(m, at[LanePart.FREE] + d, lane, 1.0)
+    for i in range(contacts.shape[0]):
+        if contacts[i, ContactColumn.CLOSED] == 1:
+            closed |= 1 << i
+            put(m, at[LanePart.FREE] + contacts[i, ContactColumn.COORDINATE], lane, 0.0)
+    return closed
+
+
+@lean_jit
+def contacts_of(lane, sizes, at, m, contacts):
+    """Fill the scalar kernel's `contacts` of a lane that moves smoothly: an open gap may be 0 at the start."""
+    closed = int(get(m, Slot.SIDE, lane)) - 1
+    for i in range(contacts.shape[0]):
+        coordinate = sizes[Size.CONTACTS + 1 + i]
+        there = get(m, at[LanePart.POSITION] + coordinate, lane) == get(m, at[LanePart.CONTACTS] + i, lane)
+        contacts[i, ContactColumn.COORDINATE], contacts[i, ContactColumn.CLOSED] = coordinate, closed >> i & 1
+        contacts[i, ContactColumn.SKIP] = 1 if there and not closed >> i & 1 else 0
+        contacts[i, ContactColumn.RELEASED] = contacts[i, ContactColumn.WAITS] = 0

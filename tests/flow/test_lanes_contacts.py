@@ -1,0 +1,173 @@
+"""Ensembles of models with several contacts: the same motions as the scalar kernel's, in lanes and on all cores."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from test_contacts import BETA80, layers
+
+import saltus
+from saltus.errors import MotionError, ParameterError
+from saltus.flow import Outcome, find_recurrence, stop_names
+from saltus.systems import Contact, Harmonic, InelasticImpact, Load, Metainterface, Model, NewtonImpact, System, VelocityReduction
+
+CASES = 150
+
+
+@dataclass(frozen=True, kw_only=True)
+class BetweenWalls(Model):
+    """x'' = F(tau) - c x' for -1 <= x <= 1: two contacts of one coordinate."""
+
+    damping: float = 0.1
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    sides: ClassVar[tuple[int, ...]] = ()
+
+    @property
+    def contacts(self):
+        return (Contact(name="left", coordinate="x", position=-1.0), Contact(name="right", coordinate="x", sign=-1, position=1.0))
+
+    def force(self, t, x, velocity, load):
+        return load.force(t) - self.damping * velocity
+
+
+def random_parameters(count, seed):
+    """Numbers of as many systems of one structure, and states from which they start: at rest, open, or both closed."""
+    rng = np.random.default_rng(seed)
+    numbers = {
+        "impact.e.0": rng.uniform(0, 0.9, count) * (rng.random(count) < 0.7),
+        "impact.e.1": rng.uniform(0, 0.9, count) * (rng.random(count) < 0.7),
+        "load.vertical": rng.uniform(-1.5, 0.3, count),
+        "load.horizontal.amplitude": rng.uniform(0, 1.0, count),
+        "load.frequency": rng.uniform(0.3, 3.0, count),
+        "load.ground_horizontal.amplitude": rng.uniform(0, 0.2, count),
+        "model.beta0": np.radians(rng.uniform(20, 160, count)),
+        "model.mass_ratio": 10 ** rng.uniform(-2, 1, count),
+        "model.damping": rng.uniform(0, 0.3, count),
+        "model.stiffness_ratio": rng.uniform(0.3, 2.0, count),
+        "model.dissipation_ratio": rng.uniform(0, 2.0, count),
+    }
+    x = rng.uniform(0.02, 0.6, (2, count)) * (rng.random((2, count)) < 0.7)
+    v = np.where(x > 0, rng.uniform(-0.5, 0.5, (2, count)), 0.0)
+    return numbers, x, v
+
+
+def end(result):
+    """The states at the end of an ensemble, (n, 4)."""
+    names = ("theta_1", "theta_2", "theta_1_velocity", "theta_2_velocity")
+    return np.stack([result[name].values for name in names], axis=-1)
+
+
+def test_ensembles_of_random_systems_are_the_scalar_motions():
+    """States to 1e-9, and exactly what is counted, wherever a change of the start by 1e-9 shows no amplification above 100."""
+    system, (numbers, x, v) = layers(e=(0.1, 0.1)), random_parameters(CASES, seed=5)
+    options = {"duration": 8.0, "tol": 1e-13, "parameters": numbers}
+    result = saltus.simulate_many(system, theta_1=x[0], theta_2=-x[1], velocity=(v[0], -v[1]), **options)
+    moved = saltus.simulate_many(system, theta_1=x[0] * (1 + 1e-9), theta_2=-x[1] * (1 + 1e-9), velocity=(v[0], -v[1]), **options)
+    calm = (np.abs(end(moved) - end(result)).max(axis=1) < 1e-7) & (moved.impact_count == result.impact_count).values
+    assert calm.sum() > 0.7 * CASES
+    for i in np.flatnonzero(calm):
+        one = system.with_({path: float(values[i]) for path, values in numbers.items()})
+        state = {"theta": (x[0, i], -x[1, i]), "velocity": (v[0, i], -v[1, i])}
+        try:
+            motion = saltus.simulate(one, **state, duration=8.0, tol=1e-13)
+        except MotionError:
+            assert stop_names(result)[i] in ("not_unique", "no_impact", "not_finite", "stalled")
+            continue
+        assert stop_names(result)[i] == motion.stop.value.split()[0], i
+        assert int(result.impact_count[i]) == len(motion.impacts), i
+        np.testing.assert_allclose(end(result)[i], [*motion.position, *motion.velocity], rtol=0, atol=1e-9)
+        names = {name for bit, name in enumerate(("lower", "upper")) if int(result.closed_contacts[i]) >> bit & 1}
+        assert names == set(motion.closed), i
+
+
+def test_lanes_do_not_depend_on_what_else_is_computed():
+    system, (numbers, x, v) = layers(e=(0.1, 0.1)), random_parameters(40, seed=6)
+    together = end(
+        saltus.simulate_many(system, theta_1=x[0], theta_2=-x[1], velocity=(v[0], -v[1]), duration=5.0, parameters=numbers)
+    )
+    for i in (0, 7, 39):
+        of_one = {path: values[i] for path, values in numbers.items()}
+        alone = saltus.simulate_many(
+            system, theta_1=x[0, i], theta_2=-x[1, i], velocity=(v[0, i], -v[1, i]), duration=5.0, parameters=of_one, threads=1
+        )
+        assert (end(alone) == together[i]).all()
+
+
+def test_the_reduced_model_is_met_where_its_closed_layer_stays_closed():
+    """H = 0.1 keeps the closed layer closed (contacts.md): equal states after 50 periods, to 1e-13, and as many impacts."""
+    theta = np.linspace(-0.3, 0.3, 60)
+    theta = theta[np.abs(theta) > 0.02]
+    load = Load(frequency=1.0, vertical=-0.5, horizontal=Harmonic(amplitude=0.1))
+    reduced = System(model=Metainterface(beta0=BETA80, damping=0.1), load=load, impact=VelocityReduction(1.0))
+    both = System(model=saltus.TwoLayer(beta0=BETA80, damping=0.1), load=load, impact=VelocityReduction(1.0))
+    options = {"periods": 50, "sample": ("state", "extrema", "impact_count", "speed"), "last": 2}
+    one = saltus.simulate_many(reduced, theta=theta, **options)
+    two = saltus.simulate_many(both, theta_1=np.maximum(theta, 0), theta_2=np.minimum(theta, 0), velocity=(0.0, 0.0), **options)
+    np.testing.assert_allclose((two.theta_1 + two.theta_2).values, one.theta.values, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(two.sampled_theta_1 + two.sampled_theta_2, one.sampled_theta, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(two.largest_theta_1, one.largest_theta, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(two.overall_least_speed, one.overall_least_speed, rtol=0, atol=1e-12)
+    assert (two.impact_count == one.impact_count).all()
+    assert (two.period_impact_count.values == one.period_impact_count.values).all()
+
+
+def test_two_stops_of_one_coordinate_are_two_contacts_in_lanes():
+    system = System(model=BetweenWalls(), load=Load(frequency=1.0, force=Harmonic(amplitude=0.8)), impact=NewtonImpact(e=0.7))
+    x = np.linspace(-0.9, 0.9, 37)
+    result = saltus.simulate_many(system, x=x, velocity=0.5, periods=3)
+    for i in range(len(x)):
+        motion = saltus.simulate(system, x=x[i], velocity=0.5, periods=3)
+        assert int(result.impact_count[i]) == len(motion.impacts)
+        assert abs(float(result.x[i]) - motion.position) < 1e-9
+        assert abs(float(result.velocity[i]) - motion.velocity) < 1e-9
+
+
+def test_both_layers_at_rest_are_captured_where_no_load_ever_opens_them():
+    """A reaction at rest is abs(V) cos(beta0) - H sin(beta0) sin(tau): it stays positive up to H = abs(V) / tan(beta0)."""
+    limit = 0.5 / math.tan(BETA80)
+    system = layers(e=(0.0, 0.0), damping=0.1)
+    H = np.array([0.0, 0.9 * limit, 0.99 * limit, 1.01 * limit, 1.1 * limit])
+    result = saltus.simulate_many(
+        system,
+        theta_1=0.0,
+        theta_2=0.0,
+        velocity=(0.0, 0.0),
+        periods=30,
+        until="rest",
+        parameters={"load.horizontal.amplitude": H},
+    )
+    assert ([str(stop) == "captured" for stop in stop_names(result)]) == [True, True, True, False, False]
+    assert (result.impact_count.values[3:] > 0).all()
+
+
+def test_recurrence_finds_motions_of_both_layers():
+    """At H = 0.2 the steady amplitude of the full motion is 0.5694 (contacts.md), once in each forcing period."""
+    load = Load(frequency=1.0, vertical=-0.5, horizontal=Harmonic(amplitude=0.2))
+    system = System(model=saltus.TwoLayer(beta0=BETA80, damping=0.1), load=load, impact=InelasticImpact())
+    states = np.array([[0.1, 0.0, 0.0, 0.0], [0.0, -0.3, 0.0, 0.0]])
+    found = find_recurrence(system, states, 400, kept=4, extrema=True)
+    assert (found.outcome == Outcome.PERIODIC).all()
+    assert (found.period == 1).all()
+    np.testing.assert_allclose(found.highest, 0.5694, atol=5e-5)
+    assert found.states.shape[2] == 4
+
+
+def test_the_massless_hinge_is_named():
+    """With m = 0 and both layers open the mass matrix has no inverse where beta_1 + beta_2 = pi."""
+    result = saltus.simulate_many(layers(), theta_1=0.6, theta_2=-0.5, velocity=(0.0, 0.0), duration=2.0)
+    assert str(stop_names(result)) == "singular"
+
+
+@pytest.mark.parametrize("state", [{"theta_1": -0.1, "theta_2": 0.0}, {"theta_1": 0.1, "theta_2": 0.1}])
+def test_states_beyond_a_contact_are_outside(state):
+    result = saltus.simulate_many(layers(), **state, velocity=(0.0, 0.0), duration=1.0)
+    assert str(stop_names(result)) == "outside"
+
+
+def test_derivatives_are_refused_by_a_sentence():
+    with pytest.raises(ParameterError, match="contacts lower, upper"):
+        saltus.simulate_many(layers(), theta_1=0.1, theta_2=0.0, velocity=(0.0, 0.0), duration=1.0, sensitivities=())
