@@ -34,7 +34,7 @@ def test_the_data_say_what_they_are_and_claims_follow_from_disk_too(tmp_path):
     figure = FIGURES["fig14"]
     check_provenance("fig14", data())
     claims = figure.claims(data())
-    assert len({claim.id for claim in claims}) == len(claims) == 7
+    assert len({claim.id for claim in claims}) == len(claims) == 8
     write_dataset(tmp_path / "fig14.nc", data())
     with xr.open_datatree(tmp_path / "fig14.nc", engine="h5netcdf") as tree:
         stored = tree.load()
@@ -100,7 +100,7 @@ def test_statements_on_parameters_compare_charts_of_the_same_cells():
     made = FIGURES["fig15"].compute(panels=quick, size=9, curves=2, starts=4)
     claims = claims_of(chart_measures.over_parameters(made))
     assert claims["fig15-damping-domain"].verdict is ClaimVerdict.AS_PRINTED
-    assert len(claims) == 5
+    assert len(claims) == 6
     picture = FIGURES["fig15"].draw(made)
     assert clipped(picture) == []
     titles = [ax.get_title() for ax in picture.axes]
@@ -128,6 +128,16 @@ def test_agreement_is_never_one_on_nothing(total, unknown, inside, agrees):
     panel.attrs["frequency"] = 1.0
     one = chart_measures.agreement(xr.DataTree(children={"a": panel}))
     assert (verdicts({"fig14-agreement": one})["fig14-agreement"] is ClaimVerdict.HOLDS) is agrees
+
+
+@pytest.mark.parametrize(("checked", "wrong", "holds"), [(0, 0, False), (120, 0, True), (120, 6, False), (600, 12, True)])
+def test_few_cells_are_wrong_by_the_upper_end_of_the_interval(checked, wrong, holds):
+    """None of none decides nothing good; 5 % of 120 may be 10 %; 2 % of 600 is 3.5 % at most."""
+    counts = {"checked_cells": checked, "wrong_cells": wrong, "wrong_rest": 0, "wrong_motions": wrong, "wrong_chaos": 0}
+    panel = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"frequency": 1.0}), "chart": xr.Dataset(attrs=counts)})
+    found = claims_of({"fig14-cells": chart_measures.right_cells(xr.DataTree(children={"a": panel}))})["fig14-cells"]
+    assert (found.verdict is ClaimVerdict.HOLDS) is holds
+    assert f"{wrong} of {checked}" in found.evidence
 
 
 # --- the errata ------------------------------------------------------------------------------------------------------------

@@ -351,14 +351,28 @@ def test_borders_that_were_interrupted_go_on_to_the_same_bytes(tmp_path):
 
 
 def test_a_chart_that_has_lost_its_motions_is_wrong_where_there_are_some():
-    """By charts with more and other starts on a finer grid: few cells of a whole chart are wrong, and most of an emptied one."""
+    """By more and other starts on a finer grid: few cells of a whole chart, and of an emptied one all that had motions."""
     whole = completed()[0]
-    good = wrong_cells(forced(1.0), whole, blocks=1, size=4)
-    assert good["checked_cells"] == 16
+    good = wrong_cells(forced(1.0), whole, cells=30)
+    assert good["checked_cells"] == 30
     assert good["wrong_rest"] == 0
-    assert good["wrong_motions"] <= 4
+    assert good["wrong_share"] <= 0.1
+    assert good["wrong_share_low"] <= good["wrong_share"] < good["wrong_share_high"] < 1.0
     empty = whole.copy(deep=True)
     empty["motion_amplitude"][:] = np.nan
-    empty["outcome"][:] = 0
-    bad = wrong_cells(forced(1.0), empty, blocks=1, size=4)
-    assert bad["wrong_rest"] == bad["wrong_motions"] == bad["wrong_outcome"] > 4
+    empty["count"][:] = empty["outcome"][:] = 0
+    bad = wrong_cells(forced(1.0), empty, cells=81)
+    filled = int((whole["outcome"] != 0).sum())
+    assert filled <= bad["wrong_rest"] == bad["wrong_cells"] <= filled + 5
+    assert filled > 40
+    assert bad["wrong_motions"] >= filled - 2
+
+
+def test_one_lost_motion_makes_one_wrong_cell():
+    whole = completed()[0].copy(deep=True)
+    row, column = np.argwhere((whole["count"] == 1).values & (whole["amplitude"] > 0.1).values)[0]
+    before = wrong_cells(forced(1.0), whole, cells=81)
+    whole["motion_amplitude"][row, column] = np.nan
+    after = wrong_cells(forced(1.0), whole, cells=81)
+    assert after["wrong_motions"] == before["wrong_motions"] + 1
+    assert after["wrong_rest"] == before["wrong_rest"]

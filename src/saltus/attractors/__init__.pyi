@@ -9,6 +9,7 @@ from .lyapunov.spectrum import Exponents, lyapunov_spectrum
 from .manifolds.equilibria import Equilibrium, equilibria
 from .manifolds.phase_plane import Separatrix, separatrices
 from .manifolds.saddle_manifolds import Manifold, stable_manifold, unstable_manifold
+from .sampled_share import share_interval
 from .verdict.classification import classify
 from .verdict.tori import excludes_tori
 from .verdict.unsettled import JUDGEMENT, Doubt, Judged, JudgementSettings, SettledLater, Unsettled, judge_unsettled
@@ -46,6 +47,7 @@ __all__ = [
     "lyapunov_many",
     "lyapunov_spectrum",
     "separatrices",
+    "share_interval",
     "stable_manifold",
     "uncertainty_exponent",
     "unstable_manifold",

@@ -13,13 +13,14 @@ from saltus.paper.figure_data import joined
 from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.figures.parallel_panels import each
 from saltus.plots import DOUBLE_COLUMN, chart_legend, draw_chart, draw_closed_form, draw_lines, new_figure, panel_label, styled
-from saltus.studies import bordered_chart
+from saltus.studies import bordered_chart, wrong_cells
 from saltus.theory import high_frequency_onset
 
 CHART_WINDOW = ((-2.0, 2.0), (-2.0, 2.0))  # of the initial states
 LOWEST_LOAD = -2.0  # V
 WIDEST = 0.5  # Hhat
 CLOSED_FORM_FROM = 2.0  # Omega from which the closed form of the onset is drawn too
+CHECKED = 40  # cells of a chart that are computed again, with more starts on a finer grid
 CURVES = 20  # largest number of curves on which motions end, for one chart
 
 
@@ -38,10 +39,11 @@ def _panel(values: Mapping[str, Any], **options: Any) -> Any:
 def panel(
     *, beta0: float, damping: float, frequency: float, widest: float, size: int, curves: int = CURVES, **options: Any
 ) -> Any:
-    """A `saltus.studies.bordered_chart` of the paper's system."""
+    """A `saltus.studies.bordered_chart` of the paper's system, with the share of its cells that are wrong (`wrong_cells`)."""
     here = under_force(frequency, 0.1, beta0=beta0, damping=damping)
     horizontal, vertical = np.linspace(0.0, widest, size), np.linspace(LOWEST_LOAD, 0.0, size)
     tree = bordered_chart(here, curves=curves, horizontal=horizontal, vertical=vertical, **({"window": CHART_WINDOW} | options))
+    tree["chart"].attrs |= wrong_cells(here, tree["chart"].to_dataset(), cells=CHECKED)
     tree["static"].attrs |= {"what": "quasi-static borders", "saltus_version": tree["chart"].attrs["saltus_version"]}
     tree.attrs = {"system": here.to_json(), "beta0_degrees": beta0, "damping": damping, "frequency": frequency}
     return tree

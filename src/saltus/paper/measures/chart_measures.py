@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.attractors import share_interval
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.measures.chart_areas import chart_cells, gained, lost, lost_by_curves, onset, outside
 from saltus.theory import high_frequency_onset
@@ -30,6 +31,7 @@ class ChartCriteria:
     narrow: float = 0.15  # A region is narrow below this share of the quasi-static domain.
     few: float = 0.02  # Of at most this share of the changes it is not known what becomes of the motion.
     apart: float = 0.1  # At most this share of the ends that were solved for lie outside of where simulation has enclosed them.
+    wrong: float = 0.05  # At most this share of the cells is wrong, with the upper end of its 95 % interval.
     slight: float = 0.15  # Relative differences below this are slight.
 
 
@@ -49,6 +51,7 @@ def over_frequency(data: Any) -> dict[str, Measured]:
         "fig14-onset": _onset(panels),
         "fig14-closed-form": _closed_form(panels),
         "fig14-agreement": agreement(data),
+        "fig14-cells": right_cells(data),
     }
 
 
@@ -136,6 +139,18 @@ def agreement(data: Any) -> Measured:
     return measured(bool(judged) and all(judged), panels=rows)
 
 
+def right_cells(data: Any) -> Measured:
+    """Cells of the charts against the same ones with four times the starts on a finer grid."""
+    names = ("checked_cells", "wrong_cells", "wrong_rest", "wrong_motions", "wrong_chaos")
+    panels = list(data.children.values())
+    counts = [{name: int(tree["chart"].attrs[name]) for name in names} for tree in panels]
+    number, wrong = (sum(one[name] for one in counts) for name in ("checked_cells", "wrong_cells"))
+    rows = [{"frequency": float(tree.attrs["frequency"]), **one} for tree, one in zip(panels, counts, strict=True)]
+    low, high = share_interval(wrong, number)
+    share = wrong / number if number else math.nan
+    return measured(high < CRITERIA.wrong, share=share, low=low, high=high, number=number, wrong=wrong, panels=rows)
+
+
 def over_parameters(data: Any) -> dict[str, Measured]:
     """Fig. 15, against the reference."""
     panels = {_parameters(tree): tree for tree in data.children.values()}
@@ -147,6 +162,7 @@ def over_parameters(data: Any) -> dict[str, Measured]:
         "fig15-damping-amplitude": _amplitude_falls(dampings),
         "fig15-damping-domain": _domain_and_damping(dampings),
         "fig15-agreement": agreement(data),
+        "fig15-cells": right_cells(data),
     }
 
 

@@ -64,16 +64,19 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
     along the two axes.
     """
     request = ChartRequest.from_arguments(arguments, block)
+    return {name: values.reshape(*request.shape, *values.shape[1:]) for name, values in computed(request)[0].items()}
+
+
+def computed(request: ChartRequest) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The variables of a chart with a row for each of its cells, and its motions, of dtype MOTION."""
     settled, judged, motions = stable_motions(request)
-    size = len(settled.captured)
-    columns = table(motions, size, request.coordinate) | {
+    columns = table(motions, len(settled.captured), request.coordinate) | {
         "rest": settled.captured > 0,
         "tiny": settled.tiny,
         **_verdicts(settled, judged),
     }
     columns["outcome"] = outcomes(columns["count"], columns["unsettled"], columns["verdict"])
-    columns |= beyond_limits(request.system, request.parameters, columns["amplitude"])
-    return {name: values.reshape(*request.shape, *values.shape[1:]) for name, values in columns.items()}
+    return columns | beyond_limits(request.system, request.parameters, columns["amplitude"]), motions
 
 
 def _verdicts(settled: CellOutcomes, judged: CellVerdicts) -> dict[str, np.ndarray]:

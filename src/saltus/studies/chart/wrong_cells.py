@@ -1,15 +1,18 @@
-"""The share of a chart's cells that are wrong, by charts with more starts on a finer grid over some blocks of its plane."""
+"""The share of a chart's cells that are wrong, by a sample of them that is computed again with more starts on a finer grid."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.attractors import share_interval
 from saltus.checks import check_count
+from saltus.studies.chart.cell_outcomes import CellOutcome
+from saltus.studies.chart.cells import computed
 from saltus.studies.chart.changes import COUNTS
-from saltus.studies.chart.chart import stability_chart
-from saltus.studies.chart.motions import ALIKE, has_alike, read_motions
+from saltus.studies.chart.motions import ALIKE, KEPT, has_alike, read_motions
 from saltus.studies.chart.request import ChartRequest
 from saltus.systems import System
 
@@ -17,46 +20,70 @@ if TYPE_CHECKING:
     import xarray
 
 MORE = 4  # times as many starts
+CHAOTIC = (CellOutcome.CHAOS, CellOutcome.MOTIONS_AND_CHAOS)
 
 
-def wrong_cells(system: System, chart: xarray.Dataset, *, blocks: int = 6, size: int = 5, seed: int = 1) -> dict[str, int]:
-    """How many cells of a sample are wrong: square blocks of cells, at random, are computed again with four times the starts,
-    other ones, and half the distance between the cells.
+def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed: int = 1) -> dict[str, float]:
+    """How many cells of a sample are wrong: cells at random are computed again with four times the starts, other ones, and beside
+    eight more cells about each, half as far away as its neighbours, so that motions which begin there are found.
 
     Args:
         system: that of the chart.
         chart: as `stability_chart` or `with_borders` returns it.
-        blocks, size: how many blocks, and of how many cells along a side.
-        seed: of the blocks and of the starts.
+        cells: how many cells the sample has; all of the chart's if it has no more.
+        seed: of the sample and of the starts.
 
     Returns:
-        `checked_cells`; of these `wrong_rest`, where the chart has rest alone and there is something else or the other way round;
-        `wrong_outcome`, where there is something else than the chart says; and `wrong_motions`, where it lacks a stable motion.
+        `checked_cells`; of these `wrong_cells`, which are `wrong_rest`, where the chart has rest alone and there is something
+        else, `wrong_motions`, where it lacks a stable motion, or `wrong_chaos`, where it has chaos and the sample none or the
+        other way round; and the `wrong_share` of the wrong ones with its 95 % interval, `wrong_share_low` to `wrong_share_high`.
     """
-    for name, value in (("blocks", blocks), ("size", size)):
-        check_count(name, value, 1)
+    check_count("cells", cells, 1)
     request, chart = ChartRequest.of_chart(system, chart), chart.transpose("vertical", "horizontal", ...)
-    rng, counted = np.random.default_rng(seed), np.zeros(4, dtype=int)
-    for _ in range(blocks):
-        first = [int(rng.integers(0, max(n - size, 0) + 1)) for n in request.shape]
-        block = chart.isel(vertical=slice(first[0], first[0] + size), horizontal=slice(first[1], first[1] + size))
-        axes: dict[str, Any] = {name: _finer(block[name].values) for name in ("vertical", "horizontal")}
-        numbers: dict[str, Any] = {"starts": MORE * request.starts, "periods": request.periods, "max_period": request.max_period}
-        numbers |= {"least": request.least, "tol": request.tol, "seed": request.seed + seed}
-        finer = stability_chart(system, paths=request.paths, window=request.window, **axes, **numbers)
-        counted += _compared(block, finer.isel(vertical=slice(None, None, 2), horizontal=slice(None, None, 2)))
-    return dict(zip(("checked_cells", "wrong_rest", "wrong_outcome", "wrong_motions"), map(int, counted), strict=True))
+    size = int(np.prod(request.shape))
+    chosen = np.sort(np.random.default_rng(seed).choice(size, min(cells, size), replace=False))
+    finer = _Sample(**_numbers(request, seed), place=np.stack(np.unravel_index(chosen, request.shape), axis=1))
+    columns, found = computed(finer)
+    middle = 9 * np.arange(len(chosen)) + 4
+    motions = found[(found["amplitude"] > COUNTS * request.least) & np.isin(found["cell"], middle)]
+    motions["cell"] = chosen[motions["cell"] // 9]
+    known, full = read_motions(chart), chart["count"].values.ravel()[motions["cell"]] >= KEPT
+    lacking = motions["cell"][~full & ~has_alike(known, motions["cell"], motions, ALIKE.followed)]
+    before, after = chart["outcome"].values.ravel()[chosen], columns["outcome"][middle]
+    wrong = {
+        "wrong_rest": (before == CellOutcome.REST) & (after != CellOutcome.REST),
+        "wrong_motions": np.isin(chosen, lacking),
+        "wrong_chaos": np.isin(before, CHAOTIC) != np.isin(after, CHAOTIC),
+    }
+    number = int(np.any(list(wrong.values()), axis=0).sum())
+    low, high = share_interval(number, len(chosen))
+    counts = {"checked_cells": len(chosen), "wrong_cells": number, **{name: int(cells.sum()) for name, cells in wrong.items()}}
+    return counts | {"wrong_share": number / len(chosen), "wrong_share_low": low, "wrong_share_high": high}
 
 
-def _finer(values: np.ndarray) -> np.ndarray:
-    """The values of an axis and those halfway between them."""
-    return np.interp(np.arange(2 * len(values) - 1) / 2, np.arange(len(values)), values)
+def _numbers(request: ChartRequest, seed: int) -> dict[str, Any]:
+    """The arguments of a chart with more starts, other ones."""
+    more = replace(request, starts=MORE * request.starts, seed=request.seed + seed)
+    return {name: getattr(more, name) for name in more.__dataclass_fields__}
 
 
-def _compared(block: xarray.Dataset, better: xarray.Dataset) -> np.ndarray:
-    """The number of cells, and of those that differ in rest, in the outcome, and in that a motion is missing."""
-    motions = read_motions(better)
-    counts = motions["amplitude"] > COUNTS * float(better.attrs["least"])
-    lacking = motions["cell"][counts & ~has_alike(read_motions(block), motions["cell"], motions, ALIKE.followed)]
-    one, other = (data["outcome"].values.ravel() for data in (block, better))
-    return np.array([one.size, ((one == 0) != (other == 0)).sum(), (one != other).sum(), len(np.unique(lacking))])
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Sample(ChartRequest):
+    """Some cells of a chart, each in the middle of three rows and columns of cells half as far apart."""
+
+    place: np.ndarray  # (n, 2): row and column in the chart
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The rows of all of them below one another: what neighbours beyond these three add as starts does no harm."""
+        return 3 * len(self.place), 3
+
+    @property
+    def parameters(self) -> dict[str, np.ndarray]:
+        """The values of both parameters in each cell, by their dotted paths."""
+        steps = np.array([-0.5, 0.0, 0.5])
+        rows, columns = (
+            np.interp(index[:, None] + steps, np.arange(len(axis)), axis)
+            for index, axis in zip(self.place.T, (self.vertical, self.horizontal), strict=True)
+        )
+        return {self.paths[1]: np.repeat(rows, 3, axis=1).ravel(), self.paths[0]: np.tile(columns, 3).ravel()}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from saltus.attractors import share_interval
 from saltus.checks import Window
 from saltus.flow import motions_from, stroboscopic
 from saltus.orbits import PeriodicOrbit, keeps_symmetry, orbits_near_returns, solved_near, within_window
@@ -37,7 +37,6 @@ class DiagramSearchSettings:
     # Where a stable part of a branch ends, motions are started from its last orbit, these shares of the range further on both
     # sides: what they fall to is there where no start of the grid may lead.
     beyond: tuple[float, ...] = (3e-5, 3e-4)
-    deviations: float = 1.96  # Standard deviations to each side of a 95 % interval.
 
 
 SETTINGS = DiagramSearchSettings()
@@ -59,12 +58,7 @@ class MissedShare:
     @property
     def interval(self) -> tuple[float, float]:
         """The 95 % interval of a binomial share (Wilson's)."""
-        if not self.sample:
-            return (np.nan, np.nan)
-        spread = SETTINGS.deviations**2 / self.sample
-        middle = (self.share + 0.5 * spread) / (1.0 + spread)
-        half = math.sqrt(spread * (self.share * (1.0 - self.share) + 0.25 * spread)) / (1.0 + spread)
-        return (max(0.0, middle - half), min(1.0, middle + half))
+        return share_interval(self.missed, self.sample)
 
 
 @dataclass
