@@ -288,6 +288,11 @@ def test_an_impact_from_the_upper_layer_gains_the_energy_that_was_announced():
     gained = (after @ mass @ after) / (before @ mass @ before) - 1.0
     assert gained == pytest.approx(energy_gain(system.model, system.impact)["upper"], abs=1e-12)
     assert gained == pytest.approx(0.7, abs=1e-12)
+    assert motion.validity.gains == pytest.approx({"upper": 0.7}, abs=1e-12)
+    assert not motion.validity.respected
+    assert "impacts at upper may raise the kinetic energy by 70 %" in str(motion.validity)
+    harmless = moved(layers(transfer=1.0, mass_ratio=0.0), (0.0, 0.15), (0.0, 0.0), 8.0)
+    assert harmless.validity.gains == {}
 
 
 def test_each_factor_of_a_law_has_a_path_and_survives_a_file():

@@ -65,4 +65,4 @@ def _validity(motion: Motion) -> list[tuple[str, str]]:
         share = 100 * motion.validity.share[name]
         verdict = "respected" if first is None else f"passed first at {first:.9g}, beyond it {share:.3g} % of the time"
         rows.append((name.replace("_", " "), verdict))
-    return rows
+    return rows + [(f"impacts at {name}", motion.validity.gain(name)) for name in motion.validity.gains]

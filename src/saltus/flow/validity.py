@@ -2,37 +2,47 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from saltus.flow.dense_output import DenseOutput, evaluate
-from saltus.systems import System
+from saltus.systems import System, energy_gain
 
 STEP_SAMPLES = 12  # in each step, to find changes of sign: a step is shorter than a margin's own time scale
+ROUNDING = 1e-12  # An impact that gains a smaller share of the energy keeps it.
 RIDDERS_ITERATIONS = 8  # of Ridders' method, each of which doubles the correct digits or at least halves the bracket
 
 
 @dataclass(frozen=True)
 class Validity:
-    """For each margin of the model: when it is first passed (or None), and the share of the motion's time spent beyond it."""
+    """For each margin of the model: when it is first passed (or None), and the share of the motion's time spent beyond it.
+
+    `gains` has the contacts at which the impact law may raise the kinetic energy, and by what share of it (see `energy_gain`).
+    """
 
     first: dict[str, float | None]
     share: dict[str, float]
+    gains: dict[str, float] = field(default_factory=dict)
 
     @property
     def respected(self) -> bool:
-        """Whether every margin stays positive throughout."""
-        return all(time is None for time in self.first.values())
+        """Whether every margin stays positive throughout, and no impact can gain energy."""
+        return not self.gains and all(time is None for time in self.first.values())
 
     def __str__(self) -> str:
-        if not self.first:
-            return "the model has no margins"
-        return "; ".join(
+        parts = [
             f"{name} " + ("respected" if t is None else f"passed first at {t:.6g}, {100 * self.share[name]:.3g} % of the time")
             for name, t in self.first.items()
-        )
+        ]
+        parts += [f"impacts at {name} {self.gain(name)}" for name in self.gains]
+        return "; ".join(parts) or "the model has no margins"
+
+    def gain(self, contact: str) -> str:
+        """What the impact law does to the energy at a contact in `gains`."""
+        share = 100 * self.gains[contact]
+        return f"may raise the kinetic energy by {share:.3g} %: v+' M v+ > v-' M v- for v+ = -E v-; a smaller transfer would not"
 
 
 class ValidityCheck:
@@ -64,9 +74,12 @@ class ValidityCheck:
 
     def result(self, duration: float) -> Validity:
         """The verdict on a motion of that duration."""
-        return Validity(
-            dict(self._first), {name: beyond / duration if duration else 0.0 for name, beyond in self._beyond.items()}
+        model, shares = (
+            self._system.model,
+            {name: beyond / duration if duration else 0.0 for name, beyond in self._beyond.items()},
         )
+        gains = energy_gain(model, self._system.impact) if model.contacts else {}
+        return Validity(dict(self._first), shares, {name: gain for name, gain in gains.items() if gain > ROUNDING})
 
 
 def _beyond(

@@ -49,19 +49,22 @@ class NewtonImpact(ImpactLaw):
 def energy_gain(model: Model, impact: ImpactLaw) -> dict[str, float]:
     """By how much an impact at each contact may raise the kinetic energy, as a share of what the impact at most takes; <= 0: not.
 
-    With all other contacts closed, at rest and the impact the only one: the velocities after it are v+ = -E v- where an impulse
-    acts, and (v+' M v+) / (v-' M v-) - 1 is the share, on fixed ground and in the position where all contacts are closed. For two
-    layers it is positive where M_ss e_s^2 + 2 cos(2 beta0) e_s g + M_jj g^2 > M_ss, s the layer that is hit.
+    With the contacts of all other coordinates closed, at rest and the impact the only one: the rates of the gaps after it are
+    -E v- where an impulse acts, coordinates without a contact keep their momentum, and (v+' M v+) / (v-' M v-) - 1 is the share,
+    on fixed ground and in the position where these contacts are closed. For two layers it is positive where
+    M_ss e_s^2 + 2 cos(2 beta0) e_s g + M_jj g^2 > M_ss, s the layer that is hit.
     """
     contacts, names = model.contacts, model.coordinates
-    position = {contact.coordinate: float(contact.position) for contact in contacts}
-    q = tuple(position.get(name, 0.0) for name in names)
-    mass = np.atleast_2d(np.array(model.mass_matrix(q[0] if len(q) == 1 else q), dtype=float))
+    places = [names.index(contact.coordinate) for contact in contacts]
     matrix, gain = np.array(impact.restitution_matrix(model), dtype=float), {}
     for s, contact in enumerate(contacts):
-        before, after = np.zeros(len(names)), np.zeros(len(names))
-        before[names.index(contact.coordinate)] = -contact.sign
+        before, after, q = np.zeros(len(names)), np.zeros(len(names)), [0.0] * len(names)
         for j, other in enumerate(contacts):
-            after[names.index(other.coordinate)] += other.sign * matrix[j, s]
+            if j == s or other.coordinate != contact.coordinate:
+                q[places[j]], after[places[j]] = float(other.position), other.sign * matrix[j, s]
+        before[places[s]] = -contact.sign
+        mass = np.atleast_2d(np.array(model.mass_matrix(q[0] if len(q) == 1 else tuple(q)), dtype=float))
+        free = [k for k in range(len(names)) if k not in places]
+        after[free] = -np.linalg.solve(mass[np.ix_(free, free)], mass[free] @ (after - before))
         gain[contact.name] = float(after @ mass @ after / (before @ mass @ before)) - 1.0
     return gain
