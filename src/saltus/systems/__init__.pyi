@@ -1,7 +1,9 @@
+from .cell_chain import CellChain, FourCells, ThreeCells, TwoCells
 from .cell_layout import CellLayout
 from .constrained import constrained_acceleration, mass_and_force, reactions
 from .contact import Contact
 from .impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
+from .impact_pair import ImpactPair
 from .load import Channel, Load
 from .metainterface import Metainterface
 from .model import MarginKind, Model
@@ -16,19 +18,23 @@ from .si_units import PhysicalCell
 from .signals import Constant, Harmonic, Record, Signal, Sum
 from .system import System, check_system
 from .two_layer import TwoLayer
+from .two_stops import TwoStops
 from .unit_cell import UnitCell
 from .wall_oscillator import WallOscillator
 
 __all__ = [
     "IMPACTS",
     "MODELS",
+    "CellChain",
     "CellLayout",
     "Channel",
     "Constant",
     "Contact",
     "EnergyRestitution",
+    "FourCells",
     "Harmonic",
     "ImpactLaw",
+    "ImpactPair",
     "InelasticImpact",
     "LayerState",
     "Load",
@@ -45,7 +51,10 @@ __all__ = [
     "Sum",
     "System",
     "TableRow",
+    "ThreeCells",
+    "TwoCells",
     "TwoLayer",
+    "TwoStops",
     "UnitCell",
     "VelocityReduction",
     "WallOscillator",

@@ -19,6 +19,7 @@ class Contact:
     coordinate: str  # the name of the model's coordinate
     sign: int = 1  # +1 where the coordinate stays above the position, -1 where it stays below
     position: Any = 0.0  # p, a number, maybe one of the model's parameters
+    group: str = ""  # an impact passes speed on (`transfer`) to the other contacts of its group only
     restitution: Any = None  # e of impacts that close it, in [0, 1]; by default that of the system's impact law
 
     def __post_init__(self) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
+from saltus.systems.contact import Contact
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 
@@ -61,8 +62,13 @@ class VelocityReduction(ImpactLaw):
 
     def restitution_matrix(self, model: Model) -> list[list[Any]]:
         """e at the contact that is hit, or at the others."""
-        places = range(len(model.contacts))
-        return [[self.e if (i != j) == model.transfers else 0.0 for j in places] for i in places]
+        contacts = model.contacts
+        return [[self.e if _passes(model, a, b) else 0.0 for a in contacts] for b in contacts]
+
+
+def _passes(model: Model, a: Contact, b: Contact) -> bool:
+    """Whether an impact at contact `a` leaves its speed with `b`: with the others of its group, or else with itself."""
+    return a is not b and a.group == b.group if model.transfers else a is b
 
 
 @dataclass(frozen=True, slots=True)

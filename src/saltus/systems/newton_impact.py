@@ -18,9 +18,9 @@ from saltus.systems.model import Model
 class NewtonImpact(ImpactLaw):
     """0 <= J _|_ v+ + E v- >= 0 at all contacts whose gap is 0, with the rates v of the gaps and the impulses J (Moreau).
 
-    E has the restitution of each contact on its diagonal and the transfer g elsewhere. A contact with an impulse is left with
-    -e_i v_i- less g times the other ones' v-. For g = 0 the energy lost at an impact is 1/2 sum J_i (1 - e_i) |v_i-| on fixed
-    ground. A transfer may gain energy: see `energy_gain`.
+    E has the restitution of each contact on its diagonal, the transfer g between contacts of one group, and 0 elsewhere. A
+    contact with an impulse is left with -e_i v_i- less g times the other ones' v-. For g = 0 the energy lost at an impact is
+    1/2 sum J_i (1 - e_i) |v_i-| on fixed ground. A transfer may gain energy: see `energy_gain`.
     """
 
     e: Any = 0.0  # of all contacts, or a tuple with one for each in the order of the model; in [0, 1]
@@ -40,7 +40,7 @@ class NewtonImpact(ImpactLaw):
         if len(factors) != len(contacts):
             names = ", ".join(contact.name for contact in contacts)
             raise ParameterError(f"impact.e must have {len(contacts)} value(s), for {names}, got {len(factors)}", "impact.e")
-        matrix: list[list[Any]] = [[self.transfer for _ in contacts] for _ in contacts]
+        matrix: list[list[Any]] = [[self.transfer * (a.group == b.group) for a in contacts] for b in contacts]
         for i, (contact, factor) in enumerate(zip(contacts, factors, strict=True)):
             matrix[i][i] = factor if contact.restitution is None else contact.restitution
         return matrix

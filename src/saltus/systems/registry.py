@@ -5,12 +5,15 @@ from __future__ import annotations
 from typing import Any, TypeVar
 
 from saltus.errors import ParameterError, near, shown
+from saltus.systems.cell_chain import FourCells, ThreeCells, TwoCells
 from saltus.systems.impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
+from saltus.systems.impact_pair import ImpactPair
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model, check_sides
 from saltus.systems.newton_impact import NewtonImpact
 from saltus.systems.rocking_block import RockingBlock
 from saltus.systems.two_layer import TwoLayer
+from saltus.systems.two_stops import TwoStops
 from saltus.systems.wall_oscillator import WallOscillator
 
 MODELS: dict[str, type[Model]] = {
@@ -18,6 +21,11 @@ MODELS: dict[str, type[Model]] = {
     "RockingBlock": RockingBlock,
     "TwoLayer": TwoLayer,
     "WallOscillator": WallOscillator,
+    "TwoStops": TwoStops,
+    "ImpactPair": ImpactPair,
+    "TwoCells": TwoCells,
+    "ThreeCells": ThreeCells,
+    "FourCells": FourCells,
 }
 IMPACTS: dict[str, type[ImpactLaw]] = {
     "VelocityReduction": VelocityReduction,

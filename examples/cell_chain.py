@@ -1,0 +1,20 @@
+"""Four cells in a row, of which the first is let go: how its motion reaches the last one through the springs between them."""
+
+import numpy as np
+
+import saltus
+
+model = saltus.FourCells(beta0=np.deg2rad(80), coupling=0.5, mass_ratio=0.2, damping=0.05)
+system = saltus.System(model=model, load=saltus.Load(vertical=-0.1), impact=saltus.NewtonImpact(e=0.3))
+start = dict.fromkeys(model.coordinates, 0.0) | {"lower_1": 0.5}
+motion = saltus.simulate(system, **start, velocity=(0.0,) * 8, duration=60)
+
+times = np.linspace(0.0, motion.time, 6001)
+opening = np.abs(motion.at(times)[0]).reshape(4, 2, -1).max(axis=1)  # of the layer that is open wider
+for cell, theta in enumerate(opening, 1):
+    first, widest = times[np.argmax(theta > 1e-9)], times[theta.argmax()]
+    print(f"cell {cell}: opens first at {first:.2f}, widest by {theta.max():.3f} at {widest:.2f}")
+print(f"{len(motion.impacts)} impacts; {motion.stop} from {motion.rest_time:.3f}")
+
+assert (np.diff(opening.argmax(axis=1)) > 0).all()  # each cell is widest open after the one before it
+assert len(motion.closed) == 8

@@ -1,0 +1,159 @@
+"""Chains of cells of the metainterface: each with both of its layers, and springs between the masses of neighbours."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, ClassVar
+
+import numpy as np
+
+from saltus.checks import RADIANS, settle_numbers
+from saltus.systems.contact import Contact
+from saltus.systems.load import Load
+from saltus.systems.metainterface import Metainterface
+from saltus.systems.model import MarginKind, Model
+from saltus.systems.two_layer import TwoLayer
+
+
+def _names(cells: int) -> tuple[str, ...]:
+    return tuple(f"{layer}_{cell}" for cell in range(1, cells + 1) for layer in ("lower", "upper"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellChain(Model):
+    """Cells side by side, each a `TwoLayer` of the same numbers under the same loads; `TwoCells`, `ThreeCells` and `FourCells`.
+
+    Long horizontal springs join each mass to that of the same layer in the neighbouring cell: with the displacements
+
+        u_1 = cos(beta0) - cos(beta0 + theta_1),    u_2 = u_1 + cos(beta0 - theta_2) - cos(beta0)
+
+    of the lower and the upper mass of a cell, per length of a layer, their energy per K2 is kappa / 2 times the sum of the
+    squares of u_j less that of the neighbour. Coordinates are theta_1 >= 0 (`lower_1`, `lower_2`, ...) and theta_2 <= 0
+    (`upper_1`, ...); each has a contact of the same name. An impact passes its speed on within its cell only.
+    """
+
+    beta0: float = field(metadata=RADIANS)  # angle of the undeformed cell, in (0, pi)
+    coupling: float = 0.1  # kappa = stiffness of a spring times length squared, over K2; at least 0
+    damping: float = 0.0  # C, at least 0
+    stiffness_ratio: float = 1.0  # k = K1 / K2, above 0
+    mass_ratio: float = 0.0  # m = M1 / M2, at least 0
+    dissipation_ratio: float = 1.0  # c = C1 / C2, at least 0
+
+    cells: ClassVar[int] = 1
+    channels: ClassVar[tuple[str, ...]] = Metainterface.channels
+    singularity: ClassVar[str] = "massless_hinge"
+    transfers: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "beta0", above=0.0, below=math.pi)
+        settle_numbers(self, "stiffness_ratio", above=0.0)
+        settle_numbers(self, "coupling", "damping", "mass_ratio", "dissipation_ratio", at_least=0.0)
+
+    def unit_of(self, coordinate: str) -> str:
+        """Radians."""
+        return "rad"
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """None: its contacts say which layers are open."""
+        return ()
+
+    @property
+    def contact(self) -> Any:
+        """All layers closed."""
+        return (0.0,) * (2 * self.cells)
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """Two for each cell, in the order of the coordinates."""
+        signs = (1, -1) * self.cells
+        names = zip(self.coordinates, signs, strict=True)
+        return tuple(Contact(name=name, coordinate=name, sign=sign, group=name.split("_")[1]) for name, sign in names)
+
+    def cell(self) -> TwoLayer:
+        """One cell by itself; its numbers may be symbols, which no checks could be made of."""
+        cell = object.__new__(TwoLayer)
+        for name in ("beta0", "damping", "stiffness_ratio", "mass_ratio", "dissipation_ratio"):
+            object.__setattr__(cell, name, getattr(self, name))
+        return cell
+
+    def mass_matrix(self, theta: Any) -> Any:
+        """That of each cell, in blocks."""
+        size, one = 2 * self.cells, self.cell()
+        matrix: list[list[Any]] = [[0.0] * size for _ in range(size)]
+        for i in range(0, size, 2):
+            block = one.mass_matrix(theta[i : i + 2])
+            matrix[i][i : i + 2], matrix[i + 1][i : i + 2] = list(block[0]), list(block[1])
+        return matrix
+
+    def displacements(self, theta: Any) -> list[tuple[Any, Any]]:
+        """(u_1, u_2) of each cell."""
+        base, found = np.cos(self.beta0), []
+        for i in range(0, 2 * self.cells, 2):
+            lower = base - np.cos(self.beta0 + theta[i])
+            found.append((lower, lower + np.cos(self.beta0 - theta[i + 1]) - base))
+        return found
+
+    def force(self, t: Any, theta: Any, velocity: Any, load: Load) -> tuple[Any, ...]:
+        """That of each cell, and of the springs between the cells."""
+        one, u, forces = self.cell(), self.displacements(theta), []
+        for i in range(self.cells):
+            angles, rates = theta[2 * i : 2 * i + 2], velocity[2 * i : 2 * i + 2]
+            lower, upper = one.force(t, angles, rates, load)
+            beside = [u[j] for j in (i - 1, i + 1) if 0 <= j < self.cells]
+            first, second = (self.coupling * sum(other[j] - u[i][j] for other in beside) for j in (0, 1))
+            forces += [
+                lower + (first + second) * np.sin(self.beta0 + angles[0]),
+                upper + second * np.sin(self.beta0 - angles[1]),
+            ]
+        return tuple(forces)
+
+    def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """The sum of the cells' energies, per K2."""
+        one, size = self.cell(), 2 * self.cells
+        return sum(one.kinetic_energy(t, theta[i : i + 2], velocity[i : i + 2], side, load) for i in range(0, size, 2))
+
+    def potential_energy(self, theta: Any) -> Any:
+        """Pi / K2 of all springs, those between the cells included."""
+        one, u, size = self.cell(), self.displacements(theta), 2 * self.cells
+        between = sum((a[j] - b[j]) * (a[j] - b[j]) for a, b in pairwise(u) for j in (0, 1))
+        return sum(one.potential_energy(theta[i : i + 2]) for i in range(0, size, 2)) + self.coupling * between / 2
+
+    def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load) -> dict[str, Any]:
+        """What each layer lacks to the kinematic limit (errata 19, 20), where the motion stops."""
+        signs = (1, -1) * self.cells
+        angles = zip(self.coordinates, signs, theta, strict=True)
+        return {f"{name}_kinematic_limit": 2 * (math.pi - self.beta0) - sign * angle for name, sign, angle in angles}
+
+    def margin_kind(self, margin: str) -> MarginKind:
+        """All are limits."""
+        return MarginKind.LIMIT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TwoCells(CellChain):
+    """A `CellChain` of two cells."""
+
+    cells: ClassVar[int] = 2
+    coordinates: ClassVar[tuple[str, ...]] = _names(2)
+    stops: ClassVar[tuple[str, ...]] = tuple(f"{name}_kinematic_limit" for name in _names(2))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThreeCells(CellChain):
+    """A `CellChain` of three cells."""
+
+    cells: ClassVar[int] = 3
+    coordinates: ClassVar[tuple[str, ...]] = _names(3)
+    stops: ClassVar[tuple[str, ...]] = tuple(f"{name}_kinematic_limit" for name in _names(3))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FourCells(CellChain):
+    """A `CellChain` of four cells."""
+
+    cells: ClassVar[int] = 4
+    coordinates: ClassVar[tuple[str, ...]] = _names(4)
+    stops: ClassVar[tuple[str, ...]] = tuple(f"{name}_kinematic_limit" for name in _names(4))

@@ -1,0 +1,50 @@
+"""The linear oscillator between two stops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from saltus.checks import settle_numbers
+from saltus.errors import ParameterError
+from saltus.systems.contact import Contact
+from saltus.systems.load import Load
+from saltus.systems.model import Model
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TwoStops(Model):
+    """x'' + c x' + k x = F(tau) for d_1 <= x <= d_2: contacts `left` and `right`, with an impact law such as `NewtonImpact`."""
+
+    stiffness: float = 1.0  # k, at least 0
+    damping: float = 0.0  # c, at least 0
+    left: float = -1.0  # d_1
+    right: float = 1.0  # d_2, above d_1
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "stiffness", "damping", at_least=0.0)
+        settle_numbers(self, "left", "right")
+        if not self.left < self.right:
+            raise ParameterError(f"left must lie below right = {self.right:g}, got {self.left:g}", "left")
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """None: it has contacts."""
+        return ()
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """x >= d_1 and x <= d_2."""
+        left = Contact(name="left", coordinate="x", position=self.left)
+        return left, Contact(name="right", coordinate="x", sign=-1, position=self.right)
+
+    def force(self, t: Any, x: Any, velocity: Any, load: Load) -> Any:
+        """F - c x' - k x."""
+        return load.force(t) - self.damping * velocity - self.stiffness * x
+
+    def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """x'^2 / 2."""
+        return velocity * velocity / 2

@@ -1,0 +1,162 @@
+"""The models with several contacts that come with saltus: the impact pair, and chains of cells."""
+
+import math
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.errors import ParameterError
+from saltus.flow import EventKind
+from saltus.systems import (
+    FourCells,
+    Harmonic,
+    ImpactPair,
+    Load,
+    NewtonImpact,
+    System,
+    ThreeCells,
+    TwoCells,
+    TwoLayer,
+    TwoStops,
+    VelocityReduction,
+    energy_gain,
+)
+
+COSINE = math.pi / 2  # the phase of a harmonic that makes it one
+BETA80 = math.radians(80)
+
+
+def test_the_impact_pair_follows_its_closed_form_with_two_impacts_a_period():
+    """Impacts at W tau = phi + n pi, right and left in turn; between them the mass in the case moves with a constant speed V.
+
+    With B = A / (k - W^2), w^2 = k and theta = pi w / W: on the way to the right z = B cos(W s + phi) + a cos(w s) + b sin(w s)
+    and z + x = V (s - pi / (2 W)). Everything turns its sign after half a period. The impact gives the case 2 mu V:
+    a (1 + cos theta) + b sin theta = 0 and b (1 + cos theta) - a sin theta = -2 mu V / w. x = -d at s = 0, and the restitution
+    there, V - z' = e (V + 2 mu V + z'), give cos(phi) and sin(phi), whose squares add up to 1.
+    """
+    A, W, k, mu, e, d = 1.0, 0.8, 1.0, 0.2, 0.6, 1.5
+    B, w, half = A / (k - W * W), math.sqrt(k), math.pi / W
+    tangent = math.tan(w * half / 2)
+    sine = -(1 + mu) * (1 - e) / ((1 + e) * B * W)  # sin phi = sine V, cos phi = d / B + cosine V
+    cosine = (-half / 2 - mu * tangent / w) / B
+    found = 0
+    for V in np.roots([sine**2 + cosine**2, 2 * cosine * d / B, (d / B) ** 2 - 1.0]):
+        if not (np.isreal(V) and V.real > 0):
+            continue
+        V = float(V.real)
+        phi, a, b, s = math.atan2(sine * V, d / B + cosine * V), mu * V * tangent / w, -mu * V / w, np.linspace(0, half, 300)
+        z = B * np.cos(W * s + phi) + a * np.cos(w * s) + b * np.sin(w * s)
+        rate = -B * W * math.sin(phi) + b * w
+        if not (np.abs(V * (s - half / 2) - z)[1:-1] < d).all():
+            continue
+        load = Load(frequency=W, force=Harmonic(amplitude=A, phase=COSINE))
+        system = System(model=ImpactPair(mass_ratio=mu, stiffness=k, clearance=d), load=load, impact=NewtonImpact(e=e))
+        start = phi % (2 * math.pi) / W
+        motion = saltus.simulate(system, z=z[0], x=-d, velocity=(rate, V - rate), time=start, duration=4.5 * half, tol=1e-14)
+        impacts = motion.events.of(EventKind.IMPACT)
+        assert [event.contact for event in impacts] == ["right", "left", "right", "left"]
+        for n, event in enumerate(impacts, 1):
+            assert event.time - start == pytest.approx(n * half, abs=1e-10)
+            np.testing.assert_allclose(event.velocity_after, np.array([rate, V - rate]) * (-1) ** n, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(motion.at(start + s[1:-1])[0][0], z[1:-1], rtol=0, atol=1e-10)
+        found += 1
+    assert found
+
+
+def test_no_restitution_of_an_impact_pair_gains_energy():
+    """Of the relative motion e^2 is left: T+ / T- = 1 - (1 - e^2) mu / (1 + mu) mu^-1 for the mass alone in motion."""
+    for e, mu in ((0.0, 0.3), (0.5, 0.1), (1.0, 2.0)):
+        gain = energy_gain(ImpactPair(mass_ratio=mu), NewtonImpact(e=e))
+        assert gain["left"] == gain["right"] == pytest.approx(-(1 - e * e) / (1 + mu), abs=1e-14)
+
+
+def test_stops_that_leave_no_room_are_refused():
+    with pytest.raises(ParameterError, match="left must lie below right = 1, got 1"):
+        TwoStops(left=1.0)
+
+
+def chain(kind, *, impact=None, **numbers):
+    numbers = {"beta0": BETA80, "coupling": 0.3, "mass_ratio": 0.5, "damping": 0.05} | numbers
+    load = Load(frequency=1.1, vertical=-0.4, horizontal=Harmonic(amplitude=0.3))
+    return System(model=kind(**numbers), load=load, impact=impact or NewtonImpact(e=0.4))
+
+
+def state(cells, seed=1):
+    """One open layer in each cell, the other closed."""
+    rng, theta = np.random.default_rng(seed), np.zeros(2 * cells)
+    for cell in range(cells):
+        upper = int(rng.integers(2))
+        theta[2 * cell + upper] = (-1) ** upper * rng.uniform(0.05, 0.4)
+    return theta
+
+
+def follow(system, theta, duration=12.0, **more):
+    start = dict(zip(system.model.coordinates, theta, strict=True))
+    return saltus.simulate(system, **start, velocity=(0.0,) * len(theta), duration=duration, tol=1e-14, **more)
+
+
+@pytest.mark.parametrize("impact", [NewtonImpact(e=0.4), NewtonImpact(e=0.2, transfer=0.5), VelocityReduction(0.9)])
+def test_cells_without_coupling_move_as_each_by_itself(impact):
+    system, theta = chain(ThreeCells, coupling=0.0, impact=impact), state(3)
+    together, times = follow(system, theta), np.linspace(0.0, 12.0, 200)
+    numbers = {"beta0": BETA80, "mass_ratio": 0.5, "damping": 0.05}
+    alone = System(model=TwoLayer(**numbers), load=system.load, impact=impact)
+    impacts = 0
+    for cell in range(3):
+        own = saltus.simulate(alone, theta=tuple(theta[2 * cell : 2 * cell + 2]), duration=12.0, tol=1e-14)
+        np.testing.assert_allclose(together.at(times)[0][2 * cell : 2 * cell + 2], own.at(times)[0], rtol=0, atol=1e-11)
+        impacts += len(own.impacts)
+    assert impacts > 3
+
+
+def test_a_chain_keeps_its_energy_without_damping_and_with_lossless_impacts():
+    """Kinetic energy, that of all springs, and that of a constant vertical load V = -0.5 on both masses of every cell."""
+    load = Load(frequency=1.0, vertical=-0.5)
+    model = FourCells(beta0=BETA80, coupling=0.4, mass_ratio=0.7, stiffness_ratio=0.8)
+    motion = follow(
+        System(model=model, load=load, impact=NewtonImpact(e=1.0)), state(4, seed=2) + np.tile([0.02, -0.03], 4), 10.0
+    )
+    theta, velocity = motion.at(np.linspace(0.0, 10.0, 300))
+    height = sum(np.sin(BETA80 + theta[i]) + np.sin(BETA80 - theta[i + 1]) for i in range(0, 8, 2))
+    energy = model.kinetic_energy(0.0, theta, velocity, 1, load) + model.potential_energy(theta) + 0.5 * height
+    assert len(motion.impacts) > 10
+    np.testing.assert_allclose(energy, energy[0], rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize(("kind", "cells"), [(TwoCells, 2), (FourCells, 4)])
+def test_a_chain_looks_the_same_from_its_other_end(kind, cells):
+    system, theta = chain(kind), state(cells, seed=3)
+    ahead = follow(system, theta)
+    back = follow(system, theta.reshape(cells, 2)[::-1].ravel())
+    assert len(ahead.impacts) > 2
+    np.testing.assert_allclose(np.reshape(ahead.position, (cells, 2)), np.reshape(back.position, (cells, 2))[::-1], atol=1e-10)
+
+
+def test_the_springs_of_a_chain_give_the_gradient_of_their_energy():
+    model, theta, load = ThreeCells(beta0=BETA80, coupling=0.7), state(3) + 0.01, Load()
+    without = ThreeCells(beta0=BETA80, coupling=0.0)
+    still = np.zeros(6)
+    force = np.array(model.force(0.0, theta, still, load)) - np.array(without.force(0.0, theta, still, load))
+
+    def energy(x):
+        return model.potential_energy(x) - without.potential_energy(x)
+
+    step = 1e-6 * np.eye(6)
+    slope = [(energy(theta + h) - energy(theta - h)) / 2e-6 for h in step]
+    np.testing.assert_allclose(force, -np.array(slope), atol=1e-9)
+
+
+def test_a_chain_with_symmetric_starts_moves_as_one_cell():
+    """Equal cells pull on each other with nothing."""
+    system = chain(TwoCells)
+    motion = follow(system, [0.2, 0.0, 0.2, 0.0])
+    one = System(model=TwoLayer(beta0=BETA80, mass_ratio=0.5, damping=0.05), load=system.load, impact=system.impact)
+    own = saltus.simulate(one, theta=(0.2, 0.0), duration=12.0, tol=1e-14)
+    np.testing.assert_allclose(motion.position, 2 * list(own.position), atol=1e-11)
+
+
+def test_chains_are_read_from_files_and_survive_them():
+    system = chain(FourCells)
+    assert System.from_toml(system.to_toml()) == system
+    assert system.parameters["model.coupling"] == 0.3
