@@ -9,6 +9,7 @@ import saltus
 from saltus.errors import ParameterError
 from saltus.flow import EventKind
 from saltus.systems import (
+    Contact,
     FourCells,
     Harmonic,
     ImpactPair,
@@ -154,6 +155,31 @@ def test_a_chain_with_symmetric_starts_moves_as_one_cell():
     one = System(model=TwoLayer(beta0=BETA80, mass_ratio=0.5, damping=0.05), load=system.load, impact=system.impact)
     own = saltus.simulate(one, theta=(0.2, 0.0), duration=12.0, tol=1e-14)
     np.testing.assert_allclose(motion.position, 2 * list(own.position), atol=1e-11)
+
+
+def test_eight_contacts_have_a_bit_each_in_datasets():
+    system, theta = chain(FourCells), state(4)
+    motion = follow(system, theta, duration=5.0)
+    closed = motion.to_xarray().closed_contacts
+    assert closed.flag_masks[-1] == 128
+    assert closed.values[0] == sum(1 << i for i, x in enumerate(theta) if x == 0.0)
+    starts = {name: np.array([x, x]) for name, x in zip(system.model.coordinates, theta, strict=True)}
+    many = saltus.simulate_many(system, **starts, velocity=(np.zeros(2),) * 8, duration=5.0)
+    assert many.closed_contacts.values.tolist() == [motion.side - 1] * 2
+    for name, x in zip(system.model.coordinates, motion.position, strict=True):
+        np.testing.assert_allclose(many[name].values.ravel(), x, rtol=0, atol=1e-9)
+
+
+class Thirteen(TwoCells):
+    """More contacts than are tried."""
+
+    coordinates = tuple(f"q{i}" for i in range(13))
+    contacts = tuple(Contact(name=name, coordinate=name) for name in coordinates)
+
+
+def test_more_contacts_than_can_be_tried_are_refused():
+    with pytest.raises(ParameterError, match="Thirteen has 13 contacts, and at most 12 can be followed"):
+        System(model=Thirteen(beta0=1.0))
 
 
 def test_chains_are_read_from_files_and_survive_them():

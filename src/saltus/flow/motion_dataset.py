@@ -57,9 +57,9 @@ def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> 
     """Which contacts are closed, and the impacts: times, contacts, positions, velocities and impulses."""
     model, impacts = motion.system.model, motion.impacts
     names, contacts = model.coordinates, [contact.name for contact in model.contacts]
-    masks = np.array([1 << i for i in range(len(contacts))], dtype=np.int8)
+    masks = np.array([1 << i for i in range(len(contacts))], dtype=np.int16)
     flags = {"units": "1", "flag_masks": masks, "flag_meanings": " ".join(contacts)}
-    dataset["closed_contacts"] = ("time", (side - 1).astype(np.int8), flags | {"long_name": "contacts that are closed"})
+    dataset["closed_contacts"] = ("time", (side - 1).astype(np.int16), flags | {"long_name": "contacts that are closed"})
     dataset["impact_time"] = ("impact", impacts.time, {"units": "1"})
     dataset["impact_contacts"] = ("impact", impacts.side, flags | {"long_name": "contacts that were hit"})
     position = np.full((len(names), len(impacts)), np.nan)

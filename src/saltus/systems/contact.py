@@ -7,6 +7,8 @@ from typing import Any
 
 from saltus.errors import ParameterError
 
+MOST = 12  # Which of them are closed is found by trying, 2^n choices at worst.
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
@@ -39,6 +41,8 @@ def check_contacts(model: Any) -> None:
     """
     contacts, kind = model.contacts, type(model).__name__
     names = [contact.name for contact in contacts]
+    if len(contacts) > MOST:
+        raise ParameterError(f"{kind} has {len(contacts)} contacts, and at most {MOST} can be followed", "model")
     if len(set(names)) < len(names):
         raise ParameterError(f"{kind}.contacts must have names of their own, got {', '.join(names)}", "model")
     if model.sides:

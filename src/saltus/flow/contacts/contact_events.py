@@ -49,4 +49,4 @@ class ContactEvents(MotionEvents):
         """The impacts, as arrays; `side` has the bits of the contacts that were hit, velocities are (n, coordinates)."""
         impacts = self.of(EventKind.IMPACT)
         before, after, _ = impacts._parts(slice(None))
-        return Impacts(impacts._times, impacts._labels[:, 2].astype(np.int8), before, after)
+        return Impacts(impacts._times, impacts._labels[:, 2].astype(np.int16), before, after)

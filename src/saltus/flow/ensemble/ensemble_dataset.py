@@ -113,8 +113,8 @@ def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends, contacts: tuple[Contact, 
     held = np.isin(ends.of(EndLabel.MODE), (Mode.REST, Mode.CHATTER))
     side, names = ends.of(EndLabel.SIDE), [contact.name for contact in contacts]
     if names:
-        flags = {"flag_masks": np.array([1 << i for i in range(len(names))], dtype=np.int8), "flag_meanings": " ".join(names)}
-        writer.add("closed_contacts", (side - 1).astype(np.int8), "1", "contacts that are closed at the end", **flags)
+        flags = {"flag_masks": np.array([1 << i for i in range(len(names))], dtype=np.int16), "flag_meanings": " ".join(names)}
+        writer.add("closed_contacts", (side - 1).astype(np.int16), "1", "contacts that are closed at the end", **flags)
         side = np.ones_like(side)
     writer.add("side", np.where(held, 0, side).astype(np.int8), "1", "side at the end, 0 at rest")
     writer.add("impact_count", ends.of(EndLabel.IMPACTS), "1", "impacts")
