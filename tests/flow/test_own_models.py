@@ -152,7 +152,7 @@ class Tabulated(Model):
 def test_an_array_in_a_model_is_not_taken_from_another_one():
     from generated_functions import Generated
 
-    from saltus.flow.structures import structure_key
+    from saltus.taylor import structure_key
 
     one, four = (System(model=Tabulated(factors=np.array([f]))) for f in (1.0, 4.0))
     assert structure_key(one) != structure_key(four)

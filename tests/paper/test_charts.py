@@ -26,7 +26,7 @@ QUICK = {
 
 @functools.cache
 def data():
-    return FIGURES["fig14"].compute(panels=QUICK, size=9, curves=3, starts=6)
+    return FIGURES["fig14"].compute(charts=QUICK, size=9, curves=3, starts=6)
 
 
 @pytest.mark.thorough
@@ -97,7 +97,7 @@ def test_the_onset_read_from_curves_is_the_closed_form_and_so_is_the_share():
 def test_statements_on_parameters_compare_charts_of_the_same_cells():
     reference = QUICK["d"] | {"widest": 0.04}
     quick = {"a": reference | {"beta0": 60.0}, "b": reference | {"damping": 0.05}, "d": reference}
-    made = FIGURES["fig15"].compute(panels=quick, size=9, curves=2, starts=4)
+    made = FIGURES["fig15"].compute(charts=quick, size=9, curves=2, starts=4)
     claims = claims_of(chart_measures.over_parameters(made))
     assert claims["fig15-damping-domain"].verdict is ClaimVerdict.AS_PRINTED
     assert len(claims) == 6

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
-from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -14,8 +12,8 @@ import numpy as np
 from saltus.checks import check_names
 from saltus.errors import ParameterError
 from saltus.flow.compiled import Structure, load_structure
-from saltus.systems import Record, System, children, is_number, numbers
-from saltus.taylor import Trace, record_table, trace
+from saltus.systems import System, numbers
+from saltus.taylor import Trace, record_table, structure_key, trace
 
 OFF_CONTACT = 1e-9  # of a gap at the contact, relative to its rate: far above rounding, far below what a model would mean
 
@@ -43,47 +41,6 @@ def program(system: System, limits: tuple[str, ...] = (), sensitivities: tuple[s
 
 
 _structures: dict[Any, tuple[Trace, Structure]] = {}
-
-
-def structure_key(node: Any) -> Any:
-    """What a system's structure depends on: the types of its parts, what these read from their modules, and whatever in them is
-    not a number."""
-    if isinstance(node, Record):  # its samples are numbers, and its scale; where they came from does not matter
-        return Record, node.quantity
-    parts = children(node)
-    if parts:
-        owner: Any = type(node)
-        outside = tuple(space.get(name) for space, name in _outside(owner))
-        return owner, outside, tuple((name, structure_key(part)) for name, part in parts.items())
-    if is_number(node):
-        return float
-    if isinstance(node, np.ndarray):
-        return node.shape, node.dtype.str, node.tobytes()
-    if type(node).__hash__ is None:
-        raise ParameterError(f"a model cannot keep a {type(node).__name__}, got {node!r}; give it numbers, an array or a tuple")
-    return node
-
-
-@cache
-def _outside(cls: type) -> tuple[tuple[Mapping[str, Any], str], ...]:
-    """Where the numbers stand that the methods of a user's class read from its module or class: a trace holds their values."""
-    found: dict[tuple[int, str], tuple[Mapping[str, Any], str]] = {}
-    owners = [owner for owner in cls.__mro__ if owner.__module__.partition(".")[0] not in ("saltus", "builtins")]
-    waiting = [value for owner in owners for value in vars(owner).values()]
-    seen: set[int] = set()
-    for owner in owners:
-        found |= {(id(owner), name): (vars(owner), name) for name, value in vars(owner).items() if is_number(value)}
-    while waiting:
-        function = getattr(waiting[-1], "fget", None) or getattr(waiting[-1], "__func__", waiting[-1])
-        waiting.pop()
-        if not isinstance(function, FunctionType) or id(function) in seen:
-            continue
-        seen.add(id(function))
-        space = function.__globals__
-        named = [name for name in function.__code__.co_names if name in space]
-        found |= {(id(space), name): (space, name) for name in named if is_number(space[name])}
-        waiting += [space[name] for name in named]  # functions that it calls
-    return tuple(found.values())
 
 
 def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from saltus.paper import report
 from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import Claim
 from saltus.paper.figures.figure import PaperFigure
+from saltus.paper.panel_work import compute_panels
 from saltus.plots import style
 from saltus.progress import Progress, silent
 
@@ -24,7 +25,7 @@ class Result:
 
     name: str
     made: bool  # False: it was up to date
-    seconds: float
+    seconds: float  # of processor time, of all cores together; 0 if it was up to date
     files: tuple[Path, ...]
     claims: tuple[Claim, ...]
 
@@ -47,26 +48,34 @@ def reproduce(
     output = Path(output)
     check_writable(output)
     chosen = [figure for name, figure in FIGURES.items() if not names or name in names]
-    results = []
-    for i, figure in enumerate(chosen):
-        progress(i / len(chosen), f"{figure.name}, {figure.title}")
-        results.append(_make(figure, output, force))
+    seconds = _make([figure for figure in chosen if force or not state.up_to_date(figure, output)], output, progress)
     progress(1.0, "writing the report")
+    results = [_result(figure, output, seconds) for figure in chosen]
     report.write(FIGURES.values(), output, {result.name: result.claims for result in results})
     return results
 
 
-def _make(figure: PaperFigure, output: Path, force: bool) -> Result:
-    start = time.perf_counter()
-    stale = force or not state.up_to_date(figure, output)
-    if stale:
-        data = figure.compute(**figure.parameters)
+def _make(stale: Sequence[PaperFigure], output: Path, progress: Progress) -> dict[str, float]:
+    """Compute, draw and judge these parts, the later ones of the paper first, as they take longest; returns their seconds."""
+    figures = {figure.name: figure for figure in reversed(stale)}
+    seconds: dict[str, float] = {}
+    progress(0.0, f"computing {len(stale)} parts")
+    for name, made, computing in compute_panels({name: figure.panels(**figure.parameters) for name, figure in figures.items()}):
+        figure, start = figures[name], time.process_time()
+        data = figure.join(made)
         _write(figure, data, output)
-        # From memory, which tests show to be what the file gives back: reading many branches takes minutes (see `read_dataset`).
-        state.write(figure, output, figure.claims(data), time.perf_counter() - start)
-    claims = tuple(state.claims(figure, output))
+        # From memory, which tests show to be what the file gives back.
+        claims = figure.claims(data)
+        seconds[name] = computing + time.process_time() - start
+        state.write(figure, output, claims, seconds[name])
+        progress(len(seconds) / len(stale), f"{name}, {figure.title}")
+    return seconds
+
+
+def _result(figure: PaperFigure, output: Path, seconds: Mapping[str, float]) -> Result:
     files = tuple(output / name for name in figure.files())
-    return Result(name=figure.name, made=stale, seconds=time.perf_counter() - start, files=files, claims=claims)
+    made, claims = figure.name in seconds, tuple(state.claims(figure, output))
+    return Result(name=figure.name, made=made, seconds=seconds.get(figure.name, 0.0), files=files, claims=claims)
 
 
 def _write(figure: PaperFigure, data: Any, output: Path) -> None:

@@ -44,7 +44,7 @@ def check_parameters(system: System, columns: Mapping[str, np.ndarray]) -> None:
         if path.endswith(".order") and not np.equal(values, np.round(values)).all():
             raise ParameterError(f"{path} must be whole numbers", "parameters")
     if columns and all(a.size for a in columns.values()):
-        rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(a) for a in columns.values())), axis=1)
+        rows = np.unique(np.stack(np.broadcast_arrays(*(np.atleast_1d(a) for a in columns.values())), axis=1), axis=0)
         for i in _chosen(rows):
             system.with_(dict(zip(columns, rows[i].tolist(), strict=True)))
 

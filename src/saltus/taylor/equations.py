@@ -8,6 +8,7 @@ from saltus.errors import SaltusError
 from saltus.systems import System
 from saltus.taylor.cache import digest
 from saltus.taylor.graph import Expr
+from saltus.taylor.structure_key import structure_key
 from saltus.taylor.tapes import tape
 from saltus.taylor.tracing import Trace, trace
 
@@ -16,14 +17,27 @@ def equations_of(system: System) -> dict[str, str]:
     """A digest of each part of a system's equations, its numbers left out: `System.to_json` has these.
 
     The parts are `acceleration` (with the load's channels in it), `gap`, `contact` (where it is), `reset` (with the impact law in
-    it), `contacts` (of a model with several), `margins`, `mirror` (the load of the mirror image) and `names` (of coordinates,
-    units, channels, sides and stops). What a model's Python reads from elsewhere, such as a constant of its module, stands in the
-    expressions as a number.
+    it), `contacts` (of a model with several), `signs` (of its contacts), `margins`, `mirror` (the load of the mirror image) and
+    `names` (of coordinates, units, channels, sides and stops). What a model's Python reads from elsewhere, such as a constant of
+    its module, stands in the expressions as a number.
 
     Raises:
         TraceError: a model that cannot be traced.
     """
-    traced, model = trace(system), system.model
+    key = structure_key(system)
+    if key not in _digests:
+        _digests[key] = _traced_parts(system)
+    mirrored, model = system.mirrored(), system.model
+    names = (model.coordinates, model.units, model.channels, model.sides, model.stops)
+    return _digests[key] | {"mirror": digest(repr(mirrored and mirrored.to_dict()["load"])), "names": digest(repr(names))}
+
+
+_digests: dict[Any, dict[str, str]] = {}  # of structures, as their compiled code is kept
+
+
+def _traced_parts(system: System) -> dict[str, str]:
+    """The digests of what was traced."""
+    traced = trace(system)
     roots: dict[str, list[Expr | None]] = {
         "acceleration": list(traced.acceleration),
         "gap": [traced.gap],
@@ -31,11 +45,8 @@ def equations_of(system: System) -> dict[str, str]:
         "reset": [traced.next_side, traced.velocity_after],
         "contacts": [*traced.mass, *traced.reactions, *traced.restitution, *traced.positions],
     }
-    mirrored = system.mirrored()
     texts = {name: _text(traced, [root for root in parts if root is not None]) for name, parts in roots.items()}
-    texts["margins"] = _margins(system)
-    texts["mirror"] = repr(mirrored and mirrored.to_dict()["load"])
-    texts["names"] = repr((model.coordinates, model.units, model.channels, model.sides, model.stops, traced.signs, traced.held))
+    texts |= {"margins": _margins(system), "signs": repr((traced.signs, traced.held))}
     return {name: digest(text) for name, text in texts.items()}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from saltus.branch_lines import border_curves
 from saltus.paper.figure_data import joined
 from saltus.paper.figures.harmonic_loads import under_force
-from saltus.paper.figures.parallel_panels import each
+from saltus.paper.panel_work import Panels
 from saltus.plots import DOUBLE_COLUMN, chart_legend, draw_chart, draw_closed_form, draw_lines, new_figure, panel_label, styled
 from saltus.studies import bordered_chart, wrong_cells
 from saltus.theory import high_frequency_onset
@@ -24,16 +25,14 @@ CHECKED = 40  # cells of a chart that are computed again, with more starts on a 
 CURVES = 20  # largest number of curves on which motions end, for one chart
 
 
-def compute(panels: Mapping[str, Mapping[str, Any]], size: int, curves: int = CURVES, **options: Any) -> Any:
+def panels(charts: Mapping[str, Mapping[str, Any]], size: int, **options: Any) -> Panels:
     """A chart of `size` x `size` cells for each panel; options are those of `stability_chart`."""
-    made = each(
-        _panel, {name: {"curves": curves} | dict(values) for name, values in panels.items()}, "first", size=size, **options
-    )
+    return {name: partial(panel, size=size, **{**values, **options}) for name, values in charts.items()}
+
+
+def join(made: Mapping[str, Any]) -> Any:
+    """The charts of a figure."""
     return joined(made, what="stability charts under load (i)")
-
-
-def _panel(values: Mapping[str, Any], **options: Any) -> Any:
-    return panel(**values, **options)
 
 
 def panel(

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from saltus.paper.claims.claim import Measured
 from saltus.paper.figure_data import joined
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.harmonic_loads import under_force
-from saltus.paper.figures.parallel_panels import each
 from saltus.paper.figures.response_panels import spectrum
 from saltus.paper.measures import chaos_measures, response_measures
 from saltus.paper.measures.spectrum_features import detached
 from saltus.paper.measures.validity_measures import validity
+from saltus.paper.panel_work import Panels
 from saltus.plots import (
     DOUBLE_COLUMN,
     draw_branches,
@@ -36,9 +37,14 @@ LOOPS = ("c",)  # panels with a loop that closes far beyond the range
 ZOOMED = {"a": (0.1, 0.46), "b": (0.1, 0.34)}  # Omega of the superharmonic resonances
 
 
-def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any:
-    """One spectrum for each amplitude; options are those of `response_spectrum`."""
-    return joined(each(_panel, amplitudes, **options), what="response spectrum under load (i)")
+def panels(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Panels:
+    """One spectrum for each amplitude, those that take longest first; options are those of `response_spectrum`."""
+    return {name: partial(_panel, amplitude, **options) for name, amplitude in reversed(amplitudes.items())}
+
+
+def join(made: Mapping[str, Any]) -> Any:
+    """The spectra in the order of the figure."""
+    return joined(dict(sorted(made.items())), what="response spectrum under load (i)")
 
 
 def _panel(amplitude: float, **options: Any) -> Any:
@@ -116,4 +122,4 @@ def measure(data: Any) -> dict[str, Measured | None]:
     return {**found, "fig09-validity": validity("Fig. 9", data.children)}
 
 
-FIGURE = paper_figure("fig09", compute=compute, draw=draw, measure=measure)
+FIGURE = paper_figure("fig09", panels=panels, join=join, draw=draw, measure=measure)

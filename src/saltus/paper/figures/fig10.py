@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,11 @@ from saltus.paper.figure_data import dataset, joined, with_groups
 from saltus.paper.figures.fig09 import draw_panel
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.harmonic_loads import on_ground
-from saltus.paper.figures.parallel_panels import each
 from saltus.paper.figures.response_panels import spectrum
 from saltus.paper.measures import chaos_measures, response_measures
 from saltus.paper.measures.spectrum_features import main_branch
 from saltus.paper.measures.validity_measures import validity
+from saltus.paper.panel_work import Panels
 from saltus.plots import DOUBLE_COLUMN, draw_beside, highest, new_figure, response_legend, styled
 
 AMPLITUDES = {"a": 0.25, "b": 0.5}  # zetahat
@@ -25,10 +26,16 @@ FREQUENCY_RANGE = (0.1, 4.0)  # Omega: up to chaos
 MOTIONS, HORIZONS = 96, (500, 2000, 8000)  # for how many forcing periods wandering motions are followed
 
 
-def compute(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Any:
-    """One spectrum for each amplitude; options are those of `response_spectrum`."""
-    panels = joined(each(_panel, amplitudes, **options), what="response spectrum under load (ii)")
-    return with_groups(panels, {"transients": transients()})
+def panels(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Panels:
+    """One spectrum for each amplitude, and what becomes of chaos; options are those of `response_spectrum`."""
+    spectra = {name: partial(_panel, amplitude, **options) for name, amplitude in reversed(amplitudes.items())}
+    return {**spectra, "transients": transients}
+
+
+def join(made: Mapping[str, Any]) -> Any:
+    """The spectra in the order of the figure, then what becomes of chaos."""
+    spectra = {name: tree for name, tree in sorted(made.items()) if name in AMPLITUDES}
+    return with_groups(joined(spectra, what="response spectrum under load (ii)"), {"transients": made["transients"]})
 
 
 def _panel(amplitude: float, **options: Any) -> Any:
@@ -81,4 +88,4 @@ def measure(data: Any) -> dict[str, Measured | None]:
     return {**found, "fig10-validity": validity("Fig. 10", drawn)}
 
 
-FIGURE = paper_figure("fig10", compute=compute, draw=draw, measure=measure)
+FIGURE = paper_figure("fig10", panels=panels, join=join, draw=draw, measure=measure)

@@ -10,14 +10,15 @@ from saltus.paper.figures import load_diagrams
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.measures import chaos_measures, response_measures
 from saltus.paper.measures.validity_measures import validity
+from saltus.paper.panel_work import Panels
 
 FREQUENCIES = {"a": 0.5, "b": 1.0}  # Omega
 LARGEST = dict.fromkeys(FREQUENCIES.values(), 4.0)  # Hhat: beyond the second region of chaos, or what is left of it
 
 
-def compute(frequencies: Mapping[str, float] = FREQUENCIES, **options: Any) -> Any:
+def panels(frequencies: Mapping[str, float] = FREQUENCIES, **options: Any) -> Panels:
     """One diagram for each frequency; options are those of `bifurcation_diagram`."""
-    return load_diagrams.compute(frequencies, LARGEST, **options)
+    return load_diagrams.panels(frequencies, LARGEST, **options)
 
 
 def draw(data: Any) -> Any:
@@ -32,4 +33,4 @@ def measure(data: Any) -> dict[str, Measured | None]:
     return {**found, "fig11-validity": validity("Fig. 11", data.children)}
 
 
-FIGURE = paper_figure("fig11", compute=compute, draw=draw, measure=measure)
+FIGURE = paper_figure("fig11", panels=panels, join=load_diagrams.join, draw=draw, measure=measure)

@@ -9,17 +9,18 @@ from saltus.paper.claims.claim import Measured
 from saltus.paper.figures import chart_panels
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.measures.chart_measures import over_parameters
+from saltus.paper.panel_work import Panels
 
 REFERENCE = "d"  # Fig. 14 (d) again, which all are compared with
-PANELS: dict[str, dict[str, Any]] = {
+CHARTS: dict[str, dict[str, Any]] = {
     name: {"beta0": beta0, "damping": damping, "frequency": 1.0, "widest": chart_panels.WIDEST, "curves": 8}
     for name, beta0, damping in (("a", 60.0, 0.1), ("b", 80.0, 0.05), ("c", 80.0, 0.15), (REFERENCE, 80.0, 0.1))
 }
 
 
-def compute(panels: Mapping[str, Mapping[str, Any]] = PANELS, size: int = 101, **options: Any) -> Any:
+def panels(charts: Mapping[str, Mapping[str, Any]] = CHARTS, size: int = 101, **options: Any) -> Panels:
     """One chart for each system; options are those of `stability_chart`."""
-    return chart_panels.compute(panels, size, **options)
+    return chart_panels.panels(charts, size, **options)
 
 
 def draw(data: Any) -> Any:
@@ -32,4 +33,4 @@ def measure(data: Any) -> dict[str, Measured]:
     return over_parameters(data)
 
 
-FIGURE = paper_figure("fig15", compute=compute, draw=draw, measure=measure)
+FIGURE = paper_figure("fig15", panels=panels, join=chart_panels.join, draw=draw, measure=measure)

@@ -5,18 +5,21 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
+from operator import itemgetter
 from typing import Any
 
 from saltus.paper.claims.claim import Claim, Measures, judge
+from saltus.paper.panel_work import Panels, compute_panels
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PaperFigure:
     """One figure, table or group of statements of the paper, which `reproduce` makes by its name.
 
-    1. `compute(**parameters)` returns an xarray DataTree: every number behind the picture, with units;
+    1. `panels(**parameters)` returns a function without arguments for each panel, and `join` makes of what they return by the
+       panels' names an xarray DataTree: every number behind the picture, with units;
     2. `draw(data)` returns a matplotlib Figure from nothing but that data, or is None where there is nothing to draw;
     3. `measure(data)` returns the numbers for its claims, again from nothing but the data; the tables of claims hold the rest;
     4. `table(data)`, where given, returns Markdown.
@@ -26,16 +29,19 @@ class PaperFigure:
     title: str
     caption: str
     section: str = ""  # its number in the paper; none where the statements are of several sections
-    compute: Callable[..., Any]
+    panels: Callable[..., Panels]
+    join: Callable[[dict[str, Any]], Any]
     measure: Callable[[Any], Measures] = lambda data: {}
     draw: Callable[[Any], Any] | None = None
     table: Callable[[Any], str] | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
 
-    @property
-    def module(self) -> str:
-        """The module that computes it."""
-        return self.compute.__module__
+    module: str  # that computes it
+
+    def compute(self, **parameters: Any) -> Any:
+        """The data of all panels together, with other parameters than the paper's."""
+        ((_, made, _),) = compute_panels({self.name: self.panels(**parameters)})
+        return self.join(made)
 
     def claims(self, data: Any) -> list[Claim]:
         """The claims that the data bears on, each with its verdict."""
@@ -47,10 +53,18 @@ class PaperFigure:
         return [self.name + kind for kind in kinds]
 
 
-def paper_figure(name: str, **parts: Any) -> PaperFigure:
-    """A `PaperFigure` with its title and caption from `captions.toml`."""
+def paper_figure(name: str, *, compute: Callable[..., Any] | None = None, **parts: Any) -> PaperFigure:
+    """A `PaperFigure` with its title and caption from `captions.toml`; `compute` is all of one that has no panels."""
     words = _captions()[name]
+    if compute is not None:
+        parts |= {"panels": partial(_only, name, compute), "join": itemgetter(name), "module": compute.__module__}
+    else:
+        parts["module"] = parts["panels"].__module__
     return PaperFigure(name=name, title=words["title"], caption=words["caption"], section=words.get("section", ""), **parts)
+
+
+def _only(name: str, compute: Callable[..., Any], **parameters: Any) -> Panels:
+    return {name: partial(compute, **parameters)}
 
 
 @cache

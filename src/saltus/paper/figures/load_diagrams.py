@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,8 @@ from saltus.flow import simulate_many
 from saltus.paper.figure_data import joined, scalar_dataset, with_groups
 from saltus.paper.figures.harmonic_loads import AMPLITUDE, under_force
 from saltus.paper.figures.knots_and_jumps import birth
-from saltus.paper.figures.parallel_panels import each
 from saltus.paper.figures.response_panels import diagram
+from saltus.paper.panel_work import Panels
 from saltus.plots import (
     DOUBLE_COLUMN,
     draw_beside,
@@ -32,14 +33,19 @@ NEAR = 1e-3  # relative distance from Hcr at which rest is tried
 WAIT, LAST = 300, 10  # forcing periods
 
 
-def compute(frequencies: Mapping[str, float], largest: Mapping[float, float], **options: Any) -> Any:
+def panels(frequencies: Mapping[str, float], largest: Mapping[float, float], **options: Any) -> Panels:
     """One diagram under load (i) for each frequency, up to the amplitude for it, with the fate of rest on both sides of Hcr."""
-    return joined(each(_panel, frequencies, largest=largest, **options), what="bifurcation diagram under load (i)")
+    return {name: partial(_panel, frequency, largest[frequency], **options) for name, frequency in frequencies.items()}
 
 
-def _panel(frequency: float, largest: Mapping[float, float], **options: Any) -> Any:
+def join(made: Mapping[str, Any]) -> Any:
+    """The diagrams of a figure."""
+    return joined(made, what="bifurcation diagram under load (i)")
+
+
+def _panel(frequency: float, largest: float, **options: Any) -> Any:
     system = under_force(frequency=frequency)
-    tree = diagram(system, (LEAST, largest[frequency]), **options)
+    tree = diagram(system, (LEAST, largest), **options)
     return with_groups(tree, {"undeformed": undeformed(system, tree.attrs["critical"]), "birth": birth(tree)})
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import joined
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.harmonic_loads import FREQUENCY, on_ground, under_force
+from saltus.paper.panel_work import Panels
 from saltus.plots import DOUBLE_COLUMN, FAINT, POINTS, STABLE, UNSTABLE, draw_bands, new_figure, panel_label, styled
 from saltus.studies import chaotic_bands
 
@@ -20,18 +22,25 @@ TITLES = {"a": r"load (i), $\widehat{\mathcal{H}}=0.2$", "b": r"load (ii), $\wid
 COUNT, STARTS = 57, 4
 
 
-def compute(windows: Mapping[str, tuple[float, float]] = WINDOWS, count: int = COUNT, starts: int = STARTS) -> Any:
-    """`chaotic_bands` over both windows; `torus` in the attributes says why there is none."""
+def panels(windows: Mapping[str, tuple[float, float]] = WINDOWS, count: int = COUNT, starts: int = STARTS) -> Panels:
+    """`chaotic_bands` over both windows."""
+    return {name: partial(_panel, name, window, count=count, starts=starts) for name, window in windows.items()}
+
+
+def join(made: Mapping[str, Any]) -> Any:
+    """The bands under both loads."""
+    return joined(made, what="the bands called quasi-periodic")
+
+
+def _panel(name: str, window: tuple[float, float], **options: Any) -> Any:
+    """The bands of a window; `torus` in the attributes says why there is none."""
     import xarray as xr
 
-    systems = {"a": under_force(amplitude=0.2), "b": on_ground(amplitude=0.5)}
-    panels = {}
-    for name, window in windows.items():
-        found = chaotic_bands(systems[name], FREQUENCY, window, count=count, starts=starts, window=((-1.0, 1.0), (-1.0, 1.0)))
-        tree = xr.DataTree.from_dict(found.to_datasets())
-        tree.attrs = {"system": systems[name].to_json(), "bounds": list(window), "torus": excludes_tori(systems[name]) or ""}
-        panels[name] = tree
-    return joined(panels, what="the bands called quasi-periodic")
+    system = {"a": under_force(amplitude=0.2), "b": on_ground(amplitude=0.5)}[name]
+    found = chaotic_bands(system, FREQUENCY, window, window=((-1.0, 1.0), (-1.0, 1.0)), **options)
+    tree = xr.DataTree.from_dict(found.to_datasets())
+    tree.attrs = {"system": system.to_json(), "bounds": list(window), "torus": excludes_tori(system) or ""}
+    return tree
 
 
 @styled
@@ -88,4 +97,4 @@ def _resolved(panel: Any) -> Measured:
     )
 
 
-FIGURE = paper_figure("quasi", compute=compute, draw=draw, measure=measure)
+FIGURE = paper_figure("quasi", panels=panels, join=join, draw=draw, measure=measure)

@@ -37,7 +37,7 @@ class ChaosSettings:
     # Shares of the range beside a special point at which motions from its orbit are begun: narrow bands begin there.
     beside: tuple[float, ...] = (-4e-4, -1.5e-4, 1.5e-4, 4e-4)
     # Judgements of rising care. The first one is made at all values, and excludes lives below 660 forcing periods; the second one
-    # at edges and at some values between them (6600). The third one is made at these where companions settled at one of a band,
+    # at edges and at some values between them (6600). The third one is made at those of these beside one where companions settled,
     # and at edges beside which transients are long (33 000).
     judgements: tuple[JudgementSettings, ...] = (
         replace(JUDGEMENT, companions=8, exposure=2000, round_periods=500, rounds=2),
@@ -309,7 +309,7 @@ class _BandSearch:
             runs = [(run, self._some_of(run)) for run in self._runs()]
             failed = self._confirm((place for run, some in runs for place in some + self._beside_windows(run)), 1)
             leaving = [a for a, b in self._edges() if b.life >= self.settings.lasting]
-            leaving += [place for _, some in runs if any(p.settled for p in some if p.chaotic) for place in some]
+            leaving += [place for _, some in runs for place in _beside_settled(some)]
             leaving += [place for place in self.places if place.settled and place.care == 1]
             failed += self._confirm(leaving, 2)
             if not failed:
@@ -381,6 +381,12 @@ class _BandSearch:
             period=np.array([place.longest for place in self.places]),
             states=states,
         )
+
+
+def _beside_settled(some: list[_Place]) -> list[_Place]:
+    """Those next to chaos in which companions settled: it may be a long transient, and so may they."""
+    settled = [i for i, place in enumerate(some) if place.chaotic and place.settled]
+    return [some[i] for i in sorted({j for i in settled for j in (i - 1, i, i + 1) if 0 <= j < len(some)})]
 
 
 def _some(settled: SettledLater, most: int) -> SettledLater:
