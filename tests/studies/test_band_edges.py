@@ -10,7 +10,8 @@ from saltus import continue_orbit, find_orbit
 from saltus.orbits import SpecialKind, switch_branch
 from saltus.studies.diagram.band_edges import explained, seeds_of, turning_points
 from saltus.studies.diagram.bands import EdgeKind
-from saltus.studies.diagram.chaos_search import SETTINGS, resolve_bands
+from saltus.studies.diagram.chaos_search import resolve_bands
+from saltus.studies.diagram.chaos_settings import SETTINGS
 from saltus.studies.diagram.simulated import simulate_from
 
 FREQUENCY, BOUNDS = "load.frequency", (0.36, 0.402)

@@ -12,7 +12,8 @@ from saltus.checks import check_window
 from saltus.flow import Outcome, find_recurrence
 from saltus.studies import chaotic_bands
 from saltus.studies.diagram.bands import Band, Edge, EdgeKind, band_dataset
-from saltus.studies.diagram.chaos_search import SETTINGS, resolve_bands
+from saltus.studies.diagram.chaos_search import resolve_bands
+from saltus.studies.diagram.chaos_settings import SETTINGS
 from saltus.studies.diagram.simulated import simulate_from, starts_at
 from saltus.systems import Harmonic, Load, System
 

@@ -8,7 +8,8 @@ from shared_systems import forced
 
 from saltus import stability_chart
 from saltus.attractors import Unsettled
-from saltus.studies.diagram.chaos_search import SETTINGS, resolve_bands
+from saltus.studies.diagram.chaos_search import resolve_bands
+from saltus.studies.diagram.chaos_settings import SETTINGS
 from saltus.studies.diagram.simulated import simulate_from
 
 AMPLITUDE = "load.horizontal.amplitude"

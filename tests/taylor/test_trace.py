@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from saltus.errors import ParameterError, TraceError
-from saltus.taylor import structure_key
 from saltus.systems import Harmonic, Load, Metainterface, Model, Record, System, VelocityReduction, WallOscillator
+from saltus.taylor import structure_key
 from saltus.taylor.graph import FRICTION, Expr, combine, differentiate, number, ordered, power, substitute
 from saltus.taylor.tracing import trace
 

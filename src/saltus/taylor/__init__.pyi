@@ -33,7 +33,7 @@ from .private_numba import entry_point, inline_jit, jit, lean_jit, not_here, poi
 from .records import anchor, expand_record
 from .rules import FUNCTIONS
 from .series import Rows
-from .structure_key import structure_key
+from .system_structure import structure_key
 from .tapes import shared_constants, tape
 from .tracing import Trace, record_table, trace
 from .vectors import CACHE_LINE, WIDTH

@@ -8,7 +8,7 @@ from saltus.errors import SaltusError
 from saltus.systems import System
 from saltus.taylor.cache import digest
 from saltus.taylor.graph import Expr
-from saltus.taylor.structure_key import structure_key
+from saltus.taylor.system_structure import structure_key
 from saltus.taylor.tapes import tape
 from saltus.taylor.tracing import Trace, trace
 

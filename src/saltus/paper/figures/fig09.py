@@ -39,7 +39,7 @@ ZOOMED = {"a": (0.1, 0.46), "b": (0.1, 0.34)}  # Omega of the superharmonic reso
 
 def panels(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Panels:
     """One spectrum for each amplitude, those that take longest first; options are those of `response_spectrum`."""
-    return {name: partial(_panel, amplitude, **options) for name, amplitude in reversed(amplitudes.items())}
+    return {name: partial(_panel, amplitude, **options) for name, amplitude in reversed(list(amplitudes.items()))}
 
 
 def join(made: Mapping[str, Any]) -> Any:

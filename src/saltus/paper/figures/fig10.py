@@ -28,7 +28,7 @@ MOTIONS, HORIZONS = 96, (500, 2000, 8000)  # for how many forcing periods wander
 
 def panels(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Panels:
     """One spectrum for each amplitude, and what becomes of chaos; options are those of `response_spectrum`."""
-    spectra = {name: partial(_panel, amplitude, **options) for name, amplitude in reversed(amplitudes.items())}
+    spectra = {name: partial(_panel, amplitude, **options) for name, amplitude in reversed(list(amplitudes.items()))}
     return {**spectra, "transients": transients}
 
 

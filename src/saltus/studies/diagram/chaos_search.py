@@ -4,54 +4,22 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from saltus.attractors import JUDGEMENT, Judged, JudgementSettings, SettledLater, Unsettled
+from saltus.attractors import Judged, SettledLater, Unsettled
 from saltus.checks import Rectangle, check_count, check_window
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.checks import check_diagram
 from saltus.studies.diagram.bands import Bands, Tried, bands_of
+from saltus.studies.diagram.chaos_settings import SETTINGS, ChaosSettings
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
-
-
-@dataclass(frozen=True)
-class ChaosSettings:
-    """How chaos is looked for along a parameter."""
-
-    settling: int = 300  # Forcing periods that a motion is given to come to rest or to repeat itself.
-    step: float = 1e-3  # Share of the range to which intervals are halved in which something changes, or with chaos at an end.
-    # The same where motions have longer periods than this: cascades and narrow bands are near.
-    fine_step: float = 3e-4
-    long_period: int = 6
-    edge: float = 1e-4  # Share of the range to which the bracket of an edge is halved.
-    seeds: int = 2  # States of the chaos at each end of an interval from which motions are begun within.
-    neighbours: int = 4  # Motions that have settled at each end, from which others are begun within.
-    states: int = 8  # Last states of each unsettled motion that are given to the judgement.
-    # Shares of the range beside a special point at which motions from its orbit are begun: narrow bands begin there.
-    beside: tuple[float, ...] = (-4e-4, -1.5e-4, 1.5e-4, 4e-4)
-    # Judgements of rising care. The first one is made at all values, and excludes lives below 660 forcing periods; the second one
-    # at edges and at some values between them (6600). The third one is made at those of these beside one where companions settled,
-    # and at edges beside which transients are long (33 000).
-    judgements: tuple[JudgementSettings, ...] = (
-        replace(JUDGEMENT, companions=8, exposure=2000, round_periods=500, rounds=2),
-        replace(JUDGEMENT, companions=16, exposure=20_000),
-        replace(JUDGEMENT, exposure=100_000, rounds=8),
-    )
-    every: float = 0.02  # Share of the range in which each band has a value that is judged with care.
-    # Share of the range about a value that fails a careful judgement in which all others are judged so; it doubles every round.
-    near: float = 0.003
-    lasting: float = 1000.0  # Mean life, in forcing periods, from which transients beside a band are long.
-    confirmations: int = 20  # The largest number of rounds in which edges are located and confirmed.
-
-
-SETTINGS = ChaosSettings()
 
 
 class Seed(NamedTuple):

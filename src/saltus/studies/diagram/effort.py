@@ -7,8 +7,8 @@ from enum import StrEnum
 from typing import Any
 
 from saltus.errors import ParameterError, near
-from saltus.studies.diagram.chaos_search import SETTINGS as CHAOS
-from saltus.studies.diagram.chaos_search import ChaosSettings
+from saltus.studies.diagram.chaos_settings import SETTINGS as CHAOS
+from saltus.studies.diagram.chaos_settings import ChaosSettings
 
 
 class Effort(StrEnum):
