@@ -1,13 +1,14 @@
-"""The panels of the paper's parts, computed on all cores: a process for each core, shared by all parts."""
+"""The panels of the parts of the paper, on all cores: a process for each, shared by all parts; what two show is computed once."""
 
 from __future__ import annotations
 
 import multiprocessing
 import signal
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 from saltus.flow import available_cores
@@ -24,27 +25,38 @@ def compute_panels(parts: Mapping[str, Panels]) -> Iterator[tuple[str, dict[str,
     Yields:
         The name of the part, its panels by name and in their order, and the seconds of processor time that they took.
     """
-    tasks: dict[Task, Callable[[], Any]] = {(part, name): make for part, panels in parts.items() for name, make in panels.items()}
+    shared: dict[Any, list[Task]] = {}  # by what computes them: a chart of two figures is computed once
+    for part, panels in parts.items():
+        for name, make in panels.items():
+            shared.setdefault(_what(make), []).append((part, name))
     found: dict[Task, tuple[Any, float]] = {}
-    with _results(tasks, min(available_cores(), max(map(len, parts.values()), default=1))) as results:
-        for task, result in results:
-            found[task] = result
-            part = task[0]
-            if all((part, name) in found for name in parts[part]):
-                made = {name: found.pop((part, name)) for name in parts[part]}
-                yield part, {name: data for name, (data, _) in made.items()}, sum(seconds for _, seconds in made.values())
+    work = [(parts[tasks[0][0]][tasks[0][1]], tasks) for tasks in shared.values()]
+    with _results(work, min(available_cores(), max(map(len, parts.values()), default=1))) as results:
+        for tasks, result in results:
+            found |= dict.fromkeys(tasks, result)
+            for part in dict.fromkeys(part for part, _ in tasks):
+                if all((part, name) in found for name in parts[part]):
+                    made = {name: found.pop((part, name)) for name in parts[part]}
+                    yield part, {name: data for name, (data, _) in made.items()}, sum(seconds for _, seconds in made.values())
+
+
+def _what(make: Callable[[], Any]) -> Any:
+    """What a function without arguments computes: of a `partial` the function with its arguments, which are plain data."""
+    return (make.func, repr(make.args), repr(sorted(make.keywords.items()))) if isinstance(make, partial) else make
 
 
 @contextmanager
-def _results(tasks: Mapping[Task, Callable[[], Any]], cores: int) -> Iterator[Iterator[tuple[Task, tuple[Any, float]]]]:
-    """The results of tasks, and their seconds, as they come."""
+def _results(
+    work: Sequence[tuple[Callable[[], Any], list[Task]]], cores: int
+) -> Iterator[Iterator[tuple[list[Task], tuple[Any, float]]]]:
+    """The results of each piece of work, and its seconds, as they come."""
     if cores < 2:
-        yield ((task, _timed(make)) for task, make in tasks.items())
+        yield ((tasks, _timed(make)) for make, tasks in work)
         return
     with ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("spawn"), initializer=_deaf) as pool:
-        futures = {pool.submit(_timed, make): task for task, make in tasks.items()}
+        futures = {pool.submit(_timed, make): tasks for make, tasks in work}
         try:
-            yield ((futures[future], future.result()) for future in as_completed(futures))
+            yield ((futures.pop(future), future.result()) for future in as_completed(list(futures)))
         except BaseException:  # interrupted, or a panel failed: the others are of no use any more
             _stop(pool)
             raise
