@@ -27,6 +27,7 @@ from saltus.sweep.store_status import StoreStatus, status
 if TYPE_CHECKING:
     from saltus.sweep.workers import Workers
 
+END = b"\n"  # of a text, which may itself end with the zeros with which rows are filled up
 PARTS = "parts"  # the folder of a store in which its parts are kept
 
 
@@ -93,8 +94,8 @@ class Parts:
         return [self.known[key][1] for key in keys]
 
     def texts(self, part: Part, inputs: Sequence[Any], progress: Progress = silent) -> list[bytes]:
-        """The text of each input, of a part of dtype "u1"."""
-        return [row.tobytes() for row in self.rows(part, inputs, progress)]
+        """The text of each input, of a part of dtype "u1" whose rows `text_rows` makes; b"" of one that was too long."""
+        return [row.tobytes().removesuffix(END) for row in self.rows(part, inputs, progress)]
 
     def _plan(self, part: Part, inputs: list[Any]) -> Plan:
         return Plan(
@@ -129,7 +130,7 @@ class Parts:
 
 def text_rows(texts: Sequence[bytes], width: int) -> np.ndarray:
     """Texts as the rows of a part of dtype "u1"; one that is longer than a row is left out."""
-    kept = [text if len(text) <= width else b"" for text in texts]
+    kept = [text + END if len(text) < width else b"" for text in texts]
     return np.stack([np.frombuffer(text.ljust(width, b"\0"), np.uint8) for text in kept])
 
 
