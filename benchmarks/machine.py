@@ -10,6 +10,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from saltus import __version__
+
 VECTORS = ("avx512f", "avx2", "asimd", "sse2")
 
 
@@ -40,6 +42,6 @@ def _processor() -> str:
 
 def _version(package: str) -> str:
     try:
-        return version(package)
+        return __version__ if package == "saltus" else version(package)  # a checkout's own, not that of its last installation
     except PackageNotFoundError:
         return "(not installed)"

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 equal, measure, reference, report = (__import__(name) for name in ("equal", "measure", "reference", "report"))
-from auto import case, diagram, program, section, verdicts  # noqa: E402
+from auto import case, diagram, exact, program, section, verdicts  # noqa: E402
 from peers.peer import AbsentError  # noqa: E402
 
 ERRORS = np.array([1e-4, 1e-6, 1e-9, 1e-13])
@@ -180,6 +180,12 @@ def test_the_report_on_auto_tells_what_is_missing_and_draws_what_is_there(tmp_pa
     assert "| 1.00 | 14 | 3e-05, 1e-04 | does not get there | turns round, back at 3 | 6 / 3 / 1 / 0 | 1 |" in text
     (tmp_path / "auto.png").write_bytes(draw(results))
     assert (tmp_path / "auto.png").stat().st_size > 10_000
+
+
+def test_the_exact_branch_beside_auto_has_the_folds_that_both_are_compared_by() -> None:
+    folds = [special.parameter for special in exact.follow(1.0, 0.7).special if special.kind == "LP"]
+    for known in case.KNOWN[1.0].folds:
+        assert min(abs(fold - known) for fold in folds) < 1e-9
 
 
 @pytest.mark.parametrize("amplitude", [0.5, 1.0])

@@ -49,9 +49,9 @@ def follow(amplitude: float, lowest: float, **options: float) -> Any:
     orbit = saltus.find_orbit(system(amplitude), theta=theta, velocity=velocity, period=1, settle=0)
     start = time.perf_counter()
 
-    def watch(omega: float) -> None:
+    def watch(done: float, what: str) -> None:
         if time.perf_counter() - start > LIMIT:
-            raise TooLongError(f"not done in {LIMIT:g} s, at Omega = {omega:.4f}")
+            raise TooLongError(f"not done in {LIMIT:g} s, {what}, {done:.0%}")
 
     return saltus.continue_orbit(orbit, "load.frequency", (lowest, HIGHEST), progress=watch, **options)
 

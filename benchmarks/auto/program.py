@@ -115,7 +115,9 @@ def _used() -> float:
 
 
 def version() -> str:
-    """What Debian calls the installed version, where it is Debian's."""
+    """What Debian calls the installed version, where it is Debian's; or `AUTO_VERSION`, beside `AUTO_DIR`."""
+    if "AUTO_VERSION" in os.environ:
+        return os.environ["AUTO_VERSION"]
     if shutil.which("dpkg-query") is None:
         return "version unknown"
     done = subprocess.run(["dpkg-query", "-W", "-f=${Version}", "auto-07p"], capture_output=True, text=True)

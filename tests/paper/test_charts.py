@@ -145,13 +145,13 @@ def test_few_cells_are_wrong_by_the_upper_end_of_the_interval(checked, wrong, ho
 EARLY = {"load.frequency": 0.5, "load.horizontal.amplitude": 0.105, "load.vertical": -0.5}  # chaos that erratum 32 denied
 
 
-def impacts_by_scipy(state, periods):
-    """Where SciPy's DOP853 takes a motion in so many forcing periods, from impact to impact; the velocity is continuous at
-    each."""
+def impacts_by_scipy(state, periods, loads=EARLY, slow=0.0):
+    """Where SciPy's DOP853 takes a motion in so many forcing periods, or to an impact that is so slow, from impact to impact; the
+    velocity is continuous at each."""
     from scipy.integrate import solve_ivp
 
-    frequency, amplitude, vertical = EARLY.values()
-    beta0, damping, now, end = np.radians(80.0), 0.1, 0.0, periods * 2 * np.pi / EARLY["load.frequency"]
+    frequency, amplitude, vertical = loads.values()
+    beta0, damping, now, end = np.radians(80.0), 0.1, 0.0, periods * 2 * np.pi / frequency
     side = np.sign(state[0])
 
     def slope(t, y):
@@ -167,6 +167,8 @@ def impacts_by_scipy(state, periods):
         now, state = part.t[-1], part.y[:, -1]
         if part.status == 1:
             side, state = -side, np.array([0.0, state[1]])
+            if abs(state[1]) < slow:
+                break
     return state
 
 
@@ -230,6 +232,12 @@ def test_erratum_33_motions_of_three_periods_go_on_beyond_any_narrow_region():
     assert branch.points[-1].orbit.stable
     other = orbit(4.0, 0.16, -0.5, (-0.0008312, -0.07474248))
     assert (other.period, other.stable) == (1, True)  # beside it
+    for horizontal, one in ((0.16, found), (1.0, branch.points[-1].orbit)):
+        loads = {"load.frequency": 4.0, "load.horizontal.amplitude": horizontal, "load.vertical": -0.5}
+        start = np.array(one.state)
+        returns = [impacts_by_scipy(start, periods, loads) for periods in (1, 30)]  # by DOP853
+        assert np.abs(returns[0] - start).max() > 1e-2
+        assert np.abs(returns[1] - start).max() < 1e-6
 
 
 def test_erratum_34_a_slow_load_leaves_rest_alone_in_and_beside_the_quasi_static_domain():
@@ -242,6 +250,19 @@ def test_erratum_34_a_slow_load_leaves_rest_alone_in_and_beside_the_quasi_static
         system = slow.with_({"load.horizontal.amplitude": horizontal, "load.vertical": vertical})
         ends = find_recurrence(system, rng.uniform(-1.5, 1.5, (40, 2)), 120, kept=0, extrema=True)
         assert (ends.rest | (np.maximum(ends.highest, -ends.lowest) < 1e-3)).all()
+
+
+@pytest.mark.parametrize(("horizontal", "vertical"), [(0.05, -0.5), (0.1, -1.4)])
+def test_erratum_34_by_another_integrator_motions_come_to_rest_under_a_slow_load(horizontal, vertical):
+    """DOP853 from impact to impact: from the plane's other parts to impacts that leave the contact by less than 0.001 rad, as the
+    least pull towards it, V cos(beta0) + H sin(beta0), is 0.037 or more."""
+    loads = {"load.frequency": 0.1, "load.horizontal.amplitude": horizontal, "load.vertical": vertical}
+    least = -vertical * np.cos(np.radians(80)) - horizontal * np.sin(np.radians(80))
+    assert least > 0.037
+    for state in ((1.2, 0.3), (-0.7, -0.8), (0.1, 0.0)):
+        theta, velocity = impacts_by_scipy(np.array(state), 5, loads, slow=6e-3)
+        assert theta == 0.0
+        assert velocity**2 / (2 * least) < 1e-3
 
 
 def test_the_cells_gained_are_shares_of_the_domain_and_of_what_is_outside_of_it():

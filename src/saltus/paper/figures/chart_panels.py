@@ -21,7 +21,7 @@ CHART_WINDOW = ((-2.0, 2.0), (-2.0, 2.0))  # of the initial states
 LOWEST_LOAD = -2.0  # V
 WIDEST = 0.5  # Hhat
 CLOSED_FORM_FROM = 2.0  # Omega from which the closed form of the onset is drawn too
-CHECKED = 40  # cells of a chart that are computed again, with more starts on a finer grid
+CHECKED = 100  # cells of a chart that are computed again, with more starts on a finer grid
 CURVES = 20  # largest number of curves on which motions end, for one chart
 
 
