@@ -32,8 +32,9 @@ def test_the_coordinates_are_told_from_their_velocities():
     layers = saltus.System(model=saltus.TwoLayer(beta0=1.4), load=saltus.Load(vertical=0.5))
     motion = saltus.simulate(layers, theta_1=0.1, theta_2=-0.1, velocity=(0.0, 0.0), duration=0.1)
     assert coordinates(motion.to_xarray()) == ["theta_1", "theta_2"]
-    history, portrait = draw_motion(motion.to_xarray()).axes
-    assert history.get_legend() is not None
+    figure = draw_motion(motion.to_xarray())
+    assert len(figure.legends[0].get_texts()) == 2
+    portrait = figure.axes[1]
     assert portrait.get_ylabel().count("dot") == 2
 
 
@@ -62,3 +63,15 @@ def test_limits_are_drawn_where_they_are_reached():
 def test_a_motion_of_no_length_can_be_drawn():
     motion = saltus.simulate(saltus.System(model=saltus.WallOscillator()), x=0.0, duration=0.0)
     draw_motion(motion.to_xarray())
+
+
+def test_every_coordinate_of_a_chain_is_drawn_with_a_line_of_its_own():
+    model = saltus.FourCells(beta0=1.4, mass_ratio=0.2)
+    system = saltus.System(model=model, load=saltus.Load(frequency=1.0, vertical=-0.5))
+    start = dict.fromkeys(model.coordinates, 0.0) | {"lower_1": 0.2}
+    figure = draw_motion(saltus.simulate(system, **start, velocity=(0.0,) * 8, periods=2).to_xarray())
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        rf"$\mathrm{{{name.replace('_', chr(92) + '_')}}}$" for name in model.coordinates
+    ]
+    lines = [line for line in figure.axes[0].lines if line.get_label().startswith("$")]
+    assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 8

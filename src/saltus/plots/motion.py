@@ -10,13 +10,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from saltus.plots.axis_names import symbol, unit_in_brackets
-from saltus.plots.conventions import DOUBLE_COLUMN, FAINT, INK, STABLE, UNSTABLE, new_figure, styled
+from saltus.plots.conventions import DOUBLE_COLUMN, FAINT, INK, LIMIT, SEPARATRIX, STABLE, UNSTABLE, new_figure, styled
 from saltus.plots.marks import limit_lines
 
 if TYPE_CHECKING:
     import xarray
 
-LINES: tuple[dict[str, Any], ...] = ({"color": STABLE, "ls": "-"}, {"color": UNSTABLE, "ls": (0, (4, 1.5))})
+DASHED = (0, (4, 1.5))
+LINES: tuple[dict[str, Any], ...] = ({"color": STABLE, "ls": "-"}, {"color": UNSTABLE, "ls": DASHED})
+PAIRS = (STABLE, UNSTABLE, LIMIT, "#E69F00", INK, SEPARATRIX)  # of more than two coordinates, two of each colour
 
 
 @styled
@@ -30,7 +32,8 @@ def draw_motion(dataset: xarray.Dataset) -> Figure:
     history, portrait = figure.subplots(1, 2, width_ratios=(1.75, 1))
     names = coordinates(dataset)
     period = _forcing_period(dataset)
-    for name, line in zip(names, LINES, strict=False):
+    several = [{"color": PAIRS[i // 2 % len(PAIRS)], "ls": ("-", DASHED)[i % 2]} for i in range(len(names))]
+    for name, line in zip(names, LINES[: len(names)] if len(names) <= len(LINES) else several, strict=True):
         time, position, velocity = arcs(dataset, name)
         label = f"${symbol(name)}$" if len(names) > 1 else None
         history.plot(time, position, lw=0.9, label=label, **line)
@@ -96,15 +99,17 @@ def _portrait(ax: Any, arc: tuple[np.ndarray, np.ndarray, np.ndarray], period: f
 
 def _labels(history: Any, portrait: Any, dataset: xarray.Dataset, names: list[str]) -> None:
     unit = unit_in_brackets(dataset[names[0]])
-    places = ", ".join(f"${symbol(name)}$" for name in names)
-    speeds = ", ".join(rf"$\dot{{{symbol(name)}}}$" for name in names)
+    places, speeds = "coordinates", "velocities"
+    if len(names) <= len(LINES):
+        places = ", ".join(f"${symbol(name)}$" for name in names)
+        speeds = ", ".join(rf"$\dot{{{symbol(name)}}}$" for name in names)
     history.set(xlabel=r"$\tau$", ylabel=f"{places}{unit}", xlim=(float(dataset.time[0]), _end(dataset)))
     portrait.set(xlabel=f"{places}{unit}", ylabel=f"{speeds}{unit}")
     for ax in (history, portrait):
         ax.axhline(0.0, color=FAINT, lw=0.5, zorder=0)
     portrait.axvline(0.0, color=FAINT, lw=0.5, zorder=0)
     if len(names) > 1:
-        history.legend(loc="upper right", ncols=len(names))
+        history.figure.legend(*history.get_legend_handles_labels(), loc="outside upper center", ncols=min(len(names), 4))
 
 
 def _end(dataset: xarray.Dataset) -> float:
