@@ -129,6 +129,23 @@ def test_motions_between_two_regions_of_chaos_must_be_large():
     assert verdicts(chaos_measures.force_diagrams({1.0: small}))["fig11-two-regions"] is ClaimVerdict.DISAGREES
 
 
+@pytest.mark.parametrize(
+    ("edges", "verdict"),
+    [
+        ((("fold", "crisis"), ("unknown", "cascade")), ClaimVerdict.AS_PRINTED),  # two of three that are known
+        ((("fold", "cascade"), ("cascade", "grazing")), ClaimVerdict.DISAGREES),
+        ((("unknown", "unknown"), ("undecided", "fold")), ClaimVerdict.UNDECIDED),  # the fold lies beyond Omega = 2
+    ],
+)
+def test_chaos_is_a_collision_where_orbits_meet_at_most_edges_about_the_resonance(edges, verdict):
+    tree = panel((1.0, 1.2), (1.5, 2.2))
+    lower, upper = (("band", list(kinds)) for kinds in zip(*edges, strict=True))
+    tree["bands"] = xr.DataTree(tree["bands"].to_dataset().assign(low_edge=lower, high_edge=upper))
+    if verdict is ClaimVerdict.AS_PRINTED:
+        tree["bands"]["high"].values[1] = 1.9
+    assert verdicts(chaos_measures.force_spectra({0.2: panel(), 3.0: tree}))["fig09-collision"] is verdict
+
+
 ROUTES = {"both": (("cascade", "cascade"), ("grazing", "crisis")), "cascades": (("cascade", "crisis"), ("cascade", "fold"))}
 
 

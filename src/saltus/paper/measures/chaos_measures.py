@@ -5,6 +5,7 @@ The panels of a figure are given by the value in which they differ, in rising or
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -26,6 +27,7 @@ class ChaosCriteria:
     inner: int = 200  # The number of values within a band at which stable motions are counted.
     high: float = 1.0  # Frequencies above this one are beyond the primary resonance.
     resonant: tuple[float, float] = (1.0, 2.0)  # The frequencies at which the paper sees chaos in Fig. 9, approximately.
+    collisions: float = 0.5  # Chaos is a matter of collisions if these are at more than this share of the edges that are known.
     apart: float = 0.05  # Bands whose gap is a larger share of the range are in different regions of chaos.
     large_motion: float = 0.5  # Motions of more than this share of the largest stable amplitude of a diagram are large.
     low: float = 0.5  # Superharmonic resonances are below this frequency.
@@ -60,6 +62,7 @@ def force_spectra(panels: Panels) -> dict[str, Measured]:
         "fig09-quasi-periodic": _quasi_periodic(panels[smallest], CRITERIA.low),
         "fig09-chaos": _widening(panels),
         "fig09-chaos-range": _around_resonance(panels),
+        "fig09-collision": _collision({load: tree for load, tree in panels.items() if load >= CRITERIA.large_load}),
         "fig09-pierced": pierced(panels[largest], load=largest),
     }
 
@@ -84,6 +87,22 @@ def _around_resonance(panels: Panels) -> Measured:
             most.append(inside > 0.5 * width)
             rows.append({"load": load, "inside": inside, "width": width, "bands": bands})
     return measured(bool(rows) and all(within), bool(rows) and all(most), panels=rows)
+
+
+def _collision(panels: Panels) -> Measured:
+    """Whether at most edges of bands about the resonance, of which it is known what happens there, motions collide: a stable
+    orbit with an unstable one at a fold, or the chaotic attractor with an unstable orbit at a crisis."""
+    rows = []
+    for load, tree in panels.items():
+        table = tree["bands"]
+        value, kinds = (np.concatenate([table[f"{edge}{more}"].values for edge in ("low", "high")]) for more in ("", "_edge"))
+        within = (value >= CRITERIA.resonant[0]) & (value <= CRITERIA.resonant[1])
+        number = Counter(map(str, kinds[within]))
+        known = sum(number[kind] for kind in EDGES if kind != "bound")
+        rows.append({"load": load, "known": known, "unknown": number.total() - known, **{kind: number[kind] for kind in EDGES}})
+    decided = bool(rows) and all(row["known"] for row in rows)
+    most = all(row["fold"] + row["crisis"] > CRITERIA.collisions * row["known"] for row in rows)
+    return measured(most if decided else None, panels=rows)
 
 
 def _stable_share(spectrum: Any, low: float, high: float) -> float:
