@@ -53,6 +53,7 @@ from .systems import (
     UnitCell,
     VelocityReduction,
     WallOscillator,
+    energy_gain,
     register,
 )
 
@@ -104,6 +105,7 @@ __all__ = [
     "continue_orbit",
     "continue_special",
     "doubling_cascade",
+    "energy_gain",
     "excludes_tori",
     "find_attractors",
     "find_orbit",
