@@ -40,7 +40,7 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
     for orbit in orbits:
         check_kind("orbits", orbit, PeriodicOrbit, source="find_orbit or search_orbits")
     check_count("rounds", rounds, 1)
-    if not orbits:
+    if len(orbits) == 0:
         return np.zeros(0)
     problem = orbits[0].problem
     return closing_distances(problem.system, next(iter(problem.paths), None), closing_rows(orbits, rounds), tol)
