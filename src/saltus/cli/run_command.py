@@ -94,8 +94,9 @@ def computed(study: Study, ask: Ask, output: Path, progress: Progress, scheduler
     from saltus.flow import available_cores
 
     more: dict[str, Any] = {"store": output / f"{ask.kind}.zarr", "scheduler": scheduler} if ask.kind in SWEPT else {}
-    if ask.kind in DIAGRAMS and scheduler is None and type(study.system.model).__module__.startswith("saltus."):
-        more["workers"] = available_cores()  # other processes do not know a model of one's own
+    known = type(study.system.model).__module__.startswith("saltus.")  # other processes do not know a model of one's own
+    if ask.kind in DIAGRAMS and scheduler is None and known and available_cores() > 1:
+        more["workers"] = available_cores()
     data = study.answer(ask, ask.function, progress=progress, **more)
     return data.to_xarray() if ask.kind == "attractors" else data
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors import Judged, JudgementSettings, SettledLater, judge_unsettled
+from saltus.attractors import JUDGEMENT, Judged, JudgementSettings, SettledLater, judge_unsettled
 from saltus.flow import Outcome
 from saltus.orbits import (
     Branch,
@@ -41,7 +41,8 @@ KEPT = SETTINGS.kept
 NUMBERS = ("periods", "outcome", "period", "impact_count", "highest", "lowest")  # of a motion, one each, before its states
 JUDGED = ("verdict", "doubt", "exponent", "error", "gone", "life", "period")  # of a judgement
 WHOLE = (*NUMBERS[1:4], "verdict", "doubt", "gone")  # which of these are whole numbers
-COMPANIONS, SETTLED, ALIKE = 24, 32, 4  # the most states, settled motions, and such of one period that are kept of a judgement
+COMPANIONS = JUDGEMENT.companions  # the most states that are kept of a judgement
+SETTLED, ALIKE = 32, 4  # the most settled motions, and such of one period, that are kept of a judgement
 BRANCH_BYTES = 1 << 20  # the most of a branch: one of 200 points has 12 000
 
 
@@ -238,6 +239,7 @@ def judgements(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[s
     result = np.full((len(inputs), len(JUDGED) + 2 * COMPANIONS + 3 * SETTLED), np.nan)
     numbers = inputs[0]["settings"]
     settings = JudgementSettings(**numbers | {"runs": tuple(numbers["runs"])})
+    assert settings.companions <= COMPANIONS, "rows have room for so many"
     states = np.full((len(inputs), max(len(given["states"]) for given in inputs), 2), np.nan)
     for to_fill, given in zip(states, inputs, strict=True):
         to_fill[: len(given["states"])] = given["states"]
