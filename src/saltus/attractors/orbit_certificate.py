@@ -11,7 +11,7 @@ import numpy as np
 from saltus.attractors.stroboscopic_section import section_states
 from saltus.errors import MotionError
 from saltus.flow import nearest_return
-from saltus.orbits import PeriodicOrbit, Problem, Signature, orbit_from
+from saltus.orbits import PeriodicOrbit, Signature, orbit_from, problem_of
 from saltus.systems import System
 
 
@@ -89,19 +89,22 @@ def certify(system: System, state: np.ndarray, period: int | None, max_period: i
     within = SETTINGS.defect if period else SETTINGS.slow
     if orbit is None:
         return Certificate(None, np.inf, within)
-    apart = np.abs(states[:q] - np.array(orbit.state)).max(axis=1)
+    position, velocity = orbit.state
+    apart = np.abs(states[:q] - np.append(position, velocity)).max(axis=1)
     return Certificate(orbit, float(apart.min()), within)
 
 
 def solved_orbit(system: System, state: np.ndarray, period: int, admissible: bool = True) -> PeriodicOrbit | None:
     """The orbit that a motion from a state (2,) at phase 0 follows over so many periods, if one solves its equations there."""
     try:
-        orbit = orbit_from(Problem(system, Signature((), 1)), start_at(system, state), period)
+        orbit = orbit_from(problem_of(system, Signature((), 1)), start_at(system, state), period)
     except MotionError:
         return None
     return orbit if orbit is not None and (orbit.admissible or not admissible) else None
 
 
 def start_at(system: System, state: np.ndarray) -> dict[str, Any]:
-    """A state (coordinate, velocity) as `simulate` takes it."""
-    return {system.model.coordinates[0]: float(state[0]), "velocity": float(state[1])}
+    """A state (coordinates, velocities) as `simulate` takes it."""
+    names = system.model.coordinates
+    velocities = tuple(map(float, state[len(names) :]))
+    return {**dict(zip(names, map(float, state), strict=False)), "velocity": velocities[0] if len(names) == 1 else velocities}

@@ -9,15 +9,15 @@ from saltus.flow import motions_from, stroboscopic
 from saltus.systems import Load, Record, System, check_system
 
 
-def with_clock(system: System) -> System:
+def with_clock(system: System, asking: str = "the search of attractors", any_model: bool = False) -> System:
     """The system with a forcing period, which fixes the stroboscopic section: its load's, or 2 pi under a constant load.
 
-    Equilibria are then orbits of period 1.
+    Equilibria are then orbits of period 1. With `any_model` there may be several coordinates and several contacts.
 
     Raises:
         ParameterError: several coordinates, or a load of records, which never repeats.
     """
-    check_system(system, "the search of attractors", coordinates=1)
+    check_system(system, asking, coordinates=None if any_model else 1, several_contacts=any_model)
     check_periodic(system)
     if system.load.frequency is not None:
         return system

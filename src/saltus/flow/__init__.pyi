@@ -1,4 +1,5 @@
-from .compiled import load_segments
+from .compiled import load_contact_segments, load_segments
+from .contacts.contact_layout import ContactColumn, SegmentEnd, SegmentLook, SegmentPlan
 from .ensemble.compiled_lanes import load_advance, load_driver, load_helpers
 from .ensemble.dataset_reading import stop_names, stroboscopic
 from .ensemble.ensemble import compiled_lanes, simulate_many
@@ -8,6 +9,7 @@ from .ensemble.threads import Jobs, Lanes, available_cores
 from .ensemble.wanted import Wanted
 from .kernel_layout import STRUCTURE_SIZES, Where
 from .load_release import Release, contact_pull, load_releases, peak_near
+from .memory_layout import EventCode
 from .motion import DenseOutput, Event, EventKind, Impacts, Motion
 from .recurrence import (
     RECURRENCE,
@@ -31,9 +33,11 @@ from .validity import Validity
 __all__ = [
     "RECURRENCE",
     "STRUCTURE_SIZES",
+    "ContactColumn",
     "ContactRegularity",
     "DenseOutput",
     "Event",
+    "EventCode",
     "EventKind",
     "Impacts",
     "Inputs",
@@ -44,6 +48,9 @@ __all__ = [
     "Recurrence",
     "RecurrenceSettings",
     "Release",
+    "SegmentEnd",
+    "SegmentLook",
+    "SegmentPlan",
     "Sensitivities",
     "Stop",
     "TangentEnsemble",
@@ -58,6 +65,7 @@ __all__ = [
     "last_states",
     "limits_of",
     "load_advance",
+    "load_contact_segments",
     "load_driver",
     "load_helpers",
     "load_releases",

@@ -23,7 +23,14 @@ from saltus.flow import (
     segments,
     steps,
 )
-from saltus.flow.contacts import complementarity, contact_impacts, contact_layout, contact_tangent, contacts_kernel
+from saltus.flow.contacts import (
+    complementarity,
+    contact_impacts,
+    contact_layout,
+    contact_segments,
+    contact_tangent,
+    contacts_kernel,
+)
 from saltus.flow.memory_layout import State
 from saltus.taylor import (
     Case,
@@ -114,6 +121,13 @@ def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
     """What periodic orbits are solved with: `fly_segments` and `impact_equations` of `segments.py`."""
     module = load_module("segments", _text(kernel_layout, roots, steps, contact, contact_side, chatter, segments))
     return entry_point(module.fly_segments), entry_point(module.impact_equations)
+
+
+@cache
+def load_contact_segments() -> Callable[..., int]:
+    """What orbits with several contacts are solved with: `follow_contact_segments` of `contacts/contact_segments.py`."""
+    parts = (contact_layout, complementarity, contact_impacts, contact_tangent, contact_segments)
+    return entry_point(load_module("contact_segments", _text(kernel_layout, roots, steps, *parts)).follow_contact_segments)
 
 
 def _text(*modules: ModuleType) -> str:

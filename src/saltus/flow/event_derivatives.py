@@ -43,7 +43,7 @@ def changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]]]:
     The leaf "shift" of a column is by how much the event moves.
     """
     events = [(EventCode.LIMIT, i, _shifts(margin_shift(trace, margin))) for i, margin in enumerate(trace.margins.values())]
-    events += [(EventCode.RELEASE, i, _shifts(margin_shift(trace, reaction))) for i, reaction in enumerate(trace.reactions)]
+    events += [(EventCode.RELEASE, i, _shifts(reaction_slopes(trace, reaction))) for i, reaction in enumerate(trace.reactions)]
     if trace.gap is None:
         return events
     jump = saltation(trace)
@@ -173,8 +173,14 @@ def number_slopes(trace: Trace) -> list[Expr]:
     return [derivative_along(trace, x, j) for j in range(trace.columns) for x in numbers]
 
 
+def reaction_slopes(trace: Trace, reaction: Expr) -> list[Expr]:
+    """The derivative of a reaction along each column at a fixed time; where the reaction reaches 0 it is -dt times its rate."""
+    accelerations = {Expr("acceleration", (), i): a for i, a in enumerate(trace.acceleration[: trace.dof])}
+    return [derivative_along(trace, substitute(reaction, accelerations), j) for j in range(trace.columns)]
+
+
 def margin_shift(trace: Trace, margin: Expr) -> list[Expr]:
-    """dt of a margin, or a contact's reaction, m(q, v, a, t, c) reaching 0: -(m_q u + m_v z + m_c) / (m_t + m_q v + m_v a)."""
+    """dt of a margin m(q, v, a, t, c) reaching 0: -(m_q u + m_v z + m_c) / (m_t + m_q v + m_v a), a being the model's own."""
     a = trace.acceleration[: trace.dof]
     margin = substitute(margin, {Expr("acceleration", (), i): a[i] for i in range(trace.dof)})
     speed = time_derivative(trace, margin)

@@ -28,5 +28,6 @@ with pointers():
 STEP_BUFFERS, EVENT_BUFFERS = types.Tuple((_i2, _f2, _f3)), types.Tuple((_i2, _f2))
 ADVANCE = _i(_i1, _f1, _f1, ENV, MODEL, STEP_BUFFERS, EVENT_BUFFERS)
 ADVANCE_CONTACTS = _i(_i1, _f1, _f1, ENV, CONTACT_MODEL, _i2, STEP_BUFFERS, EVENT_BUFFERS)
+CONTACT_SEGMENTS = _i(_i1, _f1, ENV, CONTACT_MODEL, _i2, _i2, _f1, _f1, _f2, _f3, _f3, _f2)
 SEGMENTS = _i(_i1, _f1, ENV, MODEL, _f2, _i2, _f2, _f2, _f3, _f2)
 IMPACT_EQUATIONS = types.void(_f2, _f1, _f1, _f, _i, _f2, _f3, _f2, _f3, _f3, _f3)

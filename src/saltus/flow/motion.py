@@ -156,6 +156,10 @@ class Motion:
         """The contacts that are closed at the end, of a model with several."""
         return tuple(contact.name for i, contact in enumerate(self.system.model.contacts) if (self.side - 1) >> i & 1)
 
+    def closed_at(self, time: float) -> int:
+        """The contacts that are closed just after a time, of a model with several: the sum of 2^i over them."""
+        return int(self._states(np.array([time]))[2][0]) - 1
+
     @property
     def rest_time(self) -> float | None:
         """The time from which the system rests until the end, or None."""

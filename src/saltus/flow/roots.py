@@ -204,3 +204,41 @@ def leading(coefficients, start, order):
         if abs(coefficients[k]) > ZERO:
             return k
     return order
+
+
+@jit
+def roots_within(p, n, roots, noise):
+    """The places in (0, 1) at which a polynomial of degree n goes through zero, except within `noise`; returns how many."""
+    boxes = np.empty((DEPTH, n + 1))
+    left, width = np.empty(DEPTH), np.empty(DEPTH)
+    to_bernstein(p, n, boxes[0])
+    left[0], width[0] = 0.0, 1.0
+    top, found = 1, 0
+    while top > 0:
+        top -= 1
+        b, low, wide = boxes[top], left[top], width[top]
+        count = variations(b, n)
+        largest = 0.0
+        for i in range(n + 1):
+            largest = max(largest, abs(b[i]))
+        if count == 0 or largest <= noise or found == roots.size:
+            continue
+        if count == 1 or wide < NARROW or top + 2 > DEPTH:
+            if count % 2 == 0:
+                continue
+            if b[0] < 0.0:  # `newton` starts where p is positive
+                for k in range(n + 1):
+                    p[k] = -p[k]
+                roots[found] = newton(p, n, low, low + wide)
+                for k in range(n + 1):
+                    p[k] = -p[k]
+            else:
+                roots[found] = newton(p, n, low, low + wide)
+            found += 1
+            continue
+        half = 0.5 * wide
+        split(boxes, top, n)
+        left[top], width[top] = low + half, half
+        left[top + 1], width[top + 1] = low, half
+        top += 2
+    return found

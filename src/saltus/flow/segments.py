@@ -17,21 +17,9 @@ from saltus.flow.contact_side import side_of_state
 from saltus.flow.function_types import IMPACT_EQUATIONS, SEGMENTS
 from saltus.flow.kernel_layout import ROUGHER, Geometry, ModelPart, Setting, Where, Work
 from saltus.flow.memory_layout import EventCode, State
-from saltus.flow.roots import (
-    DEPTH,
-    NARROW,
-    NOISE,
-    SIMPLE,
-    contact_root,
-    horner,
-    newton,
-    scale_gap,
-    split,
-    to_bernstein,
-    variations,
-)
+from saltus.flow.roots import NOISE, SIMPLE, contact_root, horner, roots_within, scale_gap
 from saltus.flow.steps import column_step, expand, leaps, move, step_size, work_arrays
-from saltus.taylor import jit, lean_jit
+from saltus.taylor import lean_jit
 from saltus.taylor import not_here as cached_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -45,44 +33,6 @@ LEAST_MARGIN = 7  # the margins' least values, from here on
 SLOWEST = 1e-9  # A slower passage has the tangent of this one: near a grazing two cancel, and 1e-16 / speed is their rounding.
 MOST_STEPS = 100_000  # of one segment
 SHORT = 1e-6  # a segment's duration below which the derivatives of its quotient are those of its beginning
-
-
-@jit
-def roots_within(p, n, roots, noise):
-    """The places in (0, 1) at which a polynomial of degree n goes through zero, except within `noise`; returns how many."""
-    boxes = np.empty((DEPTH, n + 1))
-    left, width = np.empty(DEPTH), np.empty(DEPTH)
-    to_bernstein(p, n, boxes[0])
-    left[0], width[0] = 0.0, 1.0
-    top, found = 1, 0
-    while top > 0:
-        top -= 1
-        b, low, wide = boxes[top], left[top], width[top]
-        count = variations(b, n)
-        largest = 0.0
-        for i in range(n + 1):
-            largest = max(largest, abs(b[i]))
-        if count == 0 or largest <= noise or found == roots.size:
-            continue
-        if count == 1 or wide < NARROW or top + 2 > DEPTH:
-            if count % 2 == 0:
-                continue
-            if b[0] < 0.0:  # `newton` starts where p is positive
-                for k in range(n + 1):
-                    p[k] = -p[k]
-                roots[found] = newton(p, n, low, low + wide)
-                for k in range(n + 1):
-                    p[k] = -p[k]
-            else:
-                roots[found] = newton(p, n, low, low + wide)
-            found += 1
-            continue
-        half = 0.5 * wide
-        split(boxes, top, n)
-        left[top], width[top] = low + half, half
-        left[top + 1], width[top + 1] = low, half
-        top += 2
-    return found
 
 
 @lean_jit

@@ -1,5 +1,6 @@
 from .branch import Branch
 from .branch_continuation import STEP, continue_orbit, follow_stable
+from .contact_problem import problem_of
 from .find import find_orbit, orbit_from
 from .from_dataset import orbits_of
 from .near_returns import orbits_near_returns, solved_near
@@ -47,6 +48,7 @@ __all__ = [
     "orbit_from",
     "orbits_near_returns",
     "orbits_of",
+    "problem_of",
     "same_orbit",
     "search_orbits",
     "solve",

@@ -63,9 +63,12 @@ def torus(point: OrbitPoint) -> float:
 
 
 def complex_pair(orbit: PeriodicOrbit) -> float:
-    """The largest modulus of a complex pair of multipliers; 0 where there is none."""
+    """The largest modulus of a complex pair of multipliers; 0 where there is none.
+
+    Multipliers of 0, which contacts make, are such pairs by rounding.
+    """
     values = orbit.multipliers
-    return float(np.abs(values[np.abs(values.imag) > 1e-9]).max(initial=0.0))
+    return float(np.abs(values[(np.abs(values.imag) > 1e-9) & (np.abs(values) > VANISHING)]).max(initial=0.0))
 
 
 def never_torus(orbit: PeriodicOrbit) -> bool:
@@ -74,11 +77,12 @@ def never_torus(orbit: PeriodicOrbit) -> bool:
 
 
 def grazing(point: OrbitPoint) -> float:
-    """The least of the impacts' speeds and of the gap's inner minima: below 0 there is no orbit.
+    """The least of the impacts' speeds, the gap's inner minima and what holds closed contacts: below 0 there is no orbit.
 
     Where the contact is no singularity there is one on both sides, and nothing to stop at.
     """
-    return math.inf if point.orbit.problem.passes_contact else min(point.orbit.slowest, point.orbit.clearance)
+    orbit = point.orbit
+    return math.inf if orbit.problem.passes_contact else min(orbit.slowest, orbit.clearance, orbit.pressing)
 
 
 def touching(point: OrbitPoint) -> float:
@@ -89,6 +93,7 @@ def touching(point: OrbitPoint) -> float:
 
 
 ROUNDING = 1e-12  # by which a product of multipliers may differ from 1 where nothing is lost
+VANISHING = 1e-4  # modulus below which a complex pair of multipliers is one of zeros, by the root of rounding
 NEAREST = 1.0  # upper limit of the distance of an orbit from a grazing, which would be infinite for one that never turns
 
 

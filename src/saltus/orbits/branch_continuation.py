@@ -11,6 +11,7 @@ from saltus.continuation import STEPS, Continuation, End, both_ways
 from saltus.errors import ParameterError, shown
 from saltus.orbits.branch import START, Branch
 from saltus.orbits.branch_events import BranchEvents
+from saltus.orbits.contact_problem import problem_of
 from saltus.orbits.find import orbit_near
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitPoint, start
@@ -117,8 +118,8 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
     """An orbit as a solution of the problem along a parameter, halved where it and the system are and stay symmetric."""
     system, signature = orbit.system, orbit.signature
     symmetric = keeps_symmetry(system, path)
-    problem = Problem(system, signature, (path,))
-    if Problem(system, Signature((), 1), (path,)).passes_contact != orbit.problem.passes_contact:
+    problem = problem_of(system, signature, (path,))
+    if problem_of(system, Signature((), 1), (path,)).passes_contact != orbit.problem.passes_contact:
         found = _in_other_equations(orbit, path)
     else:
         found = PeriodicOrbit.near(problem, orbit.solution.unknowns, problem.values)

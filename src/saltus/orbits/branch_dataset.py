@@ -85,7 +85,8 @@ def _rests(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
 
 
 def _multipliers(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
-    values = np.array([orbit.multipliers for orbit in orbits])
+    every = [orbit.multipliers for orbit in orbits]  # those that closed contacts make 0 are more or fewer
+    values = np.array([np.pad(one, (0, max(map(len, every)) - len(one))) for one in every])
     dims = ("point", "multiplier")
     return {"multiplier_real": (dims, values.real), "multiplier_imag": (dims, values.imag)}
 
@@ -98,7 +99,15 @@ def _unknowns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
     for row, side, orbit in zip(unknowns, sides, orbits, strict=True):
         row[: orbit.problem.size] = orbit.solution.unknowns
         side[: len(orbit.signature.sides)] = orbit.signature.sides
-    return {"unknowns": (("point", "unknown"), unknowns), "sides": (("point", "impact"), sides)}
+    data = {"unknowns": (("point", "unknown"), unknowns), "sides": (("point", "impact"), sides)}
+    if not orbits[0].problem.system.model.contacts:
+        return data
+    events = np.full((len(orbits), max(1, max(len(orbit.signature.events) for orbit in orbits)), 3), -1)
+    for table, orbit in zip(events, orbits, strict=True):
+        for row, event in zip(table, orbit.signature.events, strict=False):
+            row[:] = event.is_impact, event.contact, event.closed
+    closed = np.array([orbit.signature.closed for orbit in orbits])
+    return data | {"events": (("point", "event", "mark"), events), "closed_contacts": ("point", closed)}
 
 
 def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from saltus.continuation import Continuation, Cut, End, Events, Missed, Zero, located
 from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, complex_pair, grazing, never_torus
+from saltus.orbits.contact_problem import ContactProblem
 from saltus.orbits.grazing import other_side
 from saltus.orbits.images import asymmetry, falls_onto_image, halves_of, nearest, passes_image, repetition
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.signature import Signature
 from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
+from saltus.orbits.switching_contacts import contact_change
 from saltus.orbits.tolerances import TOLERANCES
 
 Run = Continuation
@@ -76,6 +78,13 @@ class BranchEvents(OrbitEvents):
     def barrier(self) -> Test:
         """A grazing, which is gone through."""
         return GRAZING
+
+    def cut(self, point: OrbitPoint, ahead: OrbitPoint) -> Cut | End | None:
+        """The cut at a grazing, or where a release or a closing of one of several contacts appears or is lost."""
+        found = super().cut(point, ahead)
+        if isinstance(found, Cut) and found.special is not None and isinstance(found.point.orbit.problem, ContactProblem):
+            return Cut(found.point, replace(found.special, kind=contact_change(found.point)))
+        return found
 
     def interrupted(self, run: Run, point: OrbitPoint, ahead: OrbitPoint) -> End | None:
         """The end at the orbit's own image, on the branch from which its family is born, at its BPC or PD."""

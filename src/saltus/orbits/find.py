@@ -20,6 +20,8 @@ from saltus.flow import (
     return_period,
     simulate,
 )
+from saltus.orbits.contact_problem import ContactProblem, problem_of
+from saltus.orbits.contact_signature import solved_from
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import resting_near
@@ -71,7 +73,7 @@ def find_orbit(
         MotionError: the motion comes to rest for good, does not settle, or Newton's method does not converge; with what to do.
     """
     _check(system, parameters, coordinates, {"period": period, "max_period": max_period, "settle": settle})
-    base = Problem(system, Signature((), 1), tuple(parameters))  # refuses what has no orbits
+    base = problem_of(system, Signature((), 1), tuple(parameters))  # refuses what has no orbits
     state = {**coordinates, "velocity": velocity}
     if settle is not None:
         state = _after(system, state, settle)
@@ -92,7 +94,7 @@ def find_orbit(
 
 def _check(system: System, parameters: Iterable[str], coordinates: Mapping[str, Any], counts: dict[str, int | None]) -> None:
     """Refuse arguments without meaning."""
-    check_system(system, "find_orbit")
+    check_system(system, "find_orbit", several_contacts=True)
     for name, count in counts.items():
         if count is not None or name == "max_period":
             check_count(name, count, 0 if name == "settle" else 1)
@@ -186,7 +188,7 @@ def _polish(base: Problem, state: dict[str, Any], periods: int, passed: int | No
 def orbit_from(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
     """The orbit near a motion over `periods` forcing periods from a state at phase 0, one that rests for a part of them too."""
     orbit = orbit_near(base, state, periods)
-    if orbit is not None and orbit.admissible:
+    if (orbit is not None and orbit.admissible) or base.system.model.contacts:
         return orbit
     return resting_near(base, simulate(base.system, **state, periods=periods, dense=False), periods) or orbit
 
@@ -194,6 +196,8 @@ def orbit_from(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOr
 def orbit_near(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
     """The orbit with the signature of a motion over `periods` forcing periods from a state at phase 0, by Newton's method."""
     system = base.system
+    if isinstance(base, ContactProblem):
+        return solved_from(base, state, periods, SETTINGS.iterations)
     motion = simulate(system, **state, periods=periods)
     if motion.side == 0 or len(motion.events.of(EventKind.REST)) or not motion.phase_known:
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,10 +10,11 @@ import numpy as np
 from saltus.continuation import NEWTON
 from saltus.errors import ParameterError
 from saltus.flow import load_releases
+from saltus.orbits.contact_problem import problem_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import resting_orbit
-from saltus.orbits.signature import Signature
+from saltus.orbits.signature import ModeChange, Signature
 from saltus.provenance import check_provenance
 from saltus.systems import System
 
@@ -47,7 +49,7 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     orbits = []
     for signature, row, value in zip(_signatures(dataset), dataset["unknowns"].values, values, strict=True):
         if signature not in problems:
-            problems[signature] = Problem(system, signature, paths, tol)
+            problems[signature] = problem_of(system, signature, paths, tol)
         orbits.append(_orbit(problems[signature], row, value))
     return orbits
 
@@ -58,7 +60,12 @@ def _signatures(dataset: xarray.Dataset) -> list[Signature]:
         one, sides = dataset.attrs, np.atleast_1d(dataset.attrs["sides"])
         return [_signature(sides, one["period"], one["symmetric"], one["side"])] * dataset.sizes["point"]
     columns = (dataset[name].values for name in ("sides", "period", "symmetric", "side"))
-    return [_signature(*row) for row in zip(*columns, strict=True)]
+    signatures = [_signature(*row) for row in zip(*columns, strict=True)]
+    if "events" not in dataset:
+        return signatures
+    changes = [tuple(ModeChange(bool(k), int(i), int(c)) for k, i, c in table if k >= 0) for table in dataset["events"].values]
+    more = zip(signatures, changes, dataset["closed_contacts"].values, strict=True)
+    return [replace(signature, events=events, closed=int(closed)) for signature, events, closed in more]
 
 
 def _signature(sides: np.ndarray, periods: Any, symmetric: Any, side: Any) -> Signature:

@@ -6,13 +6,19 @@ import numpy as np
 
 from saltus.continuation import End
 from saltus.flow import segments as at
+from saltus.orbits.bifurcations import grazing
+from saltus.orbits.contact_problem import ContactProblem
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.special_point import OrbitEnd
+from saltus.orbits.switching_contacts import Cycle, Switching, begins_excursion, cycle_of
 from saltus.orbits.tolerances import TOLERANCES
 
 PROBES = 10.0 ** -np.arange(2, 12.0)  # distances along the new branch, tried in turn until one direction has admissible orbits
+
+BEGUN = (1e-4, 1e-3, 1e-2)  # the same where an excursion begins, whose speeds grow as the third power of the distance
+MOST_TOGETHER = 2  # events of several contacts that change at one point
 
 
 def other_side(point: OrbitPoint) -> OrbitPoint | End:
@@ -21,6 +27,8 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
     A gap that touches zero between impacts gains a pair of impacts without speed there, or a single one at a wall that turns
     the motion round; impacts that have lost their speed are left out.
     """
+    if isinstance(point.orbit.problem, ContactProblem):
+        return _with_other_events(point)
     changed = removed(point) if point.orbit.slowest < TOLERANCES.touch else inserted(point)
     if isinstance(changed, End):
         return changed
@@ -32,12 +40,34 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
     return _admissible_direction(curve.along_kernel(known)) or End(OrbitEnd.NO_DIRECTION, point.parameter)
 
 
+def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> OrbitPoint | End:
+    """`other_side` with several contacts: of the signatures that may follow the first that this orbit solves and that leads on.
+
+    Several events may change at once, as an orbit's symmetry has it: then one after the other is changed.
+    """
+    here, reason = Switching.at(point), OrbitEnd.TWO_AT_ONCE
+    known = (*known, cycle_of(point.orbit.signature))
+    for events in here.other_signatures():
+        found = here.problem_with(events)
+        if found is None or cycle_of(found[0].signature) in known:
+            continue
+        solved = point.curve.with_problem(found[0]).known(found[1], point.parameters)
+        if solved is None or not np.abs(solved.evaluation.residual).max() < TOLERANCES.switching:
+            continue
+        reason, begun = OrbitEnd.NO_DIRECTION, point.curve.with_problem(found[0]).along_kernel(solved)
+        ahead = _admissible_direction(begun) or (_with_other_events(begun, known) if len(known) < MOST_TOGETHER else None)
+        if isinstance(ahead, OrbitPoint):
+            return ahead
+    return End(reason, point.parameter)
+
+
 def _admissible_direction(start: OrbitPoint) -> OrbitPoint | None:
-    for probe in PROBES:
+    begun = begins_excursion(start)  # there multipliers are those of no orbit: the branch goes on from a point just ahead
+    for probe in BEGUN if begun else PROBES:
         for point in (start, start.turned()):
             ahead = point.beside(probe)
-            if ahead is not None and ahead.orbit.admissible and min(ahead.orbit.slowest, ahead.orbit.clearance) > 0.0:
-                return point
+            if ahead is not None and ahead.orbit.admissible and grazing(ahead) > 0.0:
+                return ahead if begun else point
     return None
 
 

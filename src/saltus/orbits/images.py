@@ -77,7 +77,7 @@ def renumbered(problem: Problem, unknowns: np.ndarray, other: OrbitPoint) -> np.
     if (n, signature.period, signature.symmetric) != (len(target.sides), target.period, target.symmetric):
         return None
     if n == 0:
-        return unknowns if signature.side == target.side else None
+        return unknowns if signature == target else None
     pairs, best, least = unknowns.reshape(n, 2), None, math.inf
     goal = other.solution.unknowns.reshape(n, 2)
     for turn in range(n * (2 if signature.symmetric else 1)):

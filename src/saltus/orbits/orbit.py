@@ -11,6 +11,7 @@ import numpy as np
 
 from saltus.flow import Motion, Validity, simulate
 from saltus.flow import segments as at
+from saltus.orbits.contact_problem import ContactProblem
 from saltus.orbits.newton import NEWTON_ITERATIONS, Solution, solve
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
@@ -74,7 +75,7 @@ class PeriodicOrbit:
 
     @cached_property
     def _phases(self) -> np.ndarray:
-        phases = self.solution.unknowns[::2] if self.signature.sides else np.empty(0)
+        phases, _ = self.problem.impacts(self.solution.unknowns, self.solution.equations)
         return np.concatenate([phases, phases + self.problem.closing]) if self.symmetric else phases
 
     @cached_property
@@ -90,7 +91,7 @@ class PeriodicOrbit:
     @property
     def speeds(self) -> np.ndarray:
         """The speeds at which the gap closes, just before the impacts, (n,)."""
-        speeds = self.solution.unknowns[1::2] if self.signature.sides else np.empty(0)
+        _, speeds = self.problem.impacts(self.solution.unknowns, self.solution.equations)
         return np.tile(speeds, 2) if self.symmetric else speeds
 
     @property
@@ -142,14 +143,19 @@ class PeriodicOrbit:
     @cached_property
     def slowest(self) -> float:
         """The least speed of an impact; inf where there is none; below 0: no orbit."""
-        return float(self.solution.unknowns[1::2].min()) if self.signature.sides else math.inf
+        return float(self.speeds.min(initial=math.inf))
+
+    @cached_property
+    def pressing(self) -> float:
+        """With several contacts the least reaction of a closed one, or time between events; inf with one; below 0: no orbit."""
+        return self.problem.pressing(self.solution.unknowns, self.solution.equations)
 
     @property
     def admissible(self) -> bool:
         """Whether it is a motion of the system: every impact has a speed, the next one comes later, the gap is open between."""
         phases = self._phases
         in_order = np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.period)) > -TOLERANCES.touch
-        return self.clearance > -TOLERANCES.touch and self.slowest > -TOLERANCES.touch and bool(in_order.all())
+        return min(self.clearance, self.slowest, self.pressing) > -TOLERANCES.touch and bool(in_order.all())
 
     @cached_property
     def margins(self) -> dict[str, float]:
@@ -173,7 +179,8 @@ class PeriodicOrbit:
 
         Where the contact is no singularity (`ContactRegularity.CONTINUOUS`) it never does in this sense.
         """
-        return not self.problem.passes_contact and min(abs(self.clearance), abs(self.slowest)) < TOLERANCES.touch
+        speed = self.problem.touching_speed(self.solution.unknowns, self.solution.equations)
+        return not self.problem.passes_contact and min(abs(self.clearance), abs(speed)) < TOLERANCES.touch
 
     @property
     def stable(self) -> bool:
@@ -181,17 +188,26 @@ class PeriodicOrbit:
         return bool((np.abs(self.multipliers) < 1.0).all()) and not self.grazes
 
     def start(self) -> dict[str, Any]:
-        """The arguments of `simulate` that start the motion: just before its first impact, or at phase 0."""
+        """The arguments of `simulate` that start the motion: just before its first impact, or at phase 0.
+
+        With several contacts it starts between two events.
+        """
+        if isinstance(self.problem, ContactProblem):
+            state, time = self.problem.within(self.solution.unknowns, self.solution.equations, self.solution.values)
+            return {**self._named(state), "time": time}
         if not self.signature.sides:
-            n = self.problem.own
-            state = self.solution.unknowns
-            velocity = float(state[n]) if n == 1 else tuple(map(float, state[n:]))
-            return {**dict(zip(self.system.model.coordinates, map(float, state[:n]), strict=True)), "velocity": velocity}
+            return self._named(self.solution.unknowns)
         model, load, impact = self.system.model, self.system.load, self.system.impact
         side, time = int(self.sides[0]), float(self.impact_times[0])
         inward = -np.sign(float(model.gap(model.contact + 1.0, side)) - float(model.gap(model.contact, side)))
         _, after = model.reset(time, float(inward * self.speeds[0]), side, load, impact)
         return {model.coordinates[0]: float(model.contact), "velocity": float(after), "time": time}
+
+    def _named(self, state: np.ndarray) -> dict[str, Any]:
+        """A state by the names that `simulate` takes."""
+        n = self.problem.own
+        velocity = float(state[n]) if n == 1 else tuple(map(float, state[n:]))
+        return {**dict(zip(self.system.model.coordinates, map(float, state[:n]), strict=True)), "velocity": velocity}
 
     def motion(self, periods: float | None = None, tol: float = 1e-13) -> Motion:
         """The exact motion from its state, over one period of the orbit if nothing else is given."""
@@ -210,20 +226,26 @@ class PeriodicOrbit:
             ends = [np.abs(np.append(np.atleast_1d(motion.position) - begin, np.abs(motion.velocity) - np.abs(v))).max()
                     for v in (start["velocity"], self.speeds[0])]  # fmt: skip
             return min(ends) if self.grazes or abs(len(motion.impacts) - self.signature.impact_count) <= 1 else math.inf
-        velocity = np.atleast_1d(motion.velocity) - np.atleast_1d(start["velocity"])
-        return float(np.abs(np.concatenate([np.atleast_1d(motion.position) - begin, velocity])).max())
+        return self.defect_after(1)
+
+    def defect_after(self, rounds: int) -> float:
+        """The same after so many of its periods, where it has no impact at its start."""
+        start, motion = self.start(), self.motion(rounds * self.period)
+        apart = np.subtract(motion.position, [start[name] for name in self.system.model.coordinates])
+        return float(np.abs(np.append(apart, np.subtract(motion.velocity, start["velocity"]))).max())
 
     @cached_property
     def state(self) -> tuple[Any, Any]:
         """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
-        if not self.signature.sides:
+        if not (self.signature.sides or self.signature.events or self.signature.closed):
             n = self.problem.own
             return (float(self.solution.unknowns[0]), float(self.solution.unknowns[1])) if n == 1 else (
                 self.solution.unknowns[:n], self.solution.unknowns[n:])  # fmt: skip
         start = self.start()
-        ahead = 2.0 * math.pi / self.frequency - start["time"]
+        period = 2.0 * math.pi / self.frequency
+        ahead = max(1, math.ceil(start["time"] / period)) * period - start["time"]
         motion = simulate(self.system, **start, duration=ahead, tol=1e-13, dense=False)
-        return float(np.atleast_1d(motion.position)[0]), float(np.atleast_1d(motion.velocity)[0])
+        return motion.position, motion.velocity
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name in ("problem", "solution"):

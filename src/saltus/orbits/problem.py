@@ -164,13 +164,29 @@ class Problem:
 
     def with_signature(self, signature: Signature) -> Problem:
         """The problem of another signature."""
-        return Problem(self.system, signature, self.paths, self.tol)
+        return type(self)(self.system, signature, self.paths, self.tol)
+
+    def impacts(self, unknowns: np.ndarray, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
+        """The phases of the impacts, and the speeds at which the gap closes before them."""
+        return (unknowns[::2], unknowns[1::2]) if self.signature.sides else (np.empty(0), np.empty(0))
+
+    def touching_speed(self, unknowns: np.ndarray, equations: Equations) -> float:
+        """The least speed of the impacts without which the motion beside the orbit has no derivative; inf without such."""
+        return float(self.impacts(unknowns, equations)[1].min(initial=math.inf))
+
+    def pressing(self, unknowns: np.ndarray, equations: Equations) -> float:
+        """Below 0 there is no orbit, as a contact would open that is taken for closed; inf where none is."""
+        return math.inf
 
     def repeated(self, unknowns: np.ndarray) -> np.ndarray:
         """The unknowns of an orbit with impacts over twice the time that the equations cover."""
         later = unknowns.copy()
         later[::2] += self.closing
         return np.concatenate([unknowns, later])
+
+    def alternating(self, direction: np.ndarray) -> np.ndarray:
+        """A change of the unknowns as one of `repeated` ones, with the other sign in the second round."""
+        return np.concatenate([direction, -direction])
 
     def evaluate(self, unknowns: np.ndarray, values: np.ndarray, look: bool = False) -> Equations | None:
         """The equations at a point, or None where the motion cannot be followed."""

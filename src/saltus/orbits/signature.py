@@ -4,6 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from saltus.flow import EventCode
+
+
+@dataclass(frozen=True, slots=True)
+class ModeChange:
+    """An event of an orbit with several contacts: an impact of one of them, or its release."""
+
+    is_impact: bool
+    contact: int  # its number
+    closed: int  # the contacts that are closed after it, as bits
+
+    @property
+    def kind(self) -> int:
+        """The number of this kind of event in the flow."""
+        return int(EventCode.IMPACT if self.is_impact else EventCode.RELEASE)
+
 
 @dataclass(frozen=True, slots=True)
 class Signature:
@@ -17,11 +33,13 @@ class Signature:
     period: int  # forcing periods, q
     symmetric: bool = False
     side: int = 1  # of an orbit without impacts
+    events: tuple[ModeChange, ...] = ()  # of an orbit with several contacts, in place of `sides`
+    closed: int = 0  # the contacts that such an orbit has closed if it has no events, as bits
 
     @property
     def impact_count(self) -> int:
         """Impacts in one period of the orbit."""
-        return len(self.sides) * (2 if self.symmetric else 1)
+        return len(self.sides) * (2 if self.symmetric else 1) + sum(event.is_impact for event in self.events)
 
     @property
     def span(self) -> float:

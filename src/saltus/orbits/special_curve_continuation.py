@@ -26,6 +26,7 @@ from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.symmetry import half, keeps_symmetry, over_full_period
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.progress import Progress, silent
+from saltus.systems import check_system
 
 FOLLOWED = (SpecialKind.LP, SpecialKind.PD, SpecialKind.BPC, SpecialKind.GR)
 TENFOLD = 10.0  # a parameter without bounds is followed up to its value times this, and down to its value divided by this
@@ -105,6 +106,7 @@ def continue_special(
             "ends there, and no curve of such points is followed; choose an LP, PD or BPC"
         )
     first_path, system = special.orbit.problem.paths[0], special.orbit.system
+    check_system(system, "continue_special")
     if path == first_path:
         raise ParameterError(f"the branch already runs along {path}; name another parameter to follow its {special.kind} in")
     check_path(system, path)

@@ -27,6 +27,7 @@ class SpecialKind(StrEnum):
     GR = "GR", "grazing"
     RL = "RL", "a release that the load only touches: the excursion after it shrinks to rest"
     CH = "CH", "the impacts die away only at the instant of the next release: the rest before it has no duration"
+    SW = "SW", "switching: a contact's release, or its closing, appears or is lost"
     CP = "CP", "cusp: two folds meet", 2
     GPD = "GPD", "degenerate period doubling: the doubled orbit changes the side on which it lies", 2
     DBPC = "DBPC", "degenerate symmetry breaking: the unsymmetric orbits change the side on which they lie", 2
@@ -61,6 +62,7 @@ class OrbitEnd(EndReason):
     MANY_IMPACTS = "more than {detail} impacts a period"
     ACCUMULATES = "grazings accumulate near {parameter:.9g}: {detail} impacts and more"
     REPELS = "the orbit repels too strongly to be followed: its largest multiplier is {detail}"
+    TWO_AT_ONCE = "contacts act at one instant, or a contact begins to bounce to rest: motions beside it have other equations"
     NOT_UNIQUE = "an impact loses its speed while both sides push outward: the motion is not unique there"
     GRAZES_INTO_REST = "the orbit shrinks to rest"
     NO_MOTION = "the motion cannot be followed {detail} the grazing"

@@ -13,7 +13,6 @@ from saltus.orbits.branch import Branch
 from saltus.orbits.branch_continuation import STEP, follow_from
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
-from saltus.orbits.signature import Signature
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.symmetry import full_period
 
@@ -69,10 +68,11 @@ def _doubled(point: OrbitPoint) -> OrbitPoint | None:
     problem, signature = point.orbit.problem, point.orbit.signature
     if 2 * signature.period > MOST_DOUBLED:
         return None
-    twice = Signature((*signature.sides, *signature.sides), 2 * signature.period, False, signature.side)
+    events, sides = 2 * signature.events, 2 * signature.sides
+    twice = replace(signature, sides=sides, events=events, period=2 * signature.period, symmetric=False)
     unknowns, direction = point.solution.unknowns, _kernel(point.equations.jacobian(-1.0))
-    if signature.sides:
-        unknowns, direction = problem.repeated(unknowns), np.concatenate([direction, -direction])
+    if sides or events:
+        unknowns, direction = problem.repeated(unknowns), problem.alternating(direction)
     return _along(point, problem.with_signature(twice), unknowns, direction)
 
 

@@ -16,6 +16,7 @@ class OrbitTolerances:
     same_orbit: float = 1e-6  # Extrema and speeds of impact of one orbit that was found twice.
     image: float = 1e-6  # Rounding alone makes an orbit differ from its own image by less than this.
     halves: float = 1e-7  # The halves of a symmetric orbit: solved to 1e-12, but near a grazing Newton's method leaves more.
+    switching: float = 1e-5  # Phases of two events of one contact that vanish together: their speeds go as the third power.
     release: float = 1e-9  # Instants of a release, in forcing periods: releases are isolated, and known to rounding.
     load: float = 1e-12  # Values of a load and of its mirror image half a period later.
 

@@ -17,6 +17,8 @@ from saltus.flow import Motion, Stop, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
 
+ROUNDING = 1e-13  # of a derivative, relative to the largest one
+
 
 @dataclass(frozen=True, eq=False)
 class Exponents:
@@ -100,14 +102,15 @@ def lyapunov_spectrum(
         periods: over how many forcing periods to average, at least 32.
         transient: how many to let pass first.
         tol: the error that one step may make.
-        two_trajectories: False leaves out the stroboscopic map's exponent, and a half of the work.
+        two_trajectories: False leaves out the stroboscopic map's exponent, and a half of the work. With several contacts it has
+            to be False; exponents are then -inf in the directions that closed contacts take away.
         progress: called with the fraction done and what is being done.
 
     Raises:
         ParameterError: an argument without meaning; a load by records, which has no period.
         MotionError: as for `simulate`.
     """
-    check_run("lyapunov_spectrum", system, periods, transient, tol)
+    check_run("lyapunov_spectrum", system, periods, transient, tol, several_contacts=not two_trajectories)
     run, start = _Run(system, periods), dict[str, Any](coordinates, velocity=velocity)
     motion = simulate(system, **start, duration=transient * run.length, tol=tol, dense=False)
     run.state, run.note = state_of(motion), _lost(motion)
@@ -158,7 +161,10 @@ class _Run:
             return frame
         frame, upper = np.linalg.qr(found.state @ frame)
         with np.errstate(divide="ignore"):
-            self.stretch[p] += np.log(np.abs(np.diag(upper)))
+            lengths = np.abs(np.diag(upper))
+            if self.system.model.contacts:  # what closed contacts take away is 0 but for rounding
+                lengths[lengths < ROUNDING * lengths.max()] = 0.0
+            self.stretch[p] += np.log(lengths)
         self.areas[p] += contraction.along(found.motion)
         self.condition = max(self.condition, float(np.linalg.cond(found.state)))
         self.state = state_of(found.motion)

@@ -20,7 +20,7 @@ from saltus.systems import System
 def classify(
     system: System,
     *,
-    velocity: float = 0.0,
+    velocity: Any = 0.0,
     periods: int = 4000,
     transient: int = 500,
     max_period: int = RECURRENCE.compiled_max_period,
@@ -44,7 +44,7 @@ def classify(
     * `undecided`: everything else, with the reason.
 
     Args:
-        system: a model with one coordinate, under constant or harmonic loads.
+        system: what moves, under constant or harmonic loads.
         velocity, coordinates: the state at the start, at phase 0.
         periods: how long it may take, in forcing periods: so many for settling, so many for the exponents; at least 96.
         transient: how many to let pass first.
@@ -56,7 +56,7 @@ def classify(
     Raises:
         ParameterError: an argument without meaning.
     """
-    clock, start = with_clock(system), _start(system, velocity, coordinates)
+    clock, start = with_clock(system, "classify", any_model=True), _start(system, velocity, coordinates)
     check_count("periods", periods, SETTINGS.thirds * 2 * LYAPUNOV.batches)
     check_count("transient", transient, 0)
     check_count("max_period", max_period, RECURRENCE.compiled_max_period)
@@ -75,11 +75,15 @@ def _start(system: System, velocity: Any, coordinates: dict[str, float]) -> np.n
     Raises:
         ParameterError: names or values that are none.
     """
-    name = system.model.coordinates[0]
-    if set(coordinates) != {name}:
-        raise ParameterError(
-            f"the state at the start is {name}=... and velocity=..., got {', '.join(coordinates) or 'no coordinate'}"
-        )
-    check_number(name, coordinates[name])
-    check_number("velocity", velocity)
-    return np.array([[coordinates[name], velocity]], dtype=float)
+    names = system.model.coordinates
+    if set(coordinates) != set(names):
+        wanted, given = ", ".join(f"{name}=..." for name in names), ", ".join(coordinates) or "no coordinate"
+        raise ParameterError(f"the state at the start is {wanted} and velocity=..., got {given}")
+    velocities = [velocity] * len(names) if np.ndim(velocity) == 0 else list(velocity)
+    if len(velocities) != len(names):
+        raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}", "velocity")
+    for name in names:
+        check_number(name, coordinates[name])
+    for value in velocities:
+        check_number("velocity", value)
+    return np.array([[*(coordinates[name] for name in names), *velocities]], dtype=float)

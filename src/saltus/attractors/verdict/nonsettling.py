@@ -16,6 +16,7 @@ from saltus.attractors.verdict.verdict import Verdict, VerdictRequest, on_orbit,
 from saltus.attractors.verdict.zero_one_test import FEWEST_ENTRIES, ZeroOne, zero_one_test
 from saltus.flow import Recurrence
 from saltus.progress import part_of
+from saltus.systems import System
 
 
 @dataclass(frozen=True)
@@ -103,11 +104,9 @@ def _runs(case: VerdictRequest, state: np.ndarray) -> list[Exponents]:
     runs: list[Exponents] = []
     for span, part in ((third, (0.1, 0.1 + 0.8 / 3)), (2 * third, (0.1 + 0.8 / 3, 0.9))):
         progress = part_of(case.progress, *part)
-        runs.append(
-            lyapunov_spectrum(
-                case.system, **at, periods=span, transient=0, tol=case.tol, two_trajectories=not runs, progress=progress
-            )
-        )
+        second = not runs and not case.system.model.contacts
+        options: dict[str, Any] = {"periods": span, "transient": 0, "tol": case.tol, "two_trajectories": second}
+        runs.append(lyapunov_spectrum(case.system, **at, **options, progress=progress))
         at = runs[-1].state
         if runs[-1].note is not None:
             break
@@ -133,13 +132,25 @@ def _evidence(runs: list[Exponents], opinion: ZeroOne | None) -> dict[str, Any]:
 
 def _beside(case: VerdictRequest, state: dict[str, Any]) -> Recurrence:
     """How motions end that begin at a state, the first, and beside it."""
-    around = np.random.default_rng(int(case.seed)).uniform(-SETTINGS.aside, SETTINGS.aside, (SETTINGS.companions, 2))
-    states = _row(case, state) + np.concatenate([[[0.0, 0.0]], around])
+    row = _row(case, state)
+    around = np.random.default_rng(int(case.seed)).uniform(-SETTINGS.aside, SETTINGS.aside, (SETTINGS.companions, row.size))
+    states = _on_this_side(case.system, row, row + np.concatenate([np.zeros((1, row.size)), around]))
     return case.follow(states, max(case.periods, SETTINGS.least), 4 * case.max_period, (0.9, 1.0))
 
 
+def _on_this_side(system: System, row: np.ndarray, states: np.ndarray) -> np.ndarray:
+    """States (n, d) beside one (d,) with its closed contacts closed, and those beyond a contact at its mirror image."""
+    names = system.model.coordinates
+    for contact in system.model.contacts:
+        place, position = names.index(contact.coordinate), float(contact.position)
+        states[:, place] = position + contact.sign * np.abs(states[:, place] - position)
+        if contact.gap(row[place]) == 0.0 and row[len(names) + place] == 0.0:
+            states[:, [place, len(names) + place]] = position, 0.0
+    return states
+
+
 def _row(case: VerdictRequest, state: dict[str, Any]) -> np.ndarray:
-    return np.array([state[case.system.model.coordinates[0]], state["velocity"]])
+    return np.append([state[name] for name in case.system.model.coordinates], state["velocity"])
 
 
 def _after_all(verdict: Verdict, judged: _Judged) -> Verdict:

@@ -11,8 +11,9 @@ import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, complementary, invert
 from saltus.flow.contacts.contact_layout import FINISHED, MOST_FROZEN_IMPACTS, VANISHED, ContactColumn, ContactPart, Solver
-from saltus.flow.kernel_layout import CHATTER_SPEED, SLOW, Mode, Where
+from saltus.flow.kernel_layout import CHATTER_SPEED, EXACT, ROUGHER, SLOW, Mode, Setting, Where, Work
 from saltus.flow.memory_layout import State
+from saltus.flow.steps import column_step, leaps, step_size
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -53,6 +54,33 @@ def closed_bits(contacts):
     for i in range(contacts.shape[0]):
         bits |= contacts[i, ContactColumn.CLOSED] << i
     return bits
+
+
+@lean_jit
+def gap_series(model, contacts, work, i, position, order, g):
+    """The Taylor coefficients of a contact's gap."""
+    sign, coordinate = model[ContactPart.SIGNS][i], contacts[i, ContactColumn.COORDINATE]
+    for k in range(order + 1):
+        g[k] = sign * work[Work.POSITIONS][coordinate, k]
+    g[0] -= sign * position
+
+
+@lean_jit
+def contact_step_size(where, settings, env, model, contacts, work, t, origin, target, size):
+    """The step that the series of the free coordinates and of the reactions allow."""
+    order, tol, own = where[Where.ORDER], settings[Setting.TOLERANCE], where[Where.OWN]
+    natural = step_size(work[Work.VELOCITIES][:own], order, size, tol)
+    if where[Where.COLUMNS] > 0:
+        q, v, a = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.ACCELERATIONS]
+        natural = min(natural, column_step(where, q, v, a, order, ROUGHER * tol))
+    sharp = min(tol, EXACT) if where[Where.MODE] == Mode.REST else tol
+    for i in range(contacts.shape[0]):
+        if contacts[i, ContactColumn.CLOSED] == 1:
+            r = work[Work.MARGINS][i : i + 1]
+            natural = min(natural, step_size(r, order, max(1.0, abs(r[0, 0])), sharp))
+    while where[Where.CHECKED] > 0 and leaps(where, env, model, work, t, origin, 1.0, min(natural, target - t), size, tol):
+        natural = 0.5 * min(natural, target - t)
+    return natural
 
 
 @lean_jit

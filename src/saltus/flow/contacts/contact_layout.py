@@ -48,6 +48,38 @@ class Solver(IntEnum):
     PULL_SLOPES = 17  # the derivatives of `PULLS`, a row for each column
 
 
+class SegmentPlan(IntEnum):
+    """Columns of what is given of the segments of an orbit (`contact_segments.py`)."""
+
+    ALONG = 0  # the contacts that are closed along it, as bits
+    KIND = 1  # of the event with which it ends: IMPACT or RELEASE of `EventCode`, -1 for none
+    CONTACT = 2  # of that event
+    AFTER = 3  # the contacts that are closed after it
+    POWER = 4  # of its duration by which its guard is divided: with which the gap of the contact grows that it begins and ends at
+
+
+class SegmentEnd(IntEnum):
+    """Places in the numbers of a segment's ends."""
+
+    GUARD = 0  # of its event: the gap, or the reaction
+    RATE = 1  # of the guard, by which the speed of an impact is read
+    BY_START = 2  # the guard's derivative to the time of the segment's start, and to that of its end
+    BY_END = 3
+    NUMBERS = 4  # state and rates at the start, both at the end, the state after the event: 10 numbers for each coordinate
+
+
+class SegmentLook(IntEnum):
+    """Places in what is seen along a segment."""
+
+    TOP = 0  # the largest value of any coordinate
+    BOTTOM = 1
+    GAP = 2  # the lowest inner minimum of a gap, when, and whose
+    FORCE = 5  # the same of a reaction
+    PULL = 8  # the least reaction or acceleration from a contact with which it begins, and whose
+    TAIL = 10  # the least reaction with which it ends, and whose: of contacts that stay closed up to the event
+    MARGINS = 12  # their least values, from here on
+
+
 class ImpactDetail(IntEnum):
     """What an impact leaves of the tangent."""
 

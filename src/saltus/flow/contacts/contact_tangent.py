@@ -88,8 +88,10 @@ def hold_columns(where, state, contacts, solver, chosen):
 @lean_jit
 def release_columns(where, state, env, model, work, t, origin, i):
     """Take the columns to the instant at which a reaction reaches 0."""
-    expand(where, state, env, model, work, t, origin, 1.0, 0)
+    expand(where, state, env, model, work, t, origin, 1.0, 1)
     model[ContactPart.TANGENT](EventCode.RELEASE, i, t, origin, 1.0, env, where[Where.PIECE], state)
+    for j in range(where[Where.COLUMNS]):
+        state[State.COORDINATES + 2 * where[Where.DOF] + j] /= -work[Work.MARGINS][i, 1]
     move_columns(where, state, work, 1.0)
 
 

@@ -19,9 +19,11 @@ from saltus.flow.contacts.contact_impacts import (
     bring_to_rest,
     closed_bits,
     contact_position,
+    contact_step_size,
     couple,
     fill_after,
     frozen_accumulation,
+    gap_series,
     hold_coordinates,
     impact_impulses,
     is_smooth,
@@ -46,19 +48,16 @@ from saltus.flow.contacts.contact_tangent import (
     rest_columns,
 )
 from saltus.flow.function_types import ADVANCE_CONTACTS
-from saltus.flow.kernel_layout import BATCH, EXACT, ROUGHER, SHORTEST, ZERO, Mode, Setting, Status, Where, Work
+from saltus.flow.kernel_layout import BATCH, SHORTEST, ZERO, Mode, Setting, Status, Where, Work
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.roots import NEVER, SIMPLE, contact_root, horner, horner_slope, leading, margin_root
 from saltus.flow.steps import (
-    column_step,
     expand,
     forget,
-    leaps,
     motion_end,
     move,
     next_target,
     record_step,
-    step_size,
     work_arrays,
 )
 from saltus.taylor import lean_jit
@@ -99,15 +98,6 @@ def contact_impact(where, state, env, model, contacts, work, solver, events, t, 
         hold_columns(where, state, contacts, solver, chosen)
         note_shifts(where, state, contacts, events, state, first + where[Where.DOF])
     return Status.PAUSED
-
-
-@lean_jit
-def gap_series(model, contacts, work, i, position, order, g):
-    """The Taylor coefficients of a contact's gap."""
-    sign, coordinate = model[ContactPart.SIGNS][i], contacts[i, ContactColumn.COORDINATE]
-    for k in range(order + 1):
-        g[k] = sign * work[Work.POSITIONS][coordinate, k]
-    g[0] -= sign * position
 
 
 @lean_jit
@@ -237,24 +227,6 @@ def decide_contacts(where, state, settings, env, model, contacts, work, solver, 
     where[Where.MODE] = Mode.REST if where[Where.HELD] == 1 else Mode.ARC
     where[Where.SIDE] = 1 + closed_bits(contacts)
     return Status.PAUSED
-
-
-@lean_jit
-def contact_step_size(where, settings, env, model, contacts, work, t, origin, target, size):
-    """The step that the series of the free coordinates and of the reactions allow."""
-    order, tol, own = where[Where.ORDER], settings[Setting.TOLERANCE], where[Where.OWN]
-    natural = step_size(work[Work.VELOCITIES][:own], order, size, tol)
-    if where[Where.COLUMNS] > 0:
-        q, v, a = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.ACCELERATIONS]
-        natural = min(natural, column_step(where, q, v, a, order, ROUGHER * tol))
-    sharp = min(tol, EXACT) if where[Where.MODE] == Mode.REST else tol
-    for i in range(contacts.shape[0]):
-        if contacts[i, ContactColumn.CLOSED] == 1:
-            r = work[Work.MARGINS][i : i + 1]
-            natural = min(natural, step_size(r, order, max(1.0, abs(r[0, 0])), sharp))
-    while where[Where.CHECKED] > 0 and leaps(where, env, model, work, t, origin, 1.0, min(natural, target - t), size, tol):
-        natural = 0.5 * min(natural, target - t)
-    return natural
 
 
 @lean_jit

@@ -1,0 +1,365 @@
+"""Smooth segments of motions with several contacts, from event to event, with their derivatives: what their orbits are made of.
+
+The events and the contacts that are closed between them are given, and so are their times: the motion is followed whatever the
+signs of the gaps and the reactions are, which the orbit's equations bring to 0 (see `orbits/contact_problem.py`). So a family of
+orbits goes smoothly through the point at which one of its events disappears.
+
+Its compiled part goes into one module with those of the files that it imports from.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from saltus.flow.contacts.complementarity import acting
+from saltus.flow.contacts.contact_impacts import (
+    contact_position,
+    contact_step_size,
+    couple,
+    gap_series,
+    hold_coordinates,
+    impact_impulses,
+    push,
+    restitution,
+    solver_arrays,
+)
+from saltus.flow.contacts.contact_layout import ContactColumn, ContactPart, SegmentEnd, SegmentLook, SegmentPlan, Solver
+from saltus.flow.contacts.contact_tangent import fill_slopes, hold_columns, impulse_columns, lift, note_velocities
+from saltus.flow.function_types import CONTACT_SEGMENTS
+from saltus.flow.kernel_layout import Where, Work
+from saltus.flow.memory_layout import EventCode, State
+from saltus.flow.roots import NOISE, horner, roots_within, scale_gap
+from saltus.flow.steps import expand, move, work_arrays
+from saltus.taylor import lean_jit
+from saltus.taylor import not_here as cached_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+MOST_STEPS = 100_000  # of one segment
+AT_REST = 1e-9  # the speed below which a contact opens from rest after an impact without restitution
+ENDS = 1e-6  # share of a segment at both of its ends in which no extremum is looked for: guards are 0 there
+
+
+@lean_jit
+def unit_columns(where, state):
+    """The columns of the present state itself: unit ones, and 0 to the parameters."""
+    own, dof = where[Where.OWN], where[Where.DOF]
+    for j in range(where[Where.COLUMNS]):
+        for i in range(own):
+            place = State.COORDINATES + own * (1 + j) + i
+            state[place], state[place + dof] = 1.0 if j == i else 0.0, 1.0 if j == own + i else 0.0
+
+
+@lean_jit
+def hold_contacts(where, state, env, model, contacts, solver, closed):
+    """Close the contacts in `closed` and no others: their coordinates, and those of the columns, are where they are held."""
+    own, count = where[Where.OWN], contacts.shape[0]
+    fill_slopes(where, state, env, model, solver)
+    for i in range(count):
+        contacts[i, ContactColumn.CLOSED] = closed >> i & 1
+        if closed >> i & 1:
+            place = State.COORDINATES + contacts[i, ContactColumn.COORDINATE]
+            state[place], state[place + where[Where.DOF]] = contact_position(solver, own, count, i), 0.0
+    hold_columns(where, state, contacts, solver, closed)
+    hold_coordinates(where, env, contacts)
+
+
+@lean_jit
+def least_of(c, order, h, t, poly, roots, seen, place):
+    """Take in the inner minima of a series within a step: the least of them, and when."""
+    size = abs(c[0])
+    for k in range(1, order + 1):
+        poly[k - 1] = k * c[k] * h**k
+        size += abs(c[k] * h**k)
+    for i in range(roots_within(poly, order - 1, roots, NOISE * size)):
+        turn, value = 0.0, horner(c, order, roots[i] * h)
+        for k in range(order - 1, 0, -1):
+            turn = turn * roots[i] + k * poly[k]
+        if turn > 0.0 and value < seen[place]:
+            seen[place], seen[place + 1] = value, t + roots[i] * h
+
+
+@lean_jit
+def look_at_step(where, state, model, contacts, work, solver, t, h, begin, end, roots, seen, least):
+    """Take in what a step shows: turning points of the coordinates, inner minima of the guards, the margins' least values."""
+    order, own, count, poly = where[Where.ORDER], where[Where.OWN], contacts.shape[0], work[Work.POLYNOMIAL]
+    for a in range(own):
+        q, size = work[Work.POSITIONS][a], 0.0
+        scale_gap(work[Work.VELOCITIES][a], 0, order, h, poly)
+        for k in range(order + 1):
+            size += abs(poly[k])
+        for i in range(roots_within(poly, order, roots, NOISE * size) + 2):
+            u = 0.0 if i == 0 else 1.0 if i == 1 else roots[i - 2]
+            x = horner(q, order, u * h)
+            seen[SegmentLook.TOP], seen[SegmentLook.BOTTOM] = max(seen[SegmentLook.TOP], x), min(seen[SegmentLook.BOTTOM], x)
+    for i in range(count):
+        guard = work[Work.GAP]
+        if contacts[i, ContactColumn.CLOSED] == 1:
+            guard = work[Work.MARGINS][i]
+        else:
+            gap_series(model, contacts, work, i, contact_position(solver, own, count, i), order, guard)
+        least[0], least[1] = np.inf, 0.0
+        least_of(guard, order, h, t, poly, roots, least, 0)
+        place = SegmentLook.FORCE if contacts[i, ContactColumn.CLOSED] == 1 else SegmentLook.GAP
+        inside = ENDS * (end - begin) < least[1] - begin < (1.0 - ENDS) * (end - begin)
+        if inside and least[0] < seen[place]:
+            seen[place], seen[place + 1], seen[place + 2] = least[0], least[1], i
+    for j in range(count, where[Where.MARGINS]):
+        place, m = SegmentLook.MARGINS + j - count, work[Work.MARGINS][j]
+        least[0] = min(m[0], horner(m, order, h))
+        least_of(m, order, h, t, poly, roots, least, 0)
+        seen[place] = min(seen[place], least[0])
+
+
+@lean_jit
+def look_at_start(where, state, model, contacts, work, solver, opened, seen):
+    """The least of the reactions with which contacts are closed, and of the acceleration with which `opened` leaves from rest."""
+    for i in range(contacts.shape[0]):
+        pull, coordinate = np.inf, contacts[i, ContactColumn.COORDINATE]
+        if contacts[i, ContactColumn.CLOSED] == 1:
+            pull = work[Work.MARGINS][i, 0]
+        elif i == opened and abs(state[State.COORDINATES + where[Where.DOF] + coordinate]) < AT_REST:
+            pull = model[ContactPart.SIGNS][i] * work[Work.ACCELERATIONS][coordinate, 0]
+        if pull < seen[SegmentLook.PULL]:
+            seen[SegmentLook.PULL], seen[SegmentLook.PULL + 1] = pull, i
+
+
+@lean_jit
+def look_at_section(where, state, model, contacts, work, solver, t, seen):
+    """Take in the guards at the start of a segment that begins with no event: they may have their minimum just there."""
+    own, count = where[Where.OWN], contacts.shape[0]
+    for i in range(count):
+        closed, x = contacts[i, ContactColumn.CLOSED] == 1, state[State.COORDINATES + contacts[i, ContactColumn.COORDINATE]]
+        gap = model[ContactPart.SIGNS][i] * (x - contact_position(solver, own, count, i))
+        value, place = work[Work.MARGINS][i, 0] if closed else gap, SegmentLook.FORCE if closed else SegmentLook.GAP
+        if value < seen[place]:
+            seen[place], seen[place + 1], seen[place + 2] = value, t, i
+
+
+@lean_jit
+def follow_segment(where, state, settings, env, model, contacts, work, solver, begin, end, roots, seen, least):
+    """Follow one segment with the contacts that are closed; returns in how many steps, or 0 where that cannot be done."""
+    order, t, forwards = where[Where.ORDER], begin, end >= begin
+    for count in range(MOST_STEPS):
+        size = expand(where, state, env, model, work, t, 0.0, 1.0, order)
+        natural = contact_step_size(where, settings, env, model, contacts, work, t, 0.0, t + abs(end - t), size)
+        if not natural > 0.0:
+            return 0
+        last = natural >= abs(end - t)
+        h = end - t if last else (natural if forwards else -natural)
+        if seen.size > 1 and h > 0.0:
+            look_at_step(where, state, model, contacts, work, solver, t, h, begin, end, roots, seen, least)
+        move(where, state, work[Work.POSITIONS], work[Work.VELOCITIES], h)
+        if last:
+            return count + 1
+        t += h
+    return 0
+
+
+@lean_jit
+def given_impact(where, state, env, model, contacts, solver, hit):
+    """The impact of the contact `hit` whatever the sign of its speed: with the impulses that one of a unit speed has."""
+    own, count, unit = where[Where.OWN], contacts.shape[0], solver[Solver.FALLING_RATES]
+    couple(where, state, env, model, contacts, solver)
+    chosen = 1 << hit
+    for i in range(count):
+        chosen |= contacts[i, ContactColumn.CLOSED] << i
+        unit[i] = -1.0 if i == hit else 0.0
+        solver[Solver.GAPS][i] = solver[Solver.RATES][i]
+    acts = impact_impulses(solver, own, count, chosen, unit)
+    if acts < 0:
+        return False
+    note_velocities(where, state, solver, 0.0)
+    for i in range(count):
+        solver[Solver.RIGHT][i] = solver[Solver.RATES][i]
+        for k in range(count):
+            if chosen >> k & 1:
+                solver[Solver.RIGHT][i] += restitution(solver, own, count, i, k) * solver[Solver.RATES][k]
+    acting(solver[Solver.COUPLING], solver[Solver.RIGHT], count, acts, solver[Solver.BLOCK], solver[Solver.IMPULSES])
+    push(where, state, model, contacts, solver)
+    for i in range(count):
+        if acts >> i & 1:
+            rate, place = 0.0, State.COORDINATES + where[Where.DOF] + contacts[i, ContactColumn.COORDINATE]
+            for k in range(count):
+                if chosen >> k & 1:
+                    rate -= restitution(solver, own, count, i, k) * solver[Solver.GAPS][k]
+            state[place] = model[ContactPart.SIGNS][i] * rate + 0.0
+    for a in range(own):  # the jump of the velocities
+        solver[Solver.JUMP][a] = state[State.COORDINATES + where[Where.DOF] + a] - solver[Solver.JUMP][a]
+    impulse_columns(where, state, env, model, contacts, solver, acts, chosen)
+    return True
+
+
+@lean_jit
+def copy_numbers(where, state, work, ends, first):
+    """Put the state and its rates into `ends` from `first` on."""
+    own, coordinates, velocities = where[Where.OWN], State.COORDINATES, State.COORDINATES + where[Where.DOF]
+    for i in range(own):
+        ends[first + i], ends[first + own + i] = state[coordinates + i], state[velocities + i]
+        ends[first + 2 * own + i] = state[velocities + i]
+        ends[first + 3 * own + i] = work[Work.ACCELERATIONS][i, 0]
+
+
+@lean_jit
+def copy_columns(where, state, columns):
+    """Put the columns into the rows of an array: coordinates, then velocities."""
+    own = where[Where.OWN]
+    for j in range(where[Where.COLUMNS]):
+        for i in range(own):
+            place = State.COORDINATES + own * (1 + j) + i
+            columns[i, j], columns[own + i, j] = state[place], state[place + where[Where.DOF]]
+
+
+@lean_jit
+def start_slope(where, ends, slopes):
+    """The derivative of a guard to the time of the segment's start, from a state that stays: minus that along the motion."""
+    total = 0.0
+    for j in range(2 * where[Where.OWN]):
+        total -= slopes[j] * ends[SegmentEnd.NUMBERS + 2 * where[Where.OWN] + j]
+    return total
+
+
+@lean_jit
+def excursion_guard(where, model, contacts, work, contact, power, h, ends, slopes):
+    """The gap at the end of an excursion, in one step, divided by a power p of its duration h, and its derivatives.
+
+    A contact that is released where its reaction is 0 opens with h^3, one that opens from rest after an impact with h^2: without
+    the terms before, the quotient and its derivatives are regular for any h, also where the excursion appears. With the gap's
+    coefficients c_k, its derivatives w_k to the time of the start at a fixed end, and Q = sum c_k h^(k-p):
+
+        dQ/dh = sum (k-p) c_k h^(k-p-1),    dQ/dt_start = sum (w_k + (k+1) c_(k+1)) h^(k-p) - dQ/dh.
+    """
+    own, sign, coordinate = where[Where.OWN], model[ContactPart.SIGNS][contact], contacts[contact, ContactColumn.COORDINATE]
+    q, value, by_length, by_start = work[Work.POSITIONS], 0.0, 0.0, 0.0
+    for j in range(where[Where.COLUMNS]):
+        slopes[j] = 0.0
+    for k in range(where[Where.ORDER], power - 1, -1):
+        by_length = by_length * h + value
+        value = value * h + sign * q[coordinate, k]
+        by_start = by_start * h + (k + 1) * sign * q[coordinate, k + 1]
+        for j in range(where[Where.COLUMNS]):
+            slopes[j] = slopes[j] * h + sign * q[own * (1 + j) + coordinate, k]
+    ends[SegmentEnd.GUARD], ends[SegmentEnd.BY_END] = value, by_length
+    ends[SegmentEnd.BY_START] = by_start + start_slope(where, ends, slopes) - by_length
+
+
+@lean_jit
+def divide_guard(where, power, h, ends, slopes):
+    """The same of an excursion of several steps."""
+    divisor = h**power
+    ends[SegmentEnd.GUARD] /= divisor
+    turned = power * ends[SegmentEnd.GUARD] / h
+    ends[SegmentEnd.BY_END] = ends[SegmentEnd.BY_END] / divisor - turned
+    ends[SegmentEnd.BY_START] = ends[SegmentEnd.BY_START] / divisor + turned
+    for j in range(where[Where.COLUMNS]):
+        slopes[j] /= divisor
+
+
+@lean_jit
+def guard_at_end(where, state, env, model, contacts, work, solver, t, kind, contact, ends, slopes):
+    """The guard of a segment's event, its rate and the speed, and the guard's derivatives along the columns."""
+    own, count = where[Where.OWN], contacts.shape[0]
+    fill_slopes(where, state, env, model, solver)
+    if kind == EventCode.RELEASE:
+        ends[SegmentEnd.GUARD], ends[SegmentEnd.RATE] = work[Work.MARGINS][contact, 0], work[Work.MARGINS][contact, 1]
+        ends[SegmentEnd.BY_END] = ends[SegmentEnd.RATE]
+        model[ContactPart.TANGENT](EventCode.RELEASE, contact, t, 0.0, 1.0, env, 0, state)
+        for j in range(where[Where.COLUMNS]):
+            slopes[j] = state[State.COORDINATES + 2 * where[Where.DOF] + j]
+            state[State.COORDINATES + 2 * where[Where.DOF] + j] = 0.0
+        return
+    sign, place = model[ContactPart.SIGNS][contact], State.COORDINATES + contacts[contact, ContactColumn.COORDINATE]
+    ends[SegmentEnd.GUARD] = sign * (state[place] - contact_position(solver, own, count, contact))
+    ends[SegmentEnd.BY_END] = ends[SegmentEnd.RATE] = sign * state[place + where[Where.DOF]]
+    for j in range(where[Where.COLUMNS]):
+        slopes[j] = lift(where, state, model, contacts, solver, j, contact)
+
+
+@lean_jit
+def look_at_end(work, contacts, released, seen):
+    """The least of the reactions with which a segment ends, of the contacts but the one that is released there."""
+    for i in range(contacts.shape[0]):
+        reaction = work[Work.MARGINS][i, 0]
+        if contacts[i, ContactColumn.CLOSED] == 1 and i != released and reaction < seen[SegmentLook.TAIL]:
+            seen[SegmentLook.TAIL], seen[SegmentLook.TAIL + 1] = reaction, i
+
+
+@lean_jit
+def pass_event(where, state, env, model, contacts, solver, row, ends, maps):
+    """Take the state through the event of a row of the plan, with the derivatives of that; returns whether it has an outcome."""
+    own, dof = where[Where.OWN], where[Where.DOF]
+    unit_columns(where, state)
+    impact = row[SegmentPlan.KIND] == EventCode.IMPACT
+    if impact and not given_impact(where, state, env, model, contacts, solver, row[SegmentPlan.CONTACT]):
+        return False
+    hold_contacts(where, state, env, model, contacts, solver, row[SegmentPlan.AFTER])
+    copy_columns(where, state, maps)
+    for a in range(own):
+        ends[SegmentEnd.NUMBERS + 8 * own + a] = state[State.COORDINATES + a]
+        ends[SegmentEnd.NUMBERS + 9 * own + a] = state[State.COORDINATES + dof + a]
+    return True
+
+
+@cached_jit(CONTACT_SEGMENTS)
+def follow_contact_segments(where, settings, env, model, contacts, plan, times, first, ends, columns, maps, looks):
+    """Follow segments one after the other, each from the state that the event before it leaves; returns how many succeed.
+
+    `plan` says for each which contacts are closed along it, with which event it ends at which contact, and which contacts are
+    closed afterwards (`SegmentPlan`); `times` (n + 1) are those of its ends, `first` is the state at the first one. `ends` holds
+    numbers in the places of `SegmentEnd`; `columns` the derivatives to the state at the start and to the parameters of the state
+    at the end, at a fixed time, and of the guard; `maps` those of the state after the event to the state before it and to the
+    parameters. `looks` is filled, in the places of `SegmentLook`, if it has rows.
+    """
+    own, dof = where[Where.OWN], where[Where.DOF]
+    work, solver = work_arrays(where), solver_arrays(own, contacts.shape[0], where[Where.COLUMNS])
+    roots, nothing, least = np.zeros(where[Where.ORDER] + 2), np.zeros(1), np.zeros(2)
+    state = np.zeros(State.COORDINATES + 2 * dof + where[Where.COLUMNS])
+    opened = -1
+    if plan[plan.shape[0] - 1, SegmentPlan.KIND] == EventCode.IMPACT:
+        opened = plan[plan.shape[0] - 1, SegmentPlan.CONTACT]
+    for a in range(own):
+        state[State.COORDINATES + a], state[State.COORDINATES + dof + a] = first[a], first[own + a]
+    couple(where, state, env, model, contacts, solver)
+    for s in range(plan.shape[0]):
+        begin, end, kind, contact = times[s], times[s + 1], plan[s, SegmentPlan.KIND], plan[s, SegmentPlan.CONTACT]
+        unit_columns(where, state)
+        hold_contacts(where, state, env, model, contacts, solver, plan[s, SegmentPlan.ALONG])
+        expand(where, state, env, model, work, begin, 0.0, 1.0, 1)
+        copy_numbers(where, state, work, ends[s], SegmentEnd.NUMBERS)
+        seen = looks[s] if looks.shape[0] > 0 else nothing
+        if looks.shape[0] > 0:
+            for k in range(seen.size):
+                seen[k] = np.inf
+            seen[SegmentLook.TOP] = -np.inf
+            look_at_start(where, state, model, contacts, work, solver, opened, seen)
+            if kind < 0:
+                look_at_section(where, state, model, contacts, work, solver, begin, seen)
+        steps = follow_segment(where, state, settings, env, model, contacts, work, solver, begin, end, roots, seen, least)
+        if steps == 0:
+            return s
+        power = plan[s, SegmentPlan.POWER]
+        single = power > 0 and steps == 1
+        if single:
+            excursion_guard(where, model, contacts, work, contact, power, end - begin, ends[s], columns[s, 2 * own])
+        expand(where, state, env, model, work, end, 0.0, 1.0, 1)
+        copy_numbers(where, state, work, ends[s], SegmentEnd.NUMBERS + 4 * own)
+        copy_columns(where, state, columns[s])
+        if not math.isfinite(ends[s, SegmentEnd.NUMBERS + 8 * own - 1]):
+            return s
+        if looks.shape[0] > 0:
+            look_at_end(work, contacts, contact if kind == EventCode.RELEASE else -1, seen)
+        if kind >= 0:
+            if single:
+                velocity = state[State.COORDINATES + dof + contacts[contact, ContactColumn.COORDINATE]]
+                ends[s, SegmentEnd.RATE] = model[ContactPart.SIGNS][contact] * velocity
+            else:
+                guard_at_end(where, state, env, model, contacts, work, solver, end, kind, contact, ends[s], columns[s, 2 * own])
+                ends[s, SegmentEnd.BY_START] = start_slope(where, ends[s], columns[s, 2 * own])
+                if power > 0:
+                    divide_guard(where, power, end - begin, ends[s], columns[s, 2 * own])
+            if not pass_event(where, state, env, model, contacts, solver, plan[s], ends[s], maps[s]):
+                return s
+        opened = contact if kind == EventCode.IMPACT else -1
+    return plan.shape[0]

@@ -1,0 +1,243 @@
+"""The boundary-value problem of a periodic orbit with several contacts, and its derivatives.
+
+Its events are impacts of single contacts and releases. Unknowns are the state just after the first event, without the
+coordinates that are then held, and the phase of every event; equations are that each event's guard, the gap or the reaction, is 0
+at its phase, and that the state a period later, after the first event again, is the one of the start. Between events the contacts
+that are closed are those of the signature, whatever the signs of gaps and reactions. An orbit without events has the free
+coordinates and velocities at phase 0 as its unknowns.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from saltus.flow import ContactColumn, EventCode, SegmentEnd, SegmentLook, SegmentPlan, load_contact_segments
+from saltus.flow import segments as at
+from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
+from saltus.orbits.signature import ModeChange, Signature
+from saltus.systems import System
+from saltus.taylor import FREQUENCY
+
+AFTER_RELEASE, AFTER_IMPACT = 3, 2  # powers of the time with which a contact opens from rest
+WITHIN = 0.4  # share of a segment at which a motion is started: in the middle an orbit may touch, by symmetry
+
+
+@dataclass(frozen=True)
+class ContactEquations(Equations):
+    """The problem at one point. Its derivatives are `here`, to the unknowns, and `there`, to those at the end of the period."""
+
+    seen: np.ndarray  # (n, ...): what is seen along each segment, by `SegmentLook`; empty if not asked for
+    state_count: int  # of the unknowns those that are a state
+
+    def jacobian(self, closing: float = 1.0) -> np.ndarray:
+        return np.asarray(self.here + closing * self.there)
+
+    def monodromy(self) -> np.ndarray:
+        """The map of the state after the first event, and of its phase, to those a period later; inf at a grazing."""
+        count = self.state_count
+        state = [*range(count + 1)] if self.here.shape[0] > count else [*range(count)]
+        later = [*range(count + 1, self.here.shape[0])]
+        rows = [*range(len(later), self.here.shape[0])]  # the first rows are the guards of the later events
+        with np.errstate(all="ignore"):
+            try:
+                chain = self.here[np.ix_(rows, state)]
+                if later:
+                    inner = self.here[: len(later)]
+                    chain = chain - self.here[np.ix_(rows, later)] @ np.linalg.solve(inner[:, later], inner[:, state])
+                return np.asarray(-np.linalg.solve(self.there[np.ix_(rows, state)], chain))
+            except np.linalg.LinAlgError:
+                return np.full((len(state), len(state)), np.inf)
+
+
+class ContactProblem(Problem):
+    """The equations of one signature of a system with several contacts."""
+
+    @cached_property
+    def plan(self) -> np.ndarray:
+        """The segments, see `SegmentPlan`: each begins with an event and ends with the next one, the last one with the first."""
+        events = self.signature.events
+        if not events:
+            return no_event(self.signature.closed)
+        following = (*events[1:], events[0])
+        rows = [[e.closed, f.kind, f.contact, f.closed, self._power(e, f)] for e, f in zip(events, following, strict=True)]
+        return np.array(rows, dtype=np.int64)
+
+    def _power(self, begin: ModeChange, end: ModeChange) -> int:
+        """With which power of the time a contact opens that a segment begins and ends at, if it does so from rest; else 0."""
+        if begin.contact != end.contact or not end.is_impact:
+            return 0
+        if not begin.is_impact:
+            return AFTER_RELEASE
+        return 0 if bounces(self.system, begin.contact) else AFTER_IMPACT
+
+    @cached_property
+    def _free(self) -> np.ndarray:
+        """The places of the free coordinates and velocities in the state at the start."""
+        held = {self._run.trace.held[i] for i in range(len(self._run.trace.held)) if self.plan[0, SegmentPlan.ALONG] >> i & 1}
+        free = [i for i in range(self.own) if i not in held]
+        return np.array([*free, *(self.own + i for i in free)], dtype=int)
+
+    @property
+    def size(self) -> int:
+        return len(self._free) + len(self.signature.events)
+
+    def split(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The state at the start, with 0 for what is held, and the phases of the events."""
+        state = np.zeros(2 * self.own)
+        state[self._free] = unknowns[: len(self._free)]
+        return state, unknowns[len(self._free) :]
+
+    def joined(self, state: np.ndarray, phases: np.ndarray) -> np.ndarray:
+        """The unknowns of a state just after the first event, or at phase 0, and of the events' phases."""
+        return np.append(state[self._free], phases)
+
+    def repeated(self, unknowns: np.ndarray) -> np.ndarray:
+        return np.append(unknowns, unknowns[len(self._free) :] + self.closing)
+
+    def alternating(self, direction: np.ndarray) -> np.ndarray:
+        return np.append(direction, -direction[len(self._free) :])
+
+    def impacts(self, unknowns: np.ndarray, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
+        chosen = np.array([event.is_impact for event in self.signature.events], dtype=bool)
+        speeds = -np.roll(equations.ends[:, SegmentEnd.RATE], 1)[: len(chosen)]
+        return self.split(unknowns)[1][chosen], speeds[chosen]
+
+    def touching_speed(self, unknowns: np.ndarray, equations: Equations) -> float:
+        rows = (self.plan[:, SegmentPlan.KIND] == EventCode.IMPACT) & (self.plan[:, SegmentPlan.POWER] == 0)
+        return float((-equations.ends[rows, SegmentEnd.RATE]).min(initial=math.inf))
+
+    def pressing(self, unknowns: np.ndarray, equations: Equations) -> float:
+        """The least of the reactions between closing and release, and of the times between events; below 0 there is no orbit."""
+        assert isinstance(equations, ContactEquations)
+        phases = self.split(unknowns)[1]
+        apart = np.diff(np.append(phases, phases[:1] + self.closing))
+        forces = equations.seen[:, [SegmentLook.FORCE, SegmentLook.PULL, SegmentLook.TAIL]]
+        return float(min(forces.min(), apart.min(initial=math.inf)))
+
+    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, look: bool = False) -> ContactEquations | None:
+        frequency = self.frequency(values)
+        if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
+            return None
+        state, phases = self.split(unknowns)
+        times = (np.append(phases, phases[0] + self.closing) if phases.size else np.array([0.0, self.closing])) / frequency
+        followed = self._followed(self.plan, times, state, values, look)
+        return None if followed is None else self._assembled(state, times, frequency, *followed)
+
+    def carried_along(self, state: np.ndarray, closed: int, times: np.ndarray, values: np.ndarray) -> np.ndarray | None:
+        """The state at the second time of the smooth motion from a state at the first one, with these contacts closed."""
+        followed = self._followed(no_event(closed), times, state, values, False)
+        begin = SegmentEnd.NUMBERS + 4 * self.own
+        return None if followed is None else np.asarray(followed[0][0, begin : begin + 2 * self.own])
+
+    def _followed(
+        self, plan: np.ndarray, times: np.ndarray, state: np.ndarray, values: np.ndarray, look: bool
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+        """What `follow_contact_segments` fills; None where a segment cannot be followed."""
+        parameters = self._values.copy()
+        parameters[self._places] = values
+        env, model = self._run.structure.prepare(parameters, self._records)
+        n, own, width = len(plan), self.own, 2 * self.own + len(self.paths)
+        contacts = np.zeros((len(self._run.trace.held), len(ContactColumn)), dtype=np.int64)
+        contacts[:, ContactColumn.COORDINATE] = self._run.trace.held
+        ends, columns = np.zeros((n, SegmentEnd.NUMBERS + 10 * own)), np.zeros((n, 2 * own + 1, width))
+        maps = np.zeros((n, 2 * own, width))
+        seen = np.zeros((n if look else 0, SegmentLook.MARGINS + max(1, len(self.margins))))
+        done = load_contact_segments()(
+            self._where, self._settings, env, model, contacts, plan, times, state, ends, columns, maps, seen
+        )
+        return None if done < n else (ends, columns, maps, seen)
+
+    def _assembled(
+        self,
+        state: np.ndarray,
+        times: np.ndarray,
+        frequency: float,
+        ends: np.ndarray,
+        columns: np.ndarray,
+        maps: np.ndarray,
+        seen: np.ndarray,
+    ) -> ContactEquations:
+        """Residual and derivatives, by the chain rule from segment to segment.
+
+        The columns are the state at the start, the phases, the phase of the first event a period later, and the parameters.
+        """
+        own, free, events = self.own, self._free, len(self.signature.events)
+        first, count = len(free), len(self.paths)
+        end_phase, parameters = first + events, first + events + 1
+        slope = np.zeros((2 * own, parameters + count))
+        slope[free, np.arange(first)] = 1.0
+        guards, rows = np.zeros(events), np.zeros((events, slope.shape[1]))
+        for s in range(len(ends)):
+            start, stop = ends[s, SegmentEnd.NUMBERS :][2 * own : 4 * own], ends[s, SegmentEnd.NUMBERS :][6 * own : 8 * own]
+            before = columns[s, :, : 2 * own] @ slope
+            before[:, parameters:] += columns[s, :, 2 * own :]
+            moved = np.append(-columns[s, :-1, : 2 * own] @ start, ends[s, SegmentEnd.BY_START])
+            rates = np.append(stop, ends[s, SegmentEnd.BY_END])
+            for place, time, by in ((first + s, times[s], moved), (first + s + 1, times[s + 1], rates)):
+                if events:
+                    before[:, place] += by / frequency
+                if FREQUENCY in self.paths:
+                    before[:, parameters + self.paths.index(FREQUENCY)] -= by * time / frequency
+            if not events:
+                slope = before[:-1]
+                break
+            guards[s], rows[s] = ends[s, SegmentEnd.GUARD], before[-1]
+            slope = maps[s, :, : 2 * own] @ before[:-1]
+            slope[:, parameters:] += maps[s, :, 2 * own :]
+        last = SegmentEnd.NUMBERS + (8 if events else 4) * own
+        after = ends[-1, last : last + 2 * own]
+        total = np.vstack([rows, slope[free]])
+        here, there = total[:, :end_phase], np.zeros((first + events, first + events))
+        there[events:, :first] = -np.eye(first)
+        if events:
+            there[:, first] = total[:, end_phase]
+        residual = np.append(guards, (after - state)[free])
+        return ContactEquations(residual, here, there, total[:, parameters:], ends, self._looks(seen), seen, first)
+
+    def _looks(self, seen: np.ndarray) -> np.ndarray:
+        """What is seen along the segments in the places of the other orbits'."""
+        looks = np.full((len(seen), at.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
+        looks[:, [at.TOP, at.BOTTOM]] = seen[:, [SegmentLook.TOP, SegmentLook.BOTTOM]]
+        looks[:, [at.HUMP, at.HUMP_TIME]] = seen[:, [SegmentLook.GAP, SegmentLook.GAP + 1]]
+        looks[:, at.CROSSINGS] = 0.0
+        looks[:, at.LEAST_MARGIN :] = seen[:, SegmentLook.MARGINS :]
+        return looks
+
+    def within(self, unknowns: np.ndarray, equations: Equations, values: np.ndarray) -> tuple[np.ndarray, float]:
+        """A state within the longest segment, and its time; of an orbit without events that at phase 0."""
+        state, phases = self.split(unknowns)
+        if not phases.size:
+            return self._with_held(state, self.signature.closed, values), 0.0
+        times = np.append(phases, phases[0] + self.closing) / self.frequency(values)
+        longest = int(np.argmax(np.diff(times)))
+        begin = equations.ends[longest, SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + 2 * self.own]
+        part = times[longest] + np.array([0.0, WITHIN]) * (times[longest + 1] - times[longest])
+        there = self.carried_along(begin, int(self.plan[longest, SegmentPlan.ALONG]), part, values)
+        assert there is not None, "an orbit's own segments can be followed"
+        return there, float(part[1])
+
+    def _with_held(self, state: np.ndarray, closed: int, values: np.ndarray) -> np.ndarray:
+        contacts = self.at(values).model.contacts
+        for i, contact in enumerate(contacts):
+            if closed >> i & 1:
+                state[self._run.trace.held[i]] = float(contact.position)
+        return state
+
+
+def bounces(system: System, contact: int) -> bool:
+    """Whether an impact on a contact has a restitution."""
+    return float(system.impact.restitution_matrix(system.model)[contact][contact]) > 0.0
+
+
+def no_event(closed: int) -> np.ndarray:
+    """The plan of one segment without an event at its end."""
+    return np.array([[closed, -1, -1, closed, 0]], dtype=np.int64)
+
+
+def problem_of(system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> Problem:
+    """The problem of a signature of a system, with one contact or with several."""
+    return (ContactProblem if system.model.contacts else Problem)(system, signature, paths, tol)

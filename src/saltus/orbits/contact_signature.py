@@ -1,0 +1,96 @@
+"""The signature of a motion with several contacts, and the orbit with it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import MotionError
+from saltus.flow import EventKind, Motion, simulate
+from saltus.orbits.contact_problem import ContactProblem
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.signature import ModeChange, Signature
+
+
+@dataclass(frozen=True)
+class ReadingSettings:
+    """How the events of a motion become a signature."""
+
+    together: float = 1e-9  # Events nearer to each other than this share of a forcing period happen at one instant.
+    tol: float = 1e-13  # Tolerance of the motion that is read: Newton's method begins from it.
+
+
+SETTINGS = ReadingSettings()
+
+
+def solved_from(base: ContactProblem, state: dict[str, Any], periods: int, iterations: int) -> PeriodicOrbit | None:
+    """The orbit with the signature of a motion over `periods` forcing periods from a state, by Newton's method.
+
+    Raises:
+        MotionError: a motion that stays at its contacts for good, or whose events have no equations yet.
+    """
+    motion = simulate(base.system, **state, periods=2 * periods, tol=SETTINGS.tol)
+    if motion.limit is not None:
+        return None
+    problem, unknowns = read_signature(base, motion, periods)
+    if not problem.size:
+        raise MotionError("the motion comes to rest with all coordinates held at contacts for good, which is no orbit to follow")
+    return PeriodicOrbit.near(problem, unknowns, problem.values, iterations=iterations)
+
+
+def read_signature(base: ContactProblem, motion: Motion, periods: int) -> tuple[ContactProblem, np.ndarray]:
+    """The problem with the signature of a motion that was followed for twice its `periods`, and its unknowns along the motion.
+
+    The events are those of a stretch of `periods` that begins in the middle between two events.
+    """
+    period = base.system.load.period
+    assert period is not None
+    changes = _mode_changes(base, motion, SETTINGS.together * period)
+    times = np.array([time for time, _ in changes])
+    start, length = motion.start, periods * period
+    bounds = np.concatenate([[start], times[times < start + length], [start + length]])
+    longest = int(np.argmax(np.diff(bounds)))
+    begin = bounds[longest : longest + 2].mean()
+    chosen = [(time, change) for time, change in changes if begin <= time < begin + length]
+    events = tuple(change for _, change in chosen)
+    signature = Signature((), periods, events=events, closed=0 if events else motion.side - 1)
+    problem = base.with_signature(signature)
+    assert isinstance(problem, ContactProblem)
+    first = chosen[0][0] if chosen else motion.start
+    position, velocity = motion.at(first)
+    after = np.append(np.atleast_1d(position), np.atleast_1d(velocity))
+    phases = np.array([time for time, _ in chosen]) * base.frequency(base.values)
+    return problem, problem.joined(after, phases)
+
+
+def _mode_changes(base: ContactProblem, motion: Motion, together: float) -> list[tuple[float, ModeChange]]:
+    """The events at which the contacts change, each with its time and the contacts that are closed after it.
+
+    Raises:
+        MotionError: events for which orbits have no equations.
+    """
+    names = [contact.name for contact in base.system.model.contacts]
+    changes: list[tuple[float, ModeChange]] = []
+    events: Sequence[Any] = motion.events
+    for event in events:
+        if event.kind is EventKind.HELD:
+            raise MotionError(
+                f"impacts on {event.contact} die away at time {event.time:.6g}: orbits of several contacts in which they do are "
+                "not solved for yet; simulate and sensitivities follow them"
+            )
+        if event.kind not in (EventKind.IMPACT, EventKind.RELEASE):
+            continue
+        if event.contact not in names:
+            raise MotionError(f"{event.contact} act at one instant, {event.time:.6g}: an orbit has no equations for that")
+        is_impact, contact = event.kind is EventKind.IMPACT, names.index(event.contact)
+        if changes and event.time - changes[-1][0] < together:
+            before = changes.pop()
+            if is_impact or before[1].contact != contact:
+                raise MotionError(f"two events at one instant, {event.time:.6g}: an orbit has no equations for that")
+            is_impact = before[1].is_impact
+        closed = int(motion.closed_at(event.time))
+        changes.append((event.time, ModeChange(is_impact, contact, closed)))
+    return changes

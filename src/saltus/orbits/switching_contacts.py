@@ -1,0 +1,173 @@
+"""Beyond the point at which an event of an orbit with several contacts appears or is lost: the signatures on the other side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from saltus.flow import SegmentEnd, SegmentLook, SegmentPlan
+from saltus.orbits.contact_problem import AFTER_RELEASE, ContactEquations, ContactProblem, bounces
+from saltus.orbits.orbit_curve import OrbitPoint
+from saltus.orbits.signature import ModeChange, Signature
+from saltus.orbits.special_point import SpecialKind
+from saltus.orbits.tolerances import TOLERANCES
+
+
+@dataclass(frozen=True)
+class Timed:
+    """An event and its phase."""
+
+    event: ModeChange
+    phase: float
+
+    def leaving(self, closed: int) -> Timed:
+        """The same event with these contacts closed after it."""
+        return replace(self, event=replace(self.event, closed=closed))
+
+
+@dataclass(frozen=True, eq=False)
+class Switching:
+    """An orbit at which an event appears or is lost."""
+
+    point: OrbitPoint
+    problem: ContactProblem
+    equations: ContactEquations
+    events: tuple[Timed, ...]
+
+    @classmethod
+    def at(cls, point: OrbitPoint) -> Switching:
+        """What is known of a point of a curve."""
+        problem, equations = point.orbit.problem, point.solution.equations
+        assert isinstance(problem, ContactProblem)
+        assert isinstance(equations, ContactEquations)
+        phases = problem.split(point.solution.unknowns)[1].tolist()
+        return cls(point, problem, equations, tuple(map(Timed, problem.signature.events, phases)))
+
+    def other_signatures(self) -> Iterator[list[Timed]]:
+        """The events that the orbit may have on the other side, the likely ones first."""
+        yield from self._together()
+        yield from self._without_pull()
+        yield from self._without_speed()
+        yield from self._touching()
+
+    def _together(self) -> Iterator[list[Timed]]:
+        """Where two events that follow one another have come together."""
+        events, n = list(self.events), len(self.events)
+        for i in range(n if n > 1 else 0):
+            j = (i + 1) % n
+            first, second = events[i], events[j]
+            apart = second.phase - first.phase + (self.problem.closing if j == 0 else 0.0)
+            if abs(apart) > TOLERANCES.switching:
+                continue
+            one, other = first.event, second.event
+            if one.contact != other.contact:
+                before = events[i - 1].event.closed
+                yield _changed(events, {i: None, j: second})  # what was released is opened by the impact
+                swapped = before ^ (1 << other.contact) if not other.is_impact or other.closed >> other.contact & 1 else before
+                yield _changed(events, {i: replace(second, phase=first.phase).leaving(swapped), j: first.leaving(other.closed)})
+            elif one.is_impact:  # it is closed for no time, or opens and closes at once
+                yield _changed(events, {i: first.leaving(other.closed), j: None})
+            else:
+                yield _changed(events, {i: None, j: None})
+
+    def _without_pull(self) -> Iterator[list[Timed]]:
+        """Where a contact is closed without a reaction at first, opens without a pull, or has lost its reaction at the end."""
+        events, seen = list(self.events), self.equations.seen
+        for s in range(len(events)):
+            here = events[s]
+            if abs(seen[s, SegmentLook.PULL]) < TOLERANCES.touch:
+                contact = int(seen[s, SegmentLook.PULL + 1])
+                changed = here.event.closed ^ (1 << contact)
+                again = ModeChange(bool(here.event.closed >> contact & 1), contact, here.event.closed)
+                yield [*events[:s], here.leaving(changed), replace(here, event=again), *events[s + 1 :]]
+            if abs(seen[s, SegmentLook.TAIL]) < TOLERANCES.touch:
+                contact, following = int(seen[s, SegmentLook.TAIL + 1]), events[(s + 1) % len(events)]
+                phase = following.phase + (self.problem.closing if s + 1 == len(events) else 0.0)
+                release = ModeChange(False, contact, here.event.closed & ~(1 << contact))
+                yield [*events[: s + 1], Timed(release, phase), *events[s + 1 :]]
+
+    def _without_speed(self) -> Iterator[list[Timed]]:
+        """Without an impact that has lost its speed."""
+        for i, timed in enumerate(self.events):
+            slow = abs(self.equations.ends[i - 1, SegmentEnd.RATE]) < TOLERANCES.touch
+            if timed.event.is_impact and slow and timed.event.closed == self.events[i - 1].event.closed:
+                yield _changed(list(self.events), {i: None})
+
+    def _touching(self) -> Iterator[list[Timed]]:
+        """With the impact without speed where a gap touches 0, or the excursion of no duration where a reaction does."""
+        events, seen = list(self.events), self.equations.seen
+        frequency = self.problem.frequency(self.point.solution.values)
+        for place in (SegmentLook.GAP, SegmentLook.FORCE):
+            s = int(np.argmin(seen[:, place]))
+            if abs(seen[s, place]) > TOLERANCES.touch:
+                continue
+            contact, closed = int(seen[s, place + 2]), int(self.problem.plan[s, SegmentPlan.ALONG])
+            phase, at = float(seen[s, place + 1]) * frequency, s + 1 if events else 0
+            new = [Timed(ModeChange(True, contact, closed), phase)]
+            if place == SegmentLook.FORCE:
+                if bounces(self.problem.system, contact):
+                    continue  # its closings bounce, and die away: no equations yet
+                new = [Timed(ModeChange(False, contact, closed & ~(1 << contact)), phase), *new]
+            yield [*events[:at], *new, *events[at:]]
+
+    def problem_with(self, events: list[Timed]) -> tuple[ContactProblem, np.ndarray] | None:
+        """The problem with these events and its unknowns at this orbit; None where its motion cannot be followed."""
+        closed = int(self.problem.plan[0, SegmentPlan.ALONG])
+        changes, period = tuple(timed.event for timed in events), self.problem.signature.period
+        signature = Signature((), period, events=changes, closed=0 if events else closed)
+        other = self.problem.with_signature(signature)
+        assert isinstance(other, ContactProblem)
+        phases = np.array([timed.phase for timed in events])
+        state = self._state_after(events[0]) if events else self._state_at(0.0)
+        return None if state is None else (other, other.joined(state, phases))
+
+    def _state_after(self, first: Timed) -> np.ndarray | None:
+        """The state of the orbit just after one of its events on the other side."""
+        n = 2 * self.problem.own
+        for timed, end in zip(self.events, self.equations.ends, strict=False):
+            same = (timed.event.is_impact, timed.event.contact) == (first.event.is_impact, first.event.contact)
+            if same and abs(timed.phase - first.phase) < TOLERANCES.switching:
+                return np.asarray(end[SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + n])
+        return self._state_at(first.phase)
+
+    def _state_at(self, phase: float) -> np.ndarray | None:
+        """The state at a phase of an orbit without events; of one with a single event that at the next phase 0."""
+        frequency, n = self.problem.frequency(self.point.solution.values), 2 * self.problem.own
+        begin = self.events[0].phase if self.events else 0.0
+        end = phase if not self.events else 2.0 * np.pi * np.ceil(begin / (2.0 * np.pi))
+        closed, start = int(self.problem.plan[0, SegmentPlan.ALONG]), self.equations.ends[0, SegmentEnd.NUMBERS :][:n]
+        return self.problem.carried_along(start, closed, np.array([begin, end]) / frequency, self.point.solution.values)
+
+
+Cycle = tuple[ModeChange, ...]
+
+
+def cycle_of(signature: Signature) -> Cycle:
+    """The events of a signature, from the same one on wherever it begins."""
+    events = signature.events
+    return min((events[i:] + events[:i] for i in range(len(events))), key=repr, default=())
+
+
+def begins_excursion(point: OrbitPoint) -> bool:
+    """Whether an excursion of no duration from a release begins at a point, where multipliers and tangents are of no orbit."""
+    problem = point.orbit.problem
+    if not isinstance(problem, ContactProblem) or not problem.signature.events:
+        return False
+    phases = problem.split(point.solution.unknowns)[1]
+    apart = np.diff(np.append(phases, phases[:1] + problem.closing))
+    return bool((apart[problem.plan[:, SegmentPlan.POWER] == AFTER_RELEASE] < TOLERANCES.switching).any())
+
+
+def _changed(events: list[Timed], new: dict[int, Timed | None]) -> list[Timed]:
+    """Events with some of them replaced, or left out."""
+    both = [new.get(i, timed) for i, timed in enumerate(events)]
+    return [timed for timed in both if timed is not None]
+
+
+def contact_change(point: OrbitPoint) -> SpecialKind:
+    """Whether an event of an orbit appears or is lost at a point by a grazing, or by a release or a closing."""
+    orbit, here = point.orbit, Switching.at(point)
+    joined = next(iter(here._together()), None) is not None
+    return SpecialKind.SW if joined or orbit.pressing <= min(orbit.slowest, orbit.clearance) else SpecialKind.GR

@@ -1,0 +1,107 @@
+"""Verdicts on motions with several contacts: rest, orbits, chaos; their exponents."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.attractors import classify, lyapunov_spectrum
+from saltus.errors import ParameterError
+from saltus.systems import Contact, Harmonic, Load, Model, NewtonImpact, System, TwoLayer
+
+
+def layers(H, m=0.1, e=(0.0, 0.0), transfer=0.0):
+    return System(
+        model=TwoLayer(beta0=math.radians(80), damping=0.1, mass_ratio=m),
+        load=Load(frequency=1.0, vertical=-0.5, horizontal=Harmonic(amplitude=H)),
+        impact=NewtonImpact(e=e, transfer=transfer),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeRoom(Model):
+    """x'' = F(tau) between walls at -1 and 1."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    sides: ClassVar[tuple[int, ...]] = ()
+
+    @property
+    def contacts(self):
+        return (Contact(name="left", coordinate="x", position=-1.0), Contact(name="right", coordinate="x", sign=-1, position=1.0))
+
+    def force(self, t, x, velocity, load):
+        return load.force(t)
+
+
+CHAOTIC = System(
+    model=FreeRoom(), load=Load(frequency=1.0, force=Harmonic(amplitude=2.0, phase=math.pi / 2)), impact=NewtonImpact(e=0.9)
+)
+
+
+def test_a_settled_motion_is_on_the_orbit_that_find_orbit_finds():
+    for system in (layers(0.3), layers(0.3, transfer=0.6), layers(0.6, m=0.0)):
+        verdict = classify(system, theta_1=0.1, theta_2=0.0, periods=300, transient=100)
+        orbit = saltus.find_orbit(system, theta_1=0.1, theta_2=0.0)
+        assert (str(verdict.kind), verdict.period) == ("periodic", orbit.period)
+        assert verdict.orbit.amplitude == pytest.approx(orbit.amplitude, abs=1e-10)
+        assert verdict.evidence["defect"] < 1e-10
+
+
+def test_small_loads_leave_both_layers_closed():
+    verdict = classify(layers(0.01), theta_1=0.01, theta_2=-0.02, velocity=(0.0, 0.1), periods=300, transient=100)
+    assert str(verdict.kind) == "rest"
+    assert (verdict.state["theta_1"], verdict.state["theta_2"]) == (0.0, 0.0)
+
+
+def test_the_exponents_of_an_orbit_are_those_of_its_multipliers_and_closed_contacts_take_directions_away():
+    orbit = saltus.find_orbit(layers(0.2, m=0.0, transfer=1.0), theta_1=0.1, theta_2=0.0)
+    (first, second), velocity = orbit.state
+    found = lyapunov_spectrum(
+        orbit.system, theta_1=first, theta_2=second, velocity=velocity, periods=128, transient=0, two_trajectories=False
+    )
+    expected = np.log(np.abs(orbit.multipliers[:2])) / orbit.duration
+    np.testing.assert_allclose(found.values[:2], expected, rtol=0, atol=1e-4)
+    assert (found.values[2:] == -np.inf).all()
+
+
+def test_chaos_between_two_walls_has_the_exponent_of_two_neighbouring_motions():
+    verdict = classify(CHAOTIC, x=0.1, velocity=0.5, periods=600, transient=100)
+    assert str(verdict.kind) == "chaotic"
+    assert verdict.evidence["companions_settled"] == 0
+    state, growth, apart = {"x": 0.1, "velocity": 0.5}, [], 1e-8
+    direction = np.array([apart, 0.0])
+    for _ in range(300):
+        one = saltus.simulate(CHAOTIC, **state, periods=1, dense=False)
+        x = float(np.clip(state["x"] + direction[0], -1.0, 1.0))
+        other = saltus.simulate(CHAOTIC, x=x, velocity=state["velocity"] + direction[1], periods=1, dense=False)
+        change = np.array([other.x - one.x, other.velocity - one.velocity])
+        growth.append(math.log(np.linalg.norm(change) / apart))
+        direction = change * (apart / np.linalg.norm(change))
+        state = {"x": one.x, "velocity": one.velocity}
+    mean, spread = np.mean(growth[20:]), np.std(growth[20:]) / math.sqrt(len(growth) - 20)
+    exponent, error = verdict.evidence["largest_exponent"], verdict.evidence["largest_exponent_error"]
+    assert abs(mean / (2 * math.pi) - exponent) < 3 * math.hypot(spread / (2 * math.pi), error / 2)
+
+
+def test_an_orbit_whose_impacts_die_away_is_undecided_by_name():
+    verdict = classify(layers(0.3, e=(0.4, 0.4)), theta_1=0.1, theta_2=0.0, periods=300, transient=100)
+    assert str(verdict.kind) == "undecided"
+    assert "it repeats itself" in verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (lambda: classify(layers(0.3), theta=0.1), "theta_1=..., theta_2=... and velocity=..., got theta"),
+        (lambda: classify(layers(0.3), theta_1=0.1, theta_2=0.0, velocity=(0.1,)), "velocity must have 2 value(s)"),
+        (lambda: lyapunov_spectrum(layers(0.3), theta_1=0.1, theta_2=0.0), "lyapunov_spectrum is for models with one contact"),
+    ],
+)
+def test_what_has_no_meaning_is_refused_by_name(ask, words):
+    with pytest.raises(ParameterError) as refused:
+        ask()
+    assert words in str(refused.value)

@@ -1,0 +1,263 @@
+"""Periodic orbits with several contacts: against closed forms, the reduced model, simulation, and through their switchings."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.errors import MotionError, ParameterError
+from saltus.orbits import SpecialKind, defects, orbits_of
+from saltus.systems import (
+    Contact,
+    Harmonic,
+    Load,
+    Metainterface,
+    Model,
+    NewtonImpact,
+    System,
+    TwoLayer,
+    VelocityReduction,
+    register,
+)
+
+BETA80 = math.radians(80)
+H = "load.horizontal.amplitude"
+
+
+def layers(H=0.2, V=-0.5, W=1.0, transfer=0.0, e=(0.0, 0.0), m=0.0, C=0.1):
+    return System(
+        model=TwoLayer(beta0=BETA80, damping=C, mass_ratio=m),
+        load=Load(frequency=W, vertical=V, horizontal=Harmonic(amplitude=H)),
+        impact=NewtonImpact(e=e, transfer=transfer),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoomOscillator(Model):
+    """x'' = F(tau) - c x' - k x for -d <= x <= d."""
+
+    stiffness: float = 0.2
+    damping: float = 0.0
+    room: float = 1.0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    sides: ClassVar[tuple[int, ...]] = ()
+
+    @property
+    def contacts(self):
+        return (
+            Contact(name="left", coordinate="x", position=-self.room),
+            Contact(name="right", coordinate="x", sign=-1, position=self.room),
+        )
+
+    def force(self, t, x, velocity, load):
+        return load.force(t) - self.damping * velocity - self.stiffness * x
+
+
+def room(A=0.8, W=1.0, e=0.7, **numbers):
+    return System(
+        model=RoomOscillator(**numbers),
+        load=Load(frequency=W, force=Harmonic(amplitude=A, phase=math.pi / 2)),
+        impact=NewtonImpact(e=e),
+    )
+
+
+def test_between_two_walls_the_symmetric_orbit_is_its_closed_form():
+    """Without a spring: x'' = A cos(W tau), solved in tests/flow/test_contacts.py. The product of its multipliers is e^4.
+
+    The impacts are half a period apart, after each the speed is v; the first wall is left at the phase phi.
+    """
+    A, W, e, d, found = 0.8, 1.0, 0.7, 1.0, 0
+    a = -(1 - e) * W / (2 * e * A)  # sin phi = a v
+    b, c = W * W * d / A, -(W * math.pi / (2 * A)) + math.pi * a / 2  # cos phi = b + c v
+    for v in np.roots([a * a + c * c, 2 * b * c, b * b - 1.0]):
+        phi, half = math.atan2(a * v, b + c * v), math.pi / W
+        s = np.linspace(0.0, half, 200)[1:-1]
+        if v <= 0 or not (np.abs(way(A, W, d, v, phi, s)) < d).all():
+            continue
+        turns = math.floor(-phi / math.pi)
+        s, sign = -(phi + turns * math.pi) / W, (-1) ** turns
+        x, speed = way(A, W, d, v, phi, s), v + A / W * (math.sin(W * s + phi) - math.sin(phi))
+        orbit = saltus.find_orbit(room(A, W, e, stiffness=0.0), x=sign * x, velocity=sign * speed, settle=0, period=1)
+        np.testing.assert_allclose(e * orbit.speeds, v, rtol=0, atol=1e-10)
+        np.testing.assert_allclose((orbit.impact_times * W - phi + 1.0) % math.pi, 1.0, rtol=0, atol=1e-10)
+        first, second, *zeros = orbit.multipliers
+        assert first * second == pytest.approx(e**4, abs=1e-10)
+        assert np.abs(zeros).max() < 1e-12
+        found += 1
+    assert found
+
+
+def way(A, W, d, v, phi, s):
+    """x at a time s after the left wall was left."""
+    return -d + v * s + A / W**2 * (math.cos(phi) - np.cos(W * s + phi)) - A / W * s * math.sin(phi)
+
+
+CASES = {
+    "crossings": (layers(H=0.1, transfer=0.95), {}),
+    "a release before each impact": (layers(H=0.2, transfer=1.0), {}),
+    "slow second impacts": (layers(H=0.5, transfer=0.7, m=0.1), {}),
+    "two walls": (room(), {"x": 0.1, "velocity": 0.5}),
+}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def orbit(request):
+    system, start = CASES[request.param]
+    return saltus.find_orbit(system, **(start or {"theta_1": 0.1, "theta_2": 0.0}))
+
+
+def test_orbits_repeat_and_have_the_multipliers_of_their_motions(orbit):
+    assert orbit.defect < 1e-12
+    assert orbit.admissible
+    start = orbit.start()
+    flow = saltus.sensitivities(orbit.system, **start, periods=orbit.period, tol=1e-14)
+    theirs = np.linalg.eigvals(flow.state)
+    theirs = theirs[np.argsort(-np.abs(theirs))][:2]
+    assert np.abs(np.sort_complex(theirs) - np.sort_complex(orbit.multipliers[:2])).max() < 1e-10
+    assert np.abs(orbit.multipliers[2:]).max(initial=0.0) < 1e-7
+    assert defects([orbit], rounds=3)[0] < 1e-11
+
+
+def test_the_equations_have_the_derivatives_of_their_differences(orbit):
+    paths = ("load.frequency", "impact.transfer", H if "theta_1" in orbit.system.model.coordinates else "load.force.amplitude")
+    problem = type(orbit.problem)(orbit.system, orbit.signature, paths)
+    place = np.append(orbit.solution.unknowns, problem.values) + 1e-3 * np.random.default_rng(1).normal(size=problem.size + 3)
+    place[-2] = 0.5
+
+    def residual(at):
+        return problem.evaluate(at[: problem.size], at[problem.size :]).residual
+
+    step = 1e-5
+    columns = [(residual(place + step * row) - residual(place - step * row)) / (2 * step) for row in np.eye(place.size)]
+    exact = problem.evaluate(place[: problem.size], place[problem.size :]).derivatives()
+    np.testing.assert_allclose(np.array(columns).T, exact, rtol=0, atol=2e-7 * max(1.0, np.abs(exact).max()))
+
+
+def test_where_the_other_layer_stays_closed_orbits_are_those_of_the_reduced_model():
+    full = saltus.find_orbit(layers(H=0.1, transfer=0.95), theta_1=0.1, theta_2=0.0)
+    reduced = System(model=Metainterface(beta0=BETA80, damping=0.1), load=full.system.load, impact=VelocityReduction(0.95))
+    one = saltus.find_orbit(reduced, theta=0.1)
+    assert full.amplitude == pytest.approx(one.amplitude, abs=1e-12)
+    assert full.highest == pytest.approx(one.highest, abs=1e-12)
+    assert full.lowest == pytest.approx(one.lowest, abs=1e-12)
+    mine, theirs = (np.sort_complex(o.multipliers[:2]) for o in (full, one))
+    assert np.abs(mine - theirs).max() < 1e-11
+
+
+def test_the_largest_angles_are_those_of_the_derivation():
+    """0.5694 at H = 0.2 and 1.0161 at 0.5, from an independent simulation (where the reduced model has .5856 and 1.0205)."""
+    for load, angle in ((0.2, 0.5694), (0.5, 1.0161)):
+        assert saltus.find_orbit(layers(H=load, transfer=1.0), theta_1=0.1, theta_2=0.0).amplitude == pytest.approx(
+            angle, abs=6e-5
+        )
+
+
+def test_a_release_appears_where_the_reduced_model_s_reaction_vanishes():
+    full = saltus.find_orbit(layers(H=0.1, transfer=1.0), theta_1=0.1, theta_2=0.0)
+    branch = saltus.continue_orbit(full, H, (0.05, 0.3))
+    reduced = System(model=Metainterface(beta0=BETA80, damping=0.1), load=full.system.load, impact=VelocityReduction(1.0))
+    theirs = saltus.continue_orbit(saltus.find_orbit(reduced, theta=0.1), H, (0.05, 0.3))
+    vanishes = [s.parameter for s in theirs.special if s.kind == "reaction"]
+    assert [s.kind for s in branch.special] == [SpecialKind.SW]
+    assert branch.special[0].parameter == pytest.approx(vanishes[0], abs=1e-10)
+    assert "at one instant" in str(branch.ends[1])  # the impact finds the layer open then, and its transfer does not act
+
+
+@pytest.fixture(scope="module")
+def branch():
+    orbit = saltus.find_orbit(layers(H=0.4, m=0.2), theta_1=0.1, theta_2=0.0)
+    return saltus.continue_orbit(orbit, H, (0.05, 0.8))
+
+
+def test_a_branch_goes_through_its_switchings(branch):
+    """Without restitution and transfer nothing jumps where a release or a closing appears: orbits and multipliers go on."""
+    assert [str(end) for end in branch.ends] == ["bound 0.05", "bound 0.8"]
+    assert {special.kind for special in branch.special} == {SpecialKind.SW}
+    assert len(branch.special) >= 4
+    assert len({orbit.signature.impact_count for orbit in branch.orbits}) >= 3
+    assert max(orbit.defect for orbit in branch.orbits) < 1e-11
+    assert all(orbit.admissible and orbit.residual < 1e-11 for orbit in branch.orbits)
+    for special in branch.special:
+        beside = [branch.at(special.parameter + s * 1e-6)[0] for s in (-1.0, 1.0)]
+        first, second = (np.sort_complex(orbit.multipliers[:2]) for orbit in beside)
+        assert beside[0].signature != beside[1].signature
+        assert np.abs(first - second).max() < 0.02
+        assert beside[0].amplitude == pytest.approx(beside[1].amplitude, abs=1e-5)
+
+
+@pytest.mark.parametrize("load", [0.1, 0.3, 0.55, 0.7])
+def test_a_branch_has_the_orbits_that_motions_settle_on(branch, load):
+    settled = saltus.find_orbit(layers(H=load, m=0.2), theta_1=0.1, theta_2=0.0)
+    found = branch.at(load)
+    assert len(found) == 1
+    assert found[0].amplitude == pytest.approx(settled.amplitude, abs=1e-11)
+    assert found[0].signature.impact_count == settled.signature.impact_count
+
+
+def test_mirror_layers_switch_together():
+    orbit = saltus.find_orbit(layers(H=0.2), theta_1=0.1, theta_2=0.0)
+    both = saltus.continue_orbit(orbit, H, (0.05, 0.8))
+    assert [str(end) for end in both.ends] == ["bound 0.05", "bound 0.8"]
+    assert [special.kind for special in both.special] == [SpecialKind.SW] * 2
+    low, high = (both.at(value)[0].signature for value in (0.1, 0.7))
+    assert (len(low.events), low.impact_count) == (2, 2)
+    assert (len(high.events), high.impact_count) == (6, 4)
+
+
+def test_a_grazing_is_where_the_linear_response_reaches_the_walls():
+    """A / abs(k - W^2 + i c W) = d; beside it the orbit hits both walls, and its branch goes on through the grazing."""
+    A, k, c = 0.8, 0.2, 0.3
+    W = math.sqrt(k - c * c / 2 + math.sqrt((k - c * c / 2) ** 2 - k * k + A * A))
+    orbit = saltus.find_orbit(room(A, W + 0.2, stiffness=k, damping=c), x=0.1, velocity=0.0)
+    assert orbit.signature.impact_count == 0
+    free = saltus.continue_orbit(orbit, "load.frequency", (W - 0.2, W + 0.4))
+    grazing = [special for special in free.special if special.kind == SpecialKind.GR]
+    assert grazing[0].parameter == pytest.approx(W, abs=1e-10)
+
+
+def test_a_branch_and_its_orbits_survive_a_file(branch):
+    again = orbits_of(branch.to_xarray())
+    assert [orbit.signature for orbit in again] == [orbit.signature for orbit in branch.orbits]
+    np.testing.assert_array_equal(again[3].solution.unknowns, branch.orbits[3].solution.unknowns)
+
+
+def test_a_doubled_orbit_begins_at_a_period_doubling():
+    register(RoomOscillator)
+    orbit = saltus.find_orbit(room(A=0.5, W=1.0, e=0.9, stiffness=0.0, damping=0.02), x=0.1, velocity=0.9)
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.3, 2.0))
+    doublings = [special for special in branch.special if special.kind == SpecialKind.PD]
+    assert doublings
+    (doubled,) = saltus.switch_branch(doublings[0], (0.3, 2.0))
+    assert doubled.orbits[2].period == 2 * orbit.period
+    assert doubled.orbits[2].defect < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("ask", "error", "words"),
+    [
+        (
+            lambda: saltus.find_orbit(layers(H=0.3, e=(0.3, 0.3)), theta_1=0.1, theta_2=0.0),
+            MotionError,
+            "die away",
+        ),
+        (
+            lambda: saltus.find_orbit(layers(H=0.01), theta_1=0.001, theta_2=0.0, settle=60),
+            MotionError,
+            "held at contacts for good",
+        ),
+    ],
+)
+def test_what_has_no_equations_is_refused_by_name(ask, error, words):
+    with pytest.raises(error) as refused:
+        ask()
+    assert words in str(refused.value)
+
+
+def test_curves_of_special_points_are_refused_by_name(branch):
+    with pytest.raises(ParameterError):
+        saltus.continue_special(branch.special[0], "load.frequency", (0.9, 1.1))
