@@ -282,13 +282,14 @@ class _BandSearch:
             failed += self._confirm(leaving, 2)
             if not failed:
                 return
-            self._confirm_near(failed, self.settings.near * self.span * 2.0**i)
+            self._confirm_near(failed, self.settings.near * 2**i)
 
-    def _confirm_near(self, failed: list[_Place], reach: float) -> None:
-        """Judge all chaos near values that have turned out to have none as these were judged."""
+    def _confirm_near(self, failed: list[_Place], count: int) -> None:
+        """Judge so much chaos on each side of values that have turned out to have none as these were judged."""
+        chaotic = [place for place in self.places if place.chaotic]
         for care in {place.care for place in failed}:
-            values = np.array([place.value for place in failed if place.care == care])
-            self._confirm((place for place in self.places if np.abs(values - place.value).min() <= reach), care)
+            at = [bisect_left(chaotic, place) for place in failed if place.care == care]
+            self._confirm((place for i in at for place in chaotic[max(0, i - count) : i + count]), care)
 
     def _edges(self) -> list[tuple[_Place, _Place]]:
         """Neighbours of which the first is chaotic and the second is not."""

@@ -31,8 +31,8 @@ class ChaosSettings:
         replace(JUDGEMENT, exposure=100_000, rounds=8),
     )
     every: float = 0.02  # Share of the range in which each band has a value that is judged with care.
-    # Share of the range about a value that fails a careful judgement in which all others are judged so; it doubles every round.
-    near: float = 0.003
+    # Number of values with chaos on each side of one that fails a careful judgement that are judged so then; doubled every round.
+    near: int = 3
     lasting: float = 1000.0  # Mean life, in forcing periods, from which transients beside a band are long.
     confirmations: int = 20  # The largest number of rounds in which edges are located and confirmed.
 
