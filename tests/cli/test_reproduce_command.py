@@ -42,13 +42,13 @@ def test_an_unwritable_folder_is_refused(refused, tmp_path):
 
 
 def test_an_interrupt_leaves_whole_files_only(started, tmp_path):
-    command = [sys.executable, "-m", "saltus", "reproduce", "fig02", "fig04", "-o", tmp_path]
+    command = [sys.executable, "-m", "saltus", "reproduce", "fig04", "fig05", "-o", tmp_path]
     process = started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    while process.stderr.readline() != "paper: fig04\n":
+    while process.stderr.readline() != "paper: fig05\n":
         assert process.poll() is None
-    process.send_signal(signal.SIGINT)  # while fig04, which takes seconds, is being made
+    process.send_signal(signal.SIGINT)  # fig05 is made, and while fig04, which takes seconds, is being made
     _, err = process.communicate(timeout=120)
     assert (process.returncode, err) == (130, "saltus: interrupted; no file was left half-written\n")
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
-    assert any("fig02" in path.name for path in files)
+    assert any("fig05" in path.name for path in files)
     assert not [path for path in files if ".part" in path.name]

@@ -1,6 +1,8 @@
 """What is up to date is left alone; what is missing, changed or interrupted is made again."""
 
 from dataclasses import replace
+from functools import partial
+from operator import itemgetter
 
 import numpy as np
 import pytest
@@ -32,8 +34,9 @@ def measure(data):
 
 
 def figure(**changes):
-    parts = {"name": "fig99", "title": "A line", "caption": "A line.", "compute": compute, "draw": draw, "measure": measure}
-    return PaperFigure(**{**parts, **changes})
+    words = {"name": "fig99", "title": "A line", "caption": "A line.", "module": __name__}
+    parts = {"panels": lambda **given: {"line": partial(compute, **given)}, "join": itemgetter("line")}
+    return PaperFigure(**{**words, **parts, "draw": draw, "measure": measure, **changes})
 
 
 @pytest.fixture(autouse=True)
@@ -114,7 +117,7 @@ def test_other_parameters_make_it_again(tmp_path, registry):
 def test_a_figure_is_out_of_date_by_a_change_in_what_it_uses_and_by_no_other(module, changes, monkeypatch, tmp_path):
     from saltus.paper.figures import fig08
 
-    figure = replace(fig08.FIGURE, compute=fig08.compute, draw=None)
+    figure = replace(fig08.FIGURE, draw=None)
     (tmp_path / "fig08.nc").write_bytes(b"data")
     state.write(figure, tmp_path, [], 1.0)
     assert state.up_to_date(figure, tmp_path)
