@@ -14,7 +14,7 @@ from lazy_loader import attach_stub
 
 from saltus.errors import ParameterError, near
 
-FOR_USERS = ("saltus", "saltus.theory", "saltus.sweep")  # whose functions users call, with arguments of any kind
+FOR_USERS = ("saltus.theory",)  # of which users call every function, beside those that `saltus` itself names
 
 
 def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
@@ -28,7 +28,8 @@ def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[
 
     def get(name: str) -> Any:
         if name.startswith("__") or name in public:
-            return _answering(load(name)) if package in FOR_USERS else load(name)
+            public_here = package in FOR_USERS or name in vars(sys.modules["saltus"]).get("__all__", ())
+            return _answering(load(name)) if public_here else load(name)
         raise AttributeError(f"{package} has no {name!r}; {near(name, public)}")
 
     return get, names, public
@@ -51,6 +52,5 @@ def _answering(found: Any) -> Any:
     from saltus.public_functions import answered
 
     answering = answered(found)
-    vars(answering)["answers"] = True
     setattr(sys.modules[found.__module__], found.__name__, answering)  # pickle looks for it there
     return answering

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count, check_kind
+from saltus.checks import check_count
 from saltus.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -73,9 +73,7 @@ def branch_of(diagram: xarray.DataTree, number: int) -> xarray.Dataset:
     Raises:
         ParameterError: a tree without branches, or of fewer.
     """
-    import xarray
 
-    check_kind("diagram", diagram, xarray.DataTree, source="bifurcation_diagram or open_datatree")
     missing = [name for name in ("branches", *TABLES.values(), "orbits") if name not in diagram.children]
     if missing:
         raise ParameterError(f"diagram must be the tree of a diagram, or of one panel; this one has no {missing[0]!r}", "diagram")

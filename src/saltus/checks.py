@@ -174,16 +174,17 @@ def free_memory() -> float:
     return min(found)
 
 
-def check_kind(name: str, value: Any, *kinds: type, source: str = "") -> None:
-    """Refuse what is of none of the classes; `source` are the functions that return them.
+def check_dataset(
+    dataset: Any, source: str, variables: Iterable[str], attributes: Iterable[str] = (), name: str = "dataset"
+) -> None:
+    """Refuse a dataset without what `source`, the functions that make such ones, puts into it.
 
     Raises:
-        ParameterError: with the name, the first of the classes, the functions and the value.
+        ParameterError: with what it lacks.
     """
-    if not isinstance(value, kinds):
-        wanted = kinds[0].__name__
-        article, returned = "an" if wanted[0].lower() in "aeio" else "a", f", as {source} gives it" if source else ""
-        raise ParameterError(f"{name} must be {article} {wanted}{returned}, got {shown(value)}", name)
+    lacks = [each for each in variables if each not in dataset] + [each for each in attributes if each not in dataset.attrs]
+    if lacks:
+        raise ParameterError(f"{name} must be the dataset of {source}; this one lacks {lacks[0]!r}", name)
 
 
 def check_bounds(bounds: Any) -> tuple[float, float]:

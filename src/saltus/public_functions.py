@@ -1,22 +1,28 @@
-"""The public functions' arguments: refused before anything begins, or answered by their names where they do not fit."""
+"""The public functions' arguments: each of the kind that its annotation says, or answered by its name before anything begins."""
 
 from __future__ import annotations
 
+import builtins
 import functools
 import inspect
+import itertools
 import numbers
 import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, ParamSpec, Protocol, TypeVar, cast
+from typing import Annotated, Any, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 
+from saltus.checks import LIMITS
 from saltus.errors import ParameterError, SaltusError, near, shown
 
 P = ParamSpec("P")
 R = TypeVar("R", covariant=True)
+T = TypeVar("T")
+NUMBER = (float, float | None, int, int | None)
+Numbers = Annotated[Any, "a number or an array of numbers"]  # what the type checker cannot tell, as arrays have many types
 
 
 class Checked(Protocol[P, R]):
@@ -38,33 +44,29 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Check
     """
 
     def decorate(function: Callable[P, R]) -> Checked[P, R]:
-        signature = inspect.signature(function)
-        open_ended = [p.name for p in signature.parameters.values() if p.kind is p.VAR_KEYWORD]
+        open_ended = [p.name for p in inspect.signature(function).parameters.values() if p.kind is p.VAR_KEYWORD]
 
-        def refuse(*given: Any, **named: Any) -> None:
-            bound = bound_arguments(function, given, named)
+        def checked(bound: inspect.BoundArguments) -> None:
             bound.apply_defaults()
             arguments = dict(bound.arguments)
             for name in open_ended:
                 arguments |= arguments.pop(name)
-            answered(check, function)(**arguments)
+            check(**arguments)
+
+        def refuse(*given: Any, **named: Any) -> inspect.BoundArguments:
+            bound = fitting_arguments(function, given, named, checked)
+            checked(bound)
+            return bound
 
         @functools.wraps(function)
         def call(*given: Any, **named: Any) -> R:
-            given = tuple(_kept(value) for value in given)
-            named = {name: _kept(value) for name, value in named.items()}
-            refuse(*given, **named)
-            return function(*given, **named)
+            bound = refuse(*given, **named)
+            return function(*bound.args, **bound.kwargs)
 
-        vars(call)["check"] = refuse
+        vars(call).update(check=refuse, answers=True)
         return cast(Checked[P, R], call)
 
     return decorate
-
-
-def _kept(value: Any) -> Any:
-    """The value, or a tuple of what an iterator yields, which could otherwise be looked at only once."""
-    return tuple(value) if isinstance(value, Iterator) else value
 
 
 def bound_arguments(function: Callable[..., Any], given: tuple[Any, ...], named: dict[str, Any]) -> inspect.BoundArguments:
@@ -73,101 +75,194 @@ def bound_arguments(function: Callable[..., Any], given: tuple[Any, ...], named:
     Raises:
         ParameterError: one is unknown (with the near names), missing, or given twice.
     """
-    signature = inspect.signature(function)
+    signature = _signature(function)
     try:
         return signature.bind(*given, **named)
     except TypeError as error:
-        known = signature.parameters
-        unknown = [name for name in named if name not in known]
-        if unknown and not any(p.kind is p.VAR_KEYWORD for p in known.values()):
-            sentence, argument = f"has no argument {unknown[0]!r:.40}; {near(unknown[0], known)}", unknown[0]
+        sentence, known = str(error), signature.parameters
+        wrong = next((name for name in named if name not in known), None)
+        if wrong is not None and not any(p.kind is p.VAR_KEYWORD for p in known.values()):
+            sentence = f"has no argument {wrong!r:.40}; {near(wrong, [name for name in known if name != 'self'])}"
         else:
-            sentence, argument = str(error), None
-        raise ParameterError(f"{function.__name__}() {sentence}", argument) from None
+            wrong = next((name for name in known if sentence.endswith(repr(name))), None)  # missing, or given twice
+        owner, _, own = function.__qualname__.rpartition(".")
+        name = owner.rpartition(".")[2] if own == "__init__" else own
+        raise ParameterError(f"{name}() {sentence}", wrong) from None
 
 
-def answered(function: Callable[P, R], described: Callable[..., Any] | None = None) -> Callable[P, R]:
-    """The function, which answers arguments of a wrong kind with a ParameterError that names them.
+def answered(function: Callable[P, R]) -> Callable[P, R]:
+    """The function, which refuses arguments of a wrong kind by their names before it begins."""
 
-    Only where something else than an error of saltus is raised are the arguments compared with their types (those of
-    `described`, if that is another function), so that a call that fits costs nothing, and a mistake of saltus stays one.
-    """
-    described = described or function
+    def made(bound: inspect.BoundArguments) -> object:
+        return function(*bound.args, **bound.kwargs)
+
+    refuses = made if function.__name__ == "__init__" else None  # anything else may compute for long
 
     @functools.wraps(function)
     def call(*given: P.args, **named: P.kwargs) -> R:
-        try:
-            return function(*given, **named)
-        except SaltusError:
-            raise
-        except (TypeError, AttributeError, ValueError, LookupError, ArithmeticError, RecursionError) as error:
-            problem = misfit(described, given, named)
-            if problem is None:
-                raise
-            raise problem from error
+        bound = fitting_arguments(function, given, named, refuses)
+        return function(*bound.args, **bound.kwargs)
 
+    vars(call)["answers"] = True
     return call
 
 
-def misfit(function: Callable[..., Any], given: tuple[Any, ...], named: dict[str, Any]) -> ParameterError | None:
-    """What is wrong with the first argument of a call that is not of the type of its annotation, or None."""
-    try:
-        bound = bound_arguments(function, given, named)
-    except ParameterError as error:
-        return error
+def answering(*names: str) -> Callable[[type[T]], type[T]]:
+    """A decorator of classes: the methods of these names, `__init__` among them, answer as public functions do."""
+
+    def decorate(cls: type[T]) -> type[T]:
+        for name in names:
+            found = inspect.getattr_static(cls, name)
+            if isinstance(found, classmethod):
+                setattr(cls, name, classmethod(answered(found.__func__)))
+            else:
+                setattr(cls, name, answered(found))
+        return cls
+
+    return decorate
+
+
+def fitting_arguments(
+    function: Callable[..., Any], given: tuple[Any, ...], named: dict[str, Any], refuses: Callable[..., object] | None
+) -> inspect.BoundArguments:
+    """The arguments of a call by their names, each of the kind that its annotation says.
+
+    What iterators yield comes as tuples, since it could be looked at only once, and a whole number that is a float as an int.
+    What does not fit may be refused by the function's own checks, which `refuses` calls if there is such, as they know more.
+
+    Raises:
+        ParameterError: one is unknown, missing or of another kind, with its name.
+    """
+    bound, hints = bound_arguments(function, given, named), _hints(function)
     for name, value in bound.arguments.items():
-        parameter = inspect.signature(function).parameters[name]
-        hint = _hint(function, parameter.annotation)
-        values = {name: value}
-        if parameter.kind is parameter.VAR_KEYWORD:
-            values = value
-        elif parameter.kind is parameter.VAR_POSITIONAL:
-            values = {f"{name}[{i}]": each for i, each in enumerate(value)}
-        for key, each in values.items():
-            if not fits(each, hint):
-                return ParameterError(f"{key} must be {in_words(hint)}, got {shown(each)}", key)
-    return None
+        if isinstance(value, Iterator):
+            bound.arguments[name] = tuple(itertools.islice(value, LIMITS.count + 1))
+        elif isinstance(value, np.ndarray) and value.ndim == 0 and hints.get(name) in NUMBER:
+            bound.arguments[name] = value = value.item()
+        if isinstance(value, float) and value.is_integer() and hints.get(name) in NUMBER[2:]:
+            bound.arguments[name] = int(value)
+    for name, value in bound.arguments.items():
+        problem = _misfit(value, hints[name], refuses is None) if name in hints else None
+        if problem is not None:
+            if refuses is not None:
+                _refused_in_own_words(refuses, bound)
+            raise ParameterError(f"{name} must be {problem}, got {shown(value)}", name)
+    return bound
 
 
-def _hint(function: Callable[..., Any], annotation: Any) -> Any:
-    """The type that an annotation stands for; Any where it is known to the type checker alone."""
-    if not isinstance(annotation, str):
-        return Any if annotation is inspect.Parameter.empty else annotation
+def _misfit(value: Any, hint: Any, limited: bool) -> str | None:
+    """What a value must be and is not, if that is so; where it is `limited`, its square must be a number."""
+    if not fits(value, hint):
+        return in_words(hint)
+    limited = limited and hint in (float, float | None) and value is not None
+    return f"at most {LIMITS.value:g} in size" if limited and not _is_small(value) else None
+
+
+def _refused_in_own_words(refuses: Callable[..., object], bound: inspect.BoundArguments) -> None:
+    """Call what refuses a call; of its errors the sentences of saltus go on."""
     try:
-        return eval(annotation, inspect.unwrap(function).__globals__)  # saltus's own text
+        refuses(bound)
+    except SaltusError:
+        raise
     except Exception:
-        return Any
+        return
+
+
+@functools.cache
+def _hints(function: Callable[..., Any]) -> dict[str, Any]:
+    """The types that a function's annotations stand for; its `**named` it checks itself, as their names may be wrong."""
+    names = _Names(inspect.unwrap(function).__globals__)
+    checked = (p for p in _signature(function).parameters.values() if p.kind is not p.VAR_KEYWORD)
+    written = {p.name: p.annotation for p in checked if p.annotation is not p.empty}
+    return {name: eval(hint, {}, names) if isinstance(hint, str) else hint for name, hint in written.items()}  # saltus's own text
+
+
+_signature = functools.cache(inspect.signature)
+
+
+class _NamedOnly(type):
+    """A class that is known by its name, as the type checker alone imports it."""
+
+    def __getattr__(cls, name: str) -> type:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return _NamedOnly(name, (), {})
+
+    def __instancecheck__(cls, value: Any) -> bool:
+        return cls.__name__ in (kind.__name__ for kind in type(value).__mro__)
+
+
+class _Names(dict[str, Any]):
+    """The names that a file's annotations may use."""
+
+    def __missing__(self, name: str) -> Any:
+        return getattr(builtins, name, None) or _NamedOnly(name, (), {})
 
 
 def fits(value: Any, hint: Any) -> bool:
     """Whether a value is of a type; of what cannot be told it is."""
-    origin, parts = typing.get_origin(hint), typing.get_args(hint)
-    if hint in (Any, object) or isinstance(hint, TypeVar):
+    kind, parts = typing.get_origin(hint) or hint, typing.get_args(hint)
+    if kind in (Any, object):
         return True
-    if origin in (typing.Union, types.UnionType):
+    if kind is Annotated:
+        return _is_numeric(value)
+    if kind in (typing.Union, types.UnionType):
         return any(fits(value, part) for part in parts)
-    if hint is None or hint is type(None):
+    if kind in (None, type(None)):
         return value is None
-    if hint in (float, int):
-        return isinstance(value, numbers.Real) or (
-            isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu"
-        )
-    if origin in (Iterable, np.ndarray, list, tuple) or hint is np.ndarray:
-        if isinstance(value, np.ndarray) and value.ndim == 0 and origin in (Iterable, list, tuple):
-            return False
-        numeric = hint is np.ndarray or origin is np.ndarray or (parts[:1] == (float,))
-        return not isinstance(value, (str, bytes)) and isinstance(value, Iterable) and not (numeric and not _is_numeric(value))
-    if isinstance(origin, type) or isinstance(hint, type):
-        kind = origin or hint
-        return callable(value) if kind is Callable else isinstance(value, kind)
-    return True
+    if kind in (float, int):
+        value = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
+        whole = kind is float or isinstance(value, numbers.Integral) or (isinstance(value, float) and value.is_integer())
+        return isinstance(value, numbers.Real) and not isinstance(value, bool) and whole
+    if kind is Callable:
+        return _can_be_called(value, parts[0] if parts else ...)
+    if kind is np.ndarray:
+        return _is_numeric(value) and np.ndim(value) > 0
+    if kind in (dict, Mapping):
+        return isinstance(value, Mapping) and (not parts or all(fits(each, parts[1]) for each in value.values()))
+    if kind in (Iterable, list, tuple):
+        return _is_iterable_of(value, parts[0] if parts else Any)
+    return isinstance(value, kind) if isinstance(kind, type) else True
+
+
+def _is_iterable_of(value: Any, part: Any) -> bool:
+    """Whether a value can be gone through and what it yields is of a type; an array yields what its first entry is."""
+    if isinstance(value, (bytes, Mapping)) or (isinstance(value, str) and part is not str):
+        return False
+    if part is float and not isinstance(value, (set, frozenset)):
+        return _is_numeric(value) and np.ndim(value) > 0
+    if not isinstance(value, Iterable) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        return False
+    return all(fits(each, part) for each in (value[:1] if isinstance(value, np.ndarray) else value))
 
 
 def _is_numeric(value: Any) -> bool:
     try:
-        return bool(np.isfinite(np.asarray(value, dtype=float)).all())
-    except (TypeError, ValueError, OverflowError):
+        return np.asarray(value).dtype.kind in "fiu"
+    except Exception:  # arrays of several shapes, one for each coordinate; and a user's own class may raise anything
+        return isinstance(value, (tuple, list)) and all(_is_numeric(each) for each in value)
+
+
+def _is_small(value: Any) -> bool:
+    """Whether the finite ones of numbers can be squared."""
+    try:
+        array = np.abs(np.asarray(value, dtype=float))
+    except (TypeError, ValueError, OverflowError):  # arrays of several shapes, or a whole number beyond all floats
+        return isinstance(value, (tuple, list)) and all(_is_small(each) for each in value)
+    return not ((array > LIMITS.value) & np.isfinite(array)).any()
+
+
+def _can_be_called(value: Any, arguments: Any) -> bool:
+    """Whether a value is a function that takes so many arguments, as far as it tells."""
+    if not callable(value) or isinstance(value, type):
         return False
+    try:
+        inspect.signature(value).bind(*(() if arguments is ... else arguments))
+    except TypeError:
+        return arguments is ...
+    except ValueError:  # it has no signature
+        return True
+    return True
 
 
 WORDS: dict[Any, str] = {
@@ -178,19 +273,32 @@ WORDS: dict[Any, str] = {
     Path: "a path",
     np.ndarray: "an array of numbers",
     Mapping: "a dict",
+    dict: "a dict",
     type(None): "None",
-    Callable: "a function",
+}
+SOURCES = {  # what gives an object of a class
+    "PeriodicOrbit": "find_orbit or search_orbits",
+    "SpecialPoint": "branch.special",
+    "Attractors": "find_attractors",
 }
 
 
 def in_words(hint: Any) -> str:
     """A type as a sentence names it."""
-    origin, parts = typing.get_origin(hint), typing.get_args(hint)
-    if origin in (typing.Union, types.UnionType):
-        return " or ".join(dict.fromkeys(in_words(part) for part in parts))
-    if (origin or hint) in WORDS:
-        return WORDS[origin or hint]
-    if origin in (Iterable, list, tuple):
-        return "finite numbers" if parts[:1] == (float,) else "a list or a tuple"
-    name = getattr(origin or hint, "__name__", "something else")
-    return f"{'an' if name[0].lower() in 'aeio' else 'a'} {name}"
+    kind, parts = typing.get_origin(hint) or hint, typing.get_args(hint)
+    if kind is Annotated:
+        return str(hint.__metadata__[0])
+    if kind in (typing.Union, types.UnionType):
+        return " or ".join(dict.fromkeys(in_words(part) for part in parts if part is not type(None)))  # which is seldom meant
+    if kind is Callable:
+        count = len(parts[0]) if parts and parts[0] is not ... else 0
+        return f"a function of {count} arguments" if count else "a function"
+    if kind in WORDS:
+        return WORDS[kind]
+    if kind is tuple and parts == (float, float):
+        return "two numbers"
+    if kind in (Iterable, list, tuple):
+        return {float: "a list of numbers", str: "a list of texts"}.get(parts[0] if parts else Any, "a list or a tuple")
+    name = getattr(kind, "__name__", "something else")
+    source = f", as {SOURCES[name]} gives it" if name in SOURCES else "(model=..., load=..., impact=...)" * (name == "System")
+    return f"{'an' if name[0].lower() in 'aeio' else 'a'} {name}{source}"

@@ -125,7 +125,7 @@ def test_it_refuses_records_and_what_is_no_system():
     record = saltus.Record(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
     with pytest.raises(ParameterError, match="is a Record"):
         excludes_tori(under(horizontal=record))
-    with pytest.raises(ParameterError, match="takes a System"):
+    with pytest.raises(ParameterError, match="system must be a System"):
         excludes_tori("a system")
 
 

@@ -308,7 +308,7 @@ def test_mistakes_are_refused_in_one_sentence(mistake):
 
 @pytest.mark.parametrize("system", [None, 3, SYSTEM.model, "Metainterface"])
 def test_what_is_no_system_is_refused(system):
-    with pytest.raises(ParameterError, match="simulate_many takes a System"):
+    with pytest.raises(ParameterError, match="system must be a System"):
         run(system)
 
 

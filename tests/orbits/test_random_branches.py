@@ -104,5 +104,5 @@ def test_three_pairs_of_special_points_that_lie_within_one_step_each():
 @pytest.mark.parametrize("step", [0.0, -0.1, float("nan"), float("inf"), 1e6, 1e-12, "0.1", None])
 def test_steps_that_lead_nowhere_are_refused(step):
     orbit = find_orbit(forced(), theta=0.3, parameters=(FREQUENCY,))
-    with pytest.raises(ParameterError, match=r"^step must .*\[1e-06, 1\]"):
+    with pytest.raises(ParameterError, match=r"^step must be a number|^step must be finite|^step must lie in \[1e-06, 1\]"):
         continue_orbit(orbit, FREQUENCY, (0.9, 1.1), step=step)

@@ -154,5 +154,5 @@ def test_arguments_without_meaning_are_refused_in_a_sentence(arguments, sentence
 
 @pytest.mark.parametrize("wrong", [None, "system", 3, System])
 def test_what_is_no_system_is_refused(wrong):
-    with pytest.raises(ParameterError, match="takes a System"):
+    with pytest.raises(ParameterError, match="system must be a System"):
         find_orbit(wrong, theta=0.3)

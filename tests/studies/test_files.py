@@ -89,7 +89,7 @@ def test_the_orbits_of_a_curve_come_back_too(tmp_path):
 
 
 def test_what_is_no_branch_is_refused(spectrum):
-    with pytest.raises(ParameterError, match=r"orbits_of takes the dataset of a branch.*lacks 'unknowns'"):
+    with pytest.raises(ParameterError, match=r"dataset must be the dataset of a branch.*lacks 'unknowns'"):
         orbits_of(spectrum["attractors"].to_dataset())
     branch = saltus.branch_of(spectrum, 0)
     with pytest.raises(ParameterError, match="lacks 'system'"):

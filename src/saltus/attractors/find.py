@@ -155,5 +155,7 @@ def _known(system: System, known: Any) -> list[PeriodicOrbit]:
             p for p, x in system.parameters.items() if not math.isclose(theirs.get(p, math.nan), x, rel_tol=1e-9, abs_tol=1e-12)
         ]
         if unlike or type(orbit.system.model) is not type(system.model):
-            raise ParameterError(f"a known orbit belongs to another system; it differs in {', '.join(unlike) or 'its model'}")
+            raise ParameterError(
+                f"a known orbit belongs to another system; it differs in {', '.join(unlike) or 'its model'}", "known"
+            )
     return [orbit for orbit in orbits if orbit.stable]

@@ -32,7 +32,9 @@ def check_periodic(system: System) -> None:
     """
     for name, signal in system.load.channels.items():
         if any(isinstance(term, Record) for term in getattr(signal, "terms", (signal,))):
-            raise ParameterError(f"load.{name} is a Record, which does not repeat, so nothing settles under it; use Harmonic")
+            raise ParameterError(
+                f"load.{name} is a Record, which does not repeat, so nothing settles under it; use Harmonic", f"load.{name}"
+            )
 
 
 def is_constant(load: Load) -> bool:

@@ -34,7 +34,7 @@ class Source:
         while keys and keys not in self.lines:
             keys = keys[:-1]
         line = f", line {self.lines[keys]}" if keys else ""
-        raise ParameterError(one_line(f"{self.path}{line}: {problem}"))
+        raise ParameterError(one_line(f"{self.path}{line}: {problem}"), ".".join(keys) or "path")
 
     def refuse_error(self, error: ParameterError) -> NoReturn:
         """Raise the refusal of a parameter at its place in the file, or at that of the nearest table around it."""

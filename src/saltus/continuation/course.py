@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_count
 from saltus.continuation.end import CurveEnd, End
 from saltus.continuation.missed import Missed
 from saltus.continuation.solved_between import solved_between
 from saltus.continuation.step_length import STEPS
+from saltus.public_functions import answering
 
 
+@answering("is_joined", "solved_at", "solved_between")
 @dataclass(frozen=True, eq=False)
 class Course:
     """A curve as it was followed: its points in order, the special ones, the reasons for both ends."""
@@ -39,6 +42,7 @@ class Course:
 
         A loop's last point is its first one again, with the equations with which it was begun.
         """
+        check_count("before", before, 0, len(self.points) - 2)
         a, b = self.points[before], self.points[before + 1]
         if a.curve.joins(b.curve):
             return True
@@ -52,5 +56,7 @@ class Course:
 
     def solved_between(self, before: int, value: float, index: int = -1) -> list[Any]:
         """The points at a value of one number of the places, from the point of this number up to before the next."""
+        check_count("before", before, 0, len(self.points) - 2)
         a, b = self.points[before], self.points[before + 1]
+        check_count("index", index, -a.place.size, a.place.size - 1)
         return solved_between(a, b, index, value) if self.is_joined(before) else []

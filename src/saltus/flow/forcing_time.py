@@ -31,7 +31,7 @@ def clock(time: Any, length: Any, periods: float | None, duration: float | None)
         ParameterError: both of periods and duration or neither, a negative one, periods without a period, too many to count.
     """
     if (periods is None) == (duration is None):
-        raise ParameterError("say how long: either periods=... or duration=...")
+        raise ParameterError("say how long: either periods=... or duration=...", "periods")
     span = periods if duration is None else duration
     check_number("periods" if duration is None else "duration", span, at_least=0.0, at_most=LIMITS.periods)
     assert span is not None
@@ -43,7 +43,7 @@ def clock(time: Any, length: Any, periods: float | None, duration: float | None)
         return Clock(0, time, 0, time + span, 0.0)
     reach = np.max(np.abs(time) / length + (span / length if periods is None else span), initial=0.0)
     if not reach < MOST_PERIODS:
-        raise ParameterError(f"the motion must start and end within 2^53 forcing periods, got {reach:g} of them")
+        raise ParameterError(f"the motion must start and end within 2^53 forcing periods, got {reach:g} of them", "time")
     first, local = np.divmod(time, length)
     if periods is None:
         passed, end = np.divmod(local + span, length)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.public_functions import answered
 from saltus.systems import Load, Model, System, check_system
 
 RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: the contact acceleration has no narrower peak
@@ -46,6 +47,7 @@ def _force_at_rest(model: Model, t: Any, position: list[float], load: Load) -> l
     return list(model.force(t, tuple(position), (0.0,) * len(position), load))
 
 
+@answered
 def load_releases(system: System) -> tuple[Release, ...]:
     """The releases of one forcing period, by their time; none for a load that always presses, always pulls or has no period.
 

@@ -15,6 +15,7 @@ from saltus.errors import ParameterError
 from saltus.flow.dense_output import DenseOutput
 from saltus.flow.stops import Stop
 from saltus.flow.validity import Validity, ValidityCheck
+from saltus.public_functions import Numbers, answering
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -114,6 +115,7 @@ class Samples:
     side: np.ndarray
 
 
+@answering("at", "closed_at", "to_xarray")
 @dataclass(frozen=True, eq=False)
 class Motion:
     """An exact motion of a system.
@@ -172,7 +174,7 @@ class Motion:
         """Whether the phase is exact: False once impacts without loss were averaged (see `EventKind.CHATTER`)."""
         return len(self.events.of(EventKind.CHATTER)) == 0
 
-    def at(self, times: Any) -> tuple[Any, Any]:
+    def at(self, times: Numbers) -> tuple[Any, Any]:
         """Coordinate and velocity at any times of the motion, at the method's accuracy; after the impact at an impact.
 
         Returns:
@@ -190,7 +192,9 @@ class Motion:
 
     def _states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if self.dense is None and self.time > self.start:
-            raise ParameterError("this motion was not kept densely: only its end, its events and its `samples` are known")
+            raise ParameterError(
+                "this motion was not kept densely: only its end, its events and its `samples` are known", "times"
+            )
         slack = 1e-12 * max(1.0, abs(self.time))
         if times.size and not (times.min() >= self.start - slack and times.max() <= self.time + slack):
             raise ParameterError(f"times must lie in [{self.start:g}, {self.time:g}], the span of the motion", "times")
@@ -220,7 +224,7 @@ class Motion:
             check.add(self.dense)
         return check.result(self.time - self.start)
 
-    def to_xarray(self, times: Any = None) -> xarray.Dataset:
+    def to_xarray(self, times: Numbers | None = None) -> xarray.Dataset:
         """The motion as a dataset with units and provenance; by default its samples, or 200 a forcing period, or 2000 in all."""
         from saltus.flow.motion_dataset import to_dataset
 

@@ -18,6 +18,7 @@ from saltus.flow.request import MotionRequest
 from saltus.flow.simulation import Followed, follow
 from saltus.flow.stops import Stop
 from saltus.progress import Progress, silent
+from saltus.public_functions import Numbers
 from saltus.systems import System, check_system, constrained_acceleration
 from saltus.taylor import FREQUENCY
 
@@ -67,7 +68,7 @@ def sensitivities(
     system: System,
     *,
     parameters: Iterable[str] = (),
-    velocity: Any = 0.0,
+    velocity: Numbers = 0.0,
     periods: float | None = None,
     duration: float | None = None,
     tol: float = 1e-12,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from saltus.flow.request import MotionRequest
 from saltus.flow.stops import Stop
 from saltus.flow.structures import Program, program
 from saltus.progress import Progress, silent
+from saltus.public_functions import Numbers
 from saltus.systems import System
 
 WHAT = "following the motion"  # for the progress
@@ -27,7 +27,7 @@ WHAT = "following the motion"  # for the progress
 def simulate(
     system: System,
     *,
-    velocity: Any = 0.0,
+    velocity: Numbers = 0.0,
     periods: float | None = None,
     duration: float | None = None,
     tol: float = 1e-12,
@@ -35,7 +35,7 @@ def simulate(
     side: int | None = None,
     stop_at: Iterable[str] = (),
     dense: bool = True,
-    samples: Any = None,
+    samples: Numbers | None = None,
     progress: Progress = silent,
     **coordinates: float,
 ) -> Motion:

@@ -12,6 +12,7 @@ from saltus.checks import check_number
 from saltus.continuation import Course, End
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.special_point import OrbitEnd
+from saltus.public_functions import answering
 
 if TYPE_CHECKING:
     import xarray
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 START = End(OrbitEnd.START)
 
 
+@answering("at")
 @dataclass(frozen=True, eq=False)
 class Branch(Course):
     """A branch: its points in order, the special ones among them, and why it ends on both sides.

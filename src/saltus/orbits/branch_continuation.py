@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from saltus.checks import check_along, check_bounds, check_kind, check_path, check_step
+from saltus.checks import check_along, check_bounds, check_path, check_step
 from saltus.continuation import STEPS, Continuation, End, both_ways
 from saltus.errors import ParameterError, shown
 from saltus.orbits.branch import START, Branch
@@ -104,12 +104,11 @@ def follow_from(
 
 def _checked(orbit: PeriodicOrbit, path: str, bounds: Any) -> tuple[float, float]:
     """Bounds of a parameter that the system allows and between which the orbit lies."""
-    check_kind("orbit", orbit, PeriodicOrbit, RestingOrbit, source="find_orbit or search_orbits")
     low, high = check_bounds(bounds)
     check_path(orbit.system, path)
     value = orbit.system.get(path)
     if not low <= value <= high:
-        raise ParameterError(f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range")
+        raise ParameterError(f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range", "bounds")
     check_along(orbit.system, path, (low, high), "bounds")
     return low, high
 
@@ -124,7 +123,7 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
     else:
         found = PeriodicOrbit.near(problem, orbit.solution.unknowns, problem.values)
     if found is None:
-        raise ParameterError(f"the orbit does not solve its own equations to be continued along {path}; find it again")
+        raise ParameterError(f"the orbit does not solve its own equations to be continued along {path}; find it again", "orbit")
     if found.symmetric and not symmetric:
         found = full_period(found)
     elif symmetric:

@@ -28,6 +28,7 @@ from saltus.orbits.resting import resting_near
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import half, is_symmetric, keeps_symmetry
 from saltus.orbits.tolerances import TOLERANCES
+from saltus.public_functions import Numbers
 from saltus.systems import System, check_system
 
 
@@ -48,7 +49,7 @@ SETTINGS = FindOrbitSettings()
 def find_orbit(
     system: System,
     *,
-    velocity: Any = 0.0,
+    velocity: Numbers = 0.0,
     period: int | None = None,
     settle: int | None = None,
     max_period: int = SETTINGS.max_period,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import check_dataset
 from saltus.continuation import NEWTON
 from saltus.errors import ParameterError
 from saltus.flow import load_releases
@@ -16,6 +17,7 @@ from saltus.orbits.problem import Problem
 from saltus.orbits.resting import resting_orbit
 from saltus.orbits.signature import ModeChange, Signature
 from saltus.provenance import check_provenance
+from saltus.public_functions import answered
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 NEEDED = ("parameter", "unknowns")
 
 
+@answered
 def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     """The orbits along `point` of a dataset that `Branch.to_xarray` or `SpecialCurve.to_xarray` made, bit for bit, in order.
 
@@ -34,11 +37,7 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
         ParameterError: a dataset of something else, of other equations than the model has now, or of another version of saltus;
             unknowns that do not solve the equations; a model of one's own that is not registered (`saltus.register`).
     """
-    missing = [name for name in NEEDED if name not in dataset] + [name for name in ("system", "tol") if name not in dataset.attrs]
-    if missing:
-        raise ParameterError(
-            f"orbits_of takes the dataset of a branch or of a curve of special points; this one lacks {missing[0]!r}"
-        )
+    check_dataset(dataset, "a branch or a curve of special points", NEEDED, ("system", "tol"))
     system, tol = System.from_json(dataset.attrs["system"]), float(dataset.attrs["tol"])
     check_provenance(dataset.attrs, system, "the dataset of these orbits")
     if "releases" in dataset:

@@ -16,9 +16,11 @@ from saltus.orbits.newton import NEWTON_ITERATIONS, Solution, solve
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
+from saltus.public_functions import answering
 from saltus.systems import System
 
 
+@answering("motion", "defect_after")
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit:
     """A periodic orbit of the exact system, solved to rounding.

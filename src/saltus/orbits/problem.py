@@ -104,7 +104,9 @@ class Problem:
 
     def __init__(self, system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> None:
         if system.load.frequency is None:
-            raise ParameterError("a load without a frequency has no forcing period, so no periodic orbits to find; give one")
+            raise ParameterError(
+                "a load without a frequency has no forcing period, so no periodic orbits to find; give one", "load.frequency"
+            )
         self.system, self.signature, self.paths, self.tol = system, signature, paths, tol
         self._run = _ready(system, paths)
         if self._run.trace.records:

@@ -15,6 +15,7 @@ from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitCurve, OrbitPoint
 from saltus.orbits.problem import Equations
 from saltus.provenance import provenance
+from saltus.public_functions import answering
 
 if TYPE_CHECKING:
     import xarray
@@ -89,6 +90,7 @@ class ConditionedCurve(OrbitCurve):
         return True
 
 
+@answering("at")
 @dataclass(frozen=True, eq=False)
 class SpecialCurve(Course):
     """A curve of special points in two parameters: its points in order, its codimension-two points, and why it ends."""
@@ -108,7 +110,9 @@ class SpecialCurve(Course):
             ParameterError: a path that is not one of the two.
         """
         if path not in self.paths:
-            raise ParameterError(f"{path!r} is not a parameter of this curve; it has {self.paths[0]!r} and {self.paths[1]!r}")
+            raise ParameterError(
+                f"{path!r} is not a parameter of this curve; it has {self.paths[0]!r} and {self.paths[1]!r}", "path"
+            )
         return [point.orbit for point in self.solved_at(value, self.paths.index(path) - 2)]
 
     def to_xarray(self) -> xarray.Dataset:

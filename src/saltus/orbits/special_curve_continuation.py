@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_bounds, check_count, check_kind, check_path, check_step
+from saltus.checks import check_bounds, check_count, check_path, check_step
 from saltus.continuation import STEPS, Continuation, Cut, End, TestFunction, both_ways
 from saltus.errors import ParameterError
 from saltus.orbits.branch_continuation import STEP
@@ -91,24 +91,26 @@ def continue_special(
         ParameterError: another kind of point, an unknown parameter or the branch's own, bounds that exclude the point, a second
             parameter that takes away the symmetry which a BPC or a grazing on both sides rests on.
     """
-    check_kind("special", special, SpecialPoint, source="branch.special")
     check_step(step)
     check_count("most_points", most_points, 1)
     if special.kind not in FOLLOWED:
-        raise ParameterError(f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}")
+        raise ParameterError(f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}", "special")
     if isinstance(special.orbit, RestingOrbit):
         raise ParameterError(
-            "curves are followed of orbits between impacts only, and this one rests; continue it along one parameter"
+            "curves are followed of orbits between impacts only, and this one rests; continue it along one parameter", "special"
         )
     if special.kind == SpecialKind.GR and special.orbit.problem.passes_contact:
         raise ParameterError(
             "this GR is no singularity, as neither the velocity nor the acceleration changes at the contact: nothing begins or "
-            "ends there, and no curve of such points is followed; choose an LP, PD or BPC"
+            "ends there, and no curve of such points is followed; choose an LP, PD or BPC",
+            "special",
         )
     first_path, system = special.orbit.problem.paths[0], special.orbit.system
     check_system(system, "continue_special")
     if path == first_path:
-        raise ParameterError(f"the branch already runs along {path}; name another parameter to follow its {special.kind} in")
+        raise ParameterError(
+            f"the branch already runs along {path}; name another parameter to follow its {special.kind} in", "path"
+        )
     check_path(system, path)
     limits = _limits(special, system.parameters[path], bounds, first_bounds)
     start = _start(special, (first_path, path), limits)

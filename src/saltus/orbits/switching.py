@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from saltus.checks import check_bounds, check_kind, check_step
+from saltus.checks import check_bounds, check_step
 from saltus.continuation import End
 from saltus.errors import ParameterError
 from saltus.orbits.branch import Branch
@@ -40,11 +40,12 @@ def switch_branch(
     Raises:
         ParameterError: a special point where no branch begins.
     """
-    check_kind("special", special, SpecialPoint, source="branch.special")
     check_step(step)
     bounds = check_bounds(bounds)
     if special.kind not in (SpecialKind.PD, SpecialKind.BPC):
-        raise ParameterError(f"no branch begins at a {special.kind}; switch at a PD or a BPC (grazings are gone through anyway)")
+        raise ParameterError(
+            f"no branch begins at a {special.kind}; switch at a PD or a BPC (grazings are gone through anyway)", "special"
+        )
     if special.kind == SpecialKind.PD:
         starts: tuple[OrbitPoint | None, ...] = (_doubled(special.point),)
     elif special.orbit.symmetric:
@@ -135,10 +136,9 @@ def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_pe
     Raises:
         ParameterError: a special point that is no PD.
     """
-    check_kind("first", first, SpecialPoint, source="branch.special")
     check_step(step)
     if first.kind != SpecialKind.PD:
-        raise ParameterError(f"a cascade begins at a PD, not at a {first.kind}")
+        raise ParameterError(f"a cascade begins at a PD, not at a {first.kind}", "first")
     bounds, points = check_bounds(bounds), [first]
     while 2 * points[-1].orbit.period <= max_period:
         start = _doubled(points[-1].point)

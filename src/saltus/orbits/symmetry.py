@@ -10,9 +10,11 @@ from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
+from saltus.public_functions import answered
 from saltus.systems import Constant, Harmonic, Load, Signal, System, check_system
 
 
+@answered
 def is_symmetric(system: System) -> bool:
     """Whether -theta(t + T/2) moves as theta(t) does: a mirrored load that is the load half a period later (errata 18)."""
     check_system(system, "is_symmetric")

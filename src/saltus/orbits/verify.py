@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_count, check_kind
+from saltus.checks import check_count
 from saltus.flow import simulate_many
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.tolerances import TOLERANCES
@@ -37,8 +37,6 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
     Raises:
         ParameterError: what is no orbit.
     """
-    for orbit in orbits:
-        check_kind("orbits", orbit, PeriodicOrbit, source="find_orbit or search_orbits")
     check_count("rounds", rounds, 1)
     if len(orbits) == 0:
         return np.zeros(0)

@@ -11,7 +11,9 @@ def check_diagram(system: System, path: str, bounds: tuple[float, float], **coun
     """The bounds as two numbers; raises a ParameterError, before anything is computed, for what would fail later."""
     check_system(system, "a diagram", coordinates=1)
     if system.load.frequency is None:
-        raise ParameterError("a load without a frequency has no periodic orbits to draw; give the Load a frequency")
+        raise ParameterError(
+            "a load without a frequency has no periodic orbits to draw; give the Load a frequency", "load.frequency"
+        )
     low, high = check_bounds(bounds)
     check_path(system, path)
     check_along(system, path, (low, high), "bounds")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from saltus.checks import check_count
 from saltus.errors import ParameterError, SweepError
 from saltus.progress import Progress, silent
+from saltus.public_functions import answered
 from saltus.sweep.chunk_grid import Index
 from saltus.sweep.chunk_results import Failure, Raised, attempt, checked
 from saltus.sweep.memory import MemoryResults
@@ -35,6 +36,7 @@ class SweepInterrupted(KeyboardInterrupt):
     """Ctrl-C during a sweep; the message says what is kept and how to go on."""
 
 
+@answered
 def run(
     plan: Plan,
     store: Path | str | None = None,
@@ -71,7 +73,7 @@ def run(
     """
     if not isinstance(plan, Plan):
         raise ParameterError(f"plan must be a Plan, got {plan!r:.80}", "plan")
-    check_count("retries", retries, 0)
+    check_count("retries", retries, 0, 100)
     path = check_run(store, workers, scheduler, progress)
     with nullcontext(MemoryResults(plan)) if path is None else opened(plan, path) as results:
         sweep = _SweepRun(plan, results, progress, retries)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError, SweepError
+from saltus.public_functions import answered
 from saltus.sweep import store_files as files
 from saltus.sweep.chunk_grid import Index
 from saltus.sweep.chunk_results import Arrays, Failure
@@ -133,6 +134,8 @@ def check_store(plan: Plan, path: Path) -> None:
     Raises:
         ParameterError: with what is there, or what is damaged so that it cannot be told whose store it is.
     """
+    if not path.name:
+        raise ParameterError(f"store must name a folder, such as 'chart.zarr', got {str(path)!r}", "store")
     if (path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file():
         if files.damaged_files(path):
             _restorable(plan, path)
@@ -140,19 +143,24 @@ def check_store(plan: Plan, path: Path) -> None:
         differ = list(differences(read_plan(path), plan.describe()))
         if differ:
             more = f"; and {len(differ) - 3} more" if len(differ) > 3 else ""
-            raise ParameterError(f"{path} is the store of another plan: {'; '.join(differ[:3])}{more}; {BEGIN_ANEW}", "store")
+            raise ParameterError(
+                f"{path} is the store of another plan: {'; '.join(f'{each:.90}' for each in differ[:3])}{more}; {BEGIN_ANEW}",
+                "store",
+            )
     elif path.is_file() or (path.is_dir() and any(path.iterdir())):
         kind = "a file" if path.is_file() else "a folder with something else in it"
         raise ParameterError(f"{path} is {kind}; name a store that does not exist yet, or one of this plan", "store")
 
 
-def remove_store(path: Path) -> None:
+@answered
+def remove_store(path: Path | str) -> None:
     """Remove the store at `path`, if there is one.
 
     Raises:
         ParameterError: there is something else.
         SweepError: a run is writing to it, or it cannot be removed.
     """
+    path = Path(path)
     if not path.exists():
         return
     if not ((path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file()):
@@ -199,6 +207,7 @@ def _restore(plan: Plan, path: Path) -> None:
             raise SweepError(f"{path / name} is damaged and cannot be written again ({reason(error)})") from error
 
 
+@answered
 def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
     """The dataset of a sweep's store, read as it is needed; `load()` reads it all.
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from saltus.errors import ParameterError
+from saltus.public_functions import answered
 from saltus.sweep import store_files as files
 from saltus.sweep.chunk_grid import MOST_CHUNKS, NAME, ChunkGrid, Index
 from saltus.sweep.chunk_results import Failure
@@ -52,6 +53,7 @@ class StoreStatus:
         return self.done == self.total
 
 
+@answered
 def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
     """How far the sweep is whose store is at `path`; to `verify` reads all of it, and finds the files that are damaged.
 
@@ -109,25 +111,25 @@ def read_plan(path: Path) -> dict[str, Any]:
         ParameterError: there is nothing at `path`, or no store, or one that is not of a sweep, or whose metadata are damaged.
     """
     if not path.exists():
-        raise ParameterError(f"there is no store at {path}")
+        raise ParameterError(f"there is no store at {path}", "path")
     if not path.is_dir():
-        raise ParameterError(f"{path} is a file; the store of a sweep is a folder")
+        raise ParameterError(f"{path} is a file; the store of a sweep is a folder", "path")
     metadata = path / files.METADATA
     if not metadata.is_file():
-        raise ParameterError(f"{path} is not a store: it has no {files.METADATA}")
+        raise ParameterError(f"{path} is not a store: it has no {files.METADATA}", "path")
     damaged = [name for name in (files.METADATA, files.CHECKSUMS) if name in files.damaged_files(path)]
     try:
         group = json.loads(metadata.read_bytes())
     except (OSError, RecursionError, ValueError) as error:
-        raise ParameterError(f"{metadata} cannot be read ({error!s:.80})") from error
+        raise ParameterError(f"{metadata} cannot be read ({error!s:.80})", "path") from error
     try:
         plan = json.loads(group["attributes"]["plan"])
         plan = {key: plan[key] for key in ("function", "arguments", "order", "axes", "chunk", "variables", "attrs")}
         grid_of(plan)
     except (RecursionError, KeyError, TypeError, ValueError, AttributeError):
-        raise ParameterError(f"{path} is a Zarr store, but not of a sweep: it keeps no plan") from None
+        raise ParameterError(f"{path} is a Zarr store, but not of a sweep: it keeps no plan", "path") from None
     if damaged:
-        raise ParameterError(f"{path / damaged[0]} is damaged; run the sweep again, or remove the store and begin anew")
+        raise ParameterError(f"{path / damaged[0]} is damaged; run the sweep again, or remove the store and begin anew", "path")
     return plan
 
 

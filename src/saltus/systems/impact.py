@@ -9,6 +9,7 @@ import numpy as np
 
 from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
+from saltus.public_functions import answering
 from saltus.systems.contact import Contact
 from saltus.systems.load import Load
 from saltus.systems.model import Model
@@ -44,6 +45,7 @@ class ImpactLaw:
         )
 
 
+@answering("__init__")
 @dataclass(frozen=True, slots=True)
 class VelocityReduction(ImpactLaw):
     """v+ = e v-, with a constant factor e in [0, 1] (paper, `vel_red`).
@@ -71,6 +73,7 @@ def _passes(model: Model, a: Contact, b: Contact) -> bool:
     return a is not b and a.group == b.group if model.transfers else a is b
 
 
+@answering("__init__")
 @dataclass(frozen=True, slots=True)
 class EnergyRestitution(ImpactLaw):
     """T+ = r T-, with T the model's kinetic energy, ground velocities and unequal masses included (`rest_def`, errata 5, 26).
@@ -104,6 +107,7 @@ class EnergyRestitution(ImpactLaw):
         return np.where(square >= 0, np.where(through * velocity > 0, through, np.nan), np.nan)
 
 
+@answering("__init__")
 @dataclass(frozen=True, slots=True)
 class InelasticImpact(ImpactLaw):
     """Frictionless, perfectly inelastic contact: the momentum balance of the layer that is not hit fixes v+ (errata 25).

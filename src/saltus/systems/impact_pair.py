@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from saltus.checks import settle_numbers
+from saltus.public_functions import answering
 from saltus.systems.contact import Contact
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 
 
+@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImpactPair(Model):
     """A case on a spring, z, and a mass in it at x from the case's middle, |x| <= d, an impact damper:

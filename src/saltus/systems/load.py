@@ -8,6 +8,7 @@ from typing import Any
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError
+from saltus.public_functions import answering
 from saltus.systems.signals import Record, Signal, as_signal
 
 
@@ -41,6 +42,7 @@ class Channel:
         return self._derivative(t, 2)
 
 
+@answering("__init__")
 @dataclass(frozen=True, init=False, repr=False)
 class Load:
     """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H), vertical=-0.5)`.

@@ -10,11 +10,13 @@ import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
 from saltus.errors import ParameterError
+from saltus.public_functions import answering
 from saltus.systems.load import Load
 from saltus.systems.model import MarginKind, Model
 from saltus.systems.signals import Constant, Signal, scaled, vanishes
 
 
+@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metainterface(Model):
     """The single-degree-of-freedom metainterface (paper, `gov_eqn_theta_long`).

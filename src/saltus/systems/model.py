@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, ClassVar
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, near, shown
+from saltus.public_functions import answering
 from saltus.systems.constrained import constrained_acceleration
 from saltus.systems.contact import Contact
 
@@ -19,6 +20,7 @@ class MarginKind(StrEnum):
     LIMIT = "limit"  # the mechanism has no such positions
 
 
+@answering("unit_of", "margin_kind")
 class Model:
     """A piecewise-smooth oscillator. Subclass it as a frozen, keyword-only dataclass of numbers and give it:
 
@@ -57,6 +59,8 @@ class Model:
 
     def unit_of(self, coordinate: str) -> str:
         """The unit of one of the coordinates, such as "rad"."""
+        if coordinate not in self.coordinates:
+            raise ParameterError(f"no coordinate {shown(coordinate)}; {near(coordinate, self.coordinates)}", "coordinate")
         return self.units[self.coordinates.index(coordinate)] if self.units else "1"
 
     def margin_kind(self, margin: str) -> MarginKind:

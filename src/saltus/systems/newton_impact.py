@@ -9,11 +9,13 @@ import numpy as np
 
 from saltus.checks import check_number, settle_numbers
 from saltus.errors import ParameterError
+from saltus.public_functions import answered, answering
 from saltus.systems.factors import Factors
 from saltus.systems.impact import ImpactLaw
 from saltus.systems.model import Model
 
 
+@answering("__init__")
 @dataclass(frozen=True, slots=True)
 class NewtonImpact(ImpactLaw):
     """0 <= J _|_ v+ + E v- >= 0 at all contacts whose gap is 0, with the rates v of the gaps and the impulses J (Moreau).
@@ -46,6 +48,7 @@ class NewtonImpact(ImpactLaw):
         return matrix
 
 
+@answered
 def energy_gain(model: Model, impact: ImpactLaw) -> dict[str, float]:
     """By how much an impact at each contact may raise the kinetic energy, as a share of what the impact at most takes; <= 0: not.
 

@@ -44,14 +44,14 @@ def register(cls: T) -> T:
         ParameterError: what is neither; a model whose sides and reset do not go together.
     """
     if not isinstance(cls, type):
-        raise ParameterError(f"register takes a Model or an ImpactLaw, got {shown(cls)}")
+        raise ParameterError(f"register takes a Model or an ImpactLaw, got {shown(cls)}", "cls")
     if issubclass(cls, Model):
         check_sides(cls)
         MODELS[cls.__name__] = cls
     elif issubclass(cls, ImpactLaw):
         IMPACTS[cls.__name__] = cls
     else:
-        raise ParameterError(f"register takes a Model or an ImpactLaw, got {shown(cls)}")
+        raise ParameterError(f"register takes a Model or an ImpactLaw, got {shown(cls)}", "cls")
     return cls
 
 

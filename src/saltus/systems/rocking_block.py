@@ -9,11 +9,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
+from saltus.public_functions import answering
 from saltus.systems.load import Load
 from saltus.systems.model import MarginKind, Model
 from saltus.systems.signals import scaled
 
 
+@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RockingBlock(Model):
     """A rigid block rocking about its base corners, without bouncing (paper, `EOM&Rock`).

@@ -8,14 +8,16 @@ from dataclasses import dataclass
 from operator import mul, truediv
 from typing import Any
 
-from saltus.checks import settle_numbers
+from saltus.checks import check_number, settle_numbers
 from saltus.errors import ParameterError
+from saltus.public_functions import answering
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.signals import Record, Signal, Sum, scaled
 from saltus.systems.two_layer import TwoLayer
 
 
+@answering("__init__", "from_model", "metainterface", "two_layer", "load", "load_in_si")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhysicalCell:
     """Length, masses, rotational stiffnesses and dampings of a cell in SI units; layer 1 is the lower one, 2 the upper one.
@@ -54,6 +56,8 @@ class PhysicalCell:
         cls, model: Metainterface | TwoLayer, *, length: float, upper_mass: float, upper_stiffness: float
     ) -> PhysicalCell:
         """The cell of this length, upper mass and upper stiffness whose dimensionless numbers are those of `model`."""
+        for name, value in (("length", length), ("upper_mass", upper_mass), ("upper_stiffness", upper_stiffness)):
+            check_number(name, value, above=0.0)
         upper_damping = model.damping * math.sqrt(upper_mass * length**2 * upper_stiffness)
         return cls(
             length=length,

@@ -14,6 +14,7 @@ import numpy as np
 
 from saltus.checks import RADIANS, check_count, check_number, settle_numbers
 from saltus.errors import ParameterError
+from saltus.public_functions import answering
 
 
 class Signal:
@@ -52,6 +53,7 @@ class Constant(Signal):
         return self.value if order == 0 else 0.0
 
 
+@answering("__init__")
 @dataclass(frozen=True, slots=True)
 class Harmonic(Signal):
     """mean + amplitude sin(order Omega tau + phase), with the base frequency Omega of the load and an integer order.
@@ -107,6 +109,7 @@ class Sum(Signal):
 QUANTITIES = ("force", "displacement", "velocity", "acceleration")
 
 
+@answering("__init__")
 @dataclass(frozen=True, eq=False)
 class Record(Signal):
     """Samples over time, uniform or not: `Record(time, value, quantity=...)`, dimensionless like every load.
@@ -135,17 +138,17 @@ class Record(Signal):
         try:
             time, value = (np.array(a, dtype=float) for a in (self.time, self.value))
         except (TypeError, ValueError):
-            raise ParameterError(f"{where}: time and value must be lists of numbers") from None
+            raise ParameterError(f"{where}: time and value must be lists of numbers", "value") from None
         if time.ndim != 1 or time.shape != value.shape:
             raise ParameterError(
-                f"{where}: time and value must be two lists of one length, got shapes {time.shape} and {value.shape}"
+                f"{where}: time and value must be two lists of one length, got shapes {time.shape} and {value.shape}", "value"
             )
         least = 4 if self.quantity in ("velocity", "displacement") else 2
         if time.size < least:
-            raise ParameterError(f"{where}: a record of {self.quantity} needs at least {least} samples, got {time.size}")
+            raise ParameterError(f"{where}: a record of {self.quantity} needs at least {least} samples, got {time.size}", "time")
         if not (np.isfinite(time).all() and np.isfinite(value).all()):
             bad = int(np.argmin(np.isfinite(time) & np.isfinite(value)))
-            raise ParameterError(f"{where}: sample {bad} is not a finite number (time {time[bad]}, value {value[bad]})")
+            raise ParameterError(f"{where}: sample {bad} is not a finite number (time {time[bad]}, value {value[bad]})", "value")
         if not (np.diff(time) > 0).all():
             bad = int(np.argmin(np.diff(time) > 0)) + 1
             raise ParameterError(

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
+from saltus.public_functions import answering
 from saltus.systems.constrained import reactions
 from saltus.systems.contact import Contact
 from saltus.systems.load import Load
@@ -16,6 +17,7 @@ from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import MarginKind, Model
 
 
+@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoLayer(Model):
     """The metainterface with theta_1 >= 0 of the lower and theta_2 <= 0 of the upper layer (paper, `eomnl`).

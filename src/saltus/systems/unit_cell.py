@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
+from saltus.public_functions import Numbers, answering
 from saltus.systems.cell_layout import CellLayout
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.si_units import PhysicalCell
@@ -18,6 +19,8 @@ from saltus.systems.two_layer import TwoLayer
 ANGLE_ROUNDING = 1e-12  # an angle past a limit by no more than this is rounded onto it
 
 
+@answering("__init__", "line_condition", "beta", "phi", "theta", "alpha", "alpha_of_phi", "beta_of_phi")
+@answering("xi", "eta", "phi_velocity", "small_phi", "layout")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnitCell:
     """Two articulated parallelograms, each with a slider amid its diagonal (paper, `gen_conf` to `max_disp_condition`).
@@ -43,7 +46,7 @@ class UnitCell:
     def __post_init__(self) -> None:
         settle_numbers(self, "beta0", "alpha0", above=0.0, below=math.pi)
         if self.alpha0 + self.beta0 >= math.pi:
-            raise ParameterError(f"alpha0 + beta0 must lie below pi rad, got {self.alpha0!r} + {self.beta0!r}")
+            raise ParameterError(f"alpha0 + beta0 must lie below pi rad, got {self.alpha0!r} + {self.beta0!r}", "alpha0")
 
     @property
     def lambda_(self) -> float:
@@ -92,14 +95,16 @@ class UnitCell:
             ParameterError: n >= 2, which lies past the kinematic limit (erratum 20).
         """
         if n != 1:
-            raise ParameterError(f"only n = 1 of the line conditions can be reached before the kinematic limit, got n = {n!r}")
+            raise ParameterError(
+                f"only n = 1 of the line conditions can be reached before the kinematic limit, got n = {n!r}", "n"
+            )
         return self.line_limit
 
-    def beta(self, theta: Any) -> Any:
+    def beta(self, theta: Numbers) -> Any:
         """beta_j = beta0 + abs(theta_j) (erratum 2), rad."""
-        return self.beta0 + abs(theta)
+        return self.beta0 + np.abs(theta)
 
-    def phi(self, theta: Any) -> Any:
+    def phi(self, theta: Numbers) -> Any:
         """abs(phi_j) from cos(beta_j) = cos(beta0) - psi tan(phi_j)^2 (`gen_conf`), rad.
 
         Raises:
@@ -107,7 +112,7 @@ class UnitCell:
         """
         return np.arctan(np.sqrt(self._lowering(theta) / self.psi))
 
-    def theta(self, phi: Any, *, layer: int = 1, past_line: bool = False) -> Any:
+    def theta(self, phi: Numbers, *, layer: int = 1, past_line: bool = False) -> Any:
         """theta_j = -(-1)^j (beta_j(phi_j) - beta0) (`gen_conf`, erratum 2), rad; `past_line` takes beta_j > pi.
 
         Raises:
@@ -119,46 +124,46 @@ class UnitCell:
         beta = 2 * math.pi - beta if past_line else beta
         return -((-1) ** layer) * (beta - self.beta0)
 
-    def alpha(self, theta: Any) -> Any:
+    def alpha(self, theta: Numbers) -> Any:
         """alpha_j of theta_j (`configalpha`, errata 1 and 3), rad; past the line it is the diagonal's angle below the base."""
         lowering = self._lowering(theta)
         cosine = np.sqrt(self.psi / (lowering + self.psi)) * (lowering + 2 * self.lambda_ * self.chi + self.psi)
         return np.arccos(np.clip(cosine / (2 * self.lambda_), -1, 1))
 
-    def alpha_of_phi(self, phi: Any) -> Any:
+    def alpha_of_phi(self, phi: Numbers) -> Any:
         """arccos(psi / (2 lambda cos(phi)) + chi cos(phi)) (`gen_conf`), rad."""
         self._check_phi(phi)
         cosine = np.cos(phi)
         return np.arccos(np.clip(self.psi / (2 * self.lambda_ * cosine) + self.chi * cosine, -1, 1))
 
-    def beta_of_phi(self, phi: Any) -> Any:
+    def beta_of_phi(self, phi: Numbers) -> Any:
         """arccos(cos(beta0) - psi tan(phi)^2), from beta0 to pi (`gen_conf`), rad."""
         self._check_phi(phi)
         return np.arccos(np.clip(math.cos(self.beta0) - self.psi * np.tan(phi) ** 2, -1, 1))
 
-    def xi(self, theta: Any) -> Any:
+    def xi(self, theta: Numbers) -> Any:
         """Relative horizontal displacement, sgn(theta) (cos(beta0) - cos(beta_j)) (`configdbeta`, erratum 2)."""
         return np.sign(theta) * (math.cos(self.beta0) - np.cos(self.beta(theta)))
 
-    def eta(self, theta: Any) -> Any:
+    def eta(self, theta: Numbers) -> Any:
         """Height of the layer, sin(beta_j) (`configdbeta`)."""
         return np.sin(self.beta(theta))
 
-    def phi_velocity(self, theta: Any, velocity: Any) -> Any:
+    def phi_velocity(self, theta: Numbers, velocity: Numbers) -> Any:
         """Rate of abs(phi_j) at theta and theta': abs(theta)' sin(beta_j) cos(phi_j)^3 / (2 psi sin(phi_j)).
 
         At an impact, theta -> 0 with theta' finite, it diverges like abs(theta)' sqrt(sin(beta0) / (4 psi abs(theta)))
         (`fundamentalproperty`, `fundamentalvelocity`): there the result is an infinity of its sign, or 0 for theta' = 0.
         """
-        phi, rate = self.phi(theta), np.where(np.less(theta, 0), -1.0, 1.0) * velocity
+        phi, rate = self.phi(theta), np.where(np.less(theta, 0), -1.0, 1.0) * np.asarray(velocity)
         slope = np.sin(self.beta(theta)) * np.cos(phi) ** 3 / (2 * self.psi)
         closed = np.sin(phi) == 0
         moving = np.where(closed & (np.asarray(rate) != 0), np.copysign(np.inf, rate * slope), 0.0)
         return np.where(closed, moving, rate * slope / np.where(closed, 1.0, np.sin(phi)))[()]
 
-    def small_phi(self, theta: Any) -> Any:
+    def small_phi(self, theta: Numbers) -> Any:
         """abs(phi) = sqrt(abs(theta) sin(beta0) / psi), its limit for theta -> 0 (`fundamentalproperty`), rad."""
-        return np.sqrt(abs(theta) * math.sin(self.beta0) / self.psi)
+        return np.sqrt(np.abs(theta) * math.sin(self.beta0) / self.psi)
 
     def layout(self, theta_1: float = 0.0, theta_2: float = 0.0, *, misaligned: tuple[int, int] = (1, 1)) -> CellLayout:
         """Where every hinge, slider and mass is, in units of l from the lower left hinge; `misaligned` holds the signs of phi_j.
@@ -166,8 +171,10 @@ class UnitCell:
         Raises:
             ParameterError: theta_1 < 0 or theta_2 > 0 (`theta_conditions`), or either past the kinematic limit.
         """
+        if not (isinstance(misaligned, tuple | list) and len(misaligned) == 2 and set(misaligned) <= {1, -1}):
+            raise ParameterError(f"misaligned must be two signs, 1 or -1, got {shown(misaligned)}", "misaligned")
         if theta_1 < 0 or theta_2 > 0:
-            raise ParameterError(f"a cell has theta_1 >= 0 and theta_2 <= 0, got {theta_1!r} and {theta_2!r}")
+            raise ParameterError(f"a cell has theta_1 >= 0 and theta_2 <= 0, got {theta_1!r} and {theta_2!r}", "theta_1")
         phi = (float(self.phi(theta_1)) * misaligned[0], float(self.phi(theta_2)) * misaligned[1])
         return CellLayout.build(self.base, self.lambda_, (self.beta(theta_1), self.beta(theta_2)), phi)
 
@@ -190,11 +197,12 @@ class UnitCell:
         if np.any(size > self.kinematic_limit + ANGLE_ROUNDING):
             worst = float(np.max(size))
             raise ParameterError(
-                f"abs(theta) must not pass the kinematic limit 2 (pi - beta0) = {self.kinematic_limit:.6g} rad, got {worst!r}"
+                f"abs(theta) must not pass the kinematic limit 2 (pi - beta0) = {self.kinematic_limit:.6g} rad, got {worst!r}",
+                "theta",
             )
         return np.maximum(2 * np.sin(self.beta0 + size / 2) * np.sin(size / 2), 0.0)
 
     def _check_phi(self, phi: Any) -> None:
         if not np.all(np.abs(phi) <= self.max_misalignment + ANGLE_ROUNDING):
             worst = float(np.max(np.abs(phi)))
-            raise ParameterError(f"abs(phi) must lie in [0, {self.max_misalignment:.6g}] rad in this cell, got {worst!r}")
+            raise ParameterError(f"abs(phi) must lie in [0, {self.max_misalignment:.6g}] rad in this cell, got {worst!r}", "phi")

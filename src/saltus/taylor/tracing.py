@@ -235,7 +235,9 @@ def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: 
     margins = ask(twin.model, "margins", t, q, v, a[0] if dof == 1 else a, side, twin.load)
     for name in stop_at:
         if name not in margins:
-            raise ParameterError(f"{type(twin.model).__name__} has no margin {name!r} to stop at; {near(name, margins)}")
+            raise ParameterError(
+                f"{type(twin.model).__name__} has no margin {name!r} to stop at; {near(name, margins)}", "stop_at"
+            )
         result.margins[name] = combine("add", margins[name], 0.0)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError
+from saltus.public_functions import Numbers
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
 from saltus.theory.loaded_equilibria import zeros_of_slope
@@ -50,12 +51,14 @@ def peaks(system: System, theta0: float) -> Peaks:
     check_number("theta0", theta0)
     lower, upper = layers(system)
     if lower.damping or upper.damping:
-        raise ParameterError(f"peak ratios are for undamped motion; set model.damping to 0, got {system.get('model.damping')!r}")
+        raise ParameterError(
+            f"peak ratios are for undamped motion; set model.damping to 0, got {system.get('model.damping')!r}", "model.damping"
+        )
     here, there = (lower, upper) if theta0 > 0 else (upper, lower)
     speed = _fall_speed(here, abs(theta0))
     other_speed = _after_impact(system, speed, here.side)
     if not math.isclose(_after_impact(system, other_speed, there.side), speed, rel_tol=1e-12):
-        raise ParameterError(f"{system.impact!r} loses energy, so the motion does not repeat; use e = 1 or r = 1")
+        raise ParameterError(f"{system.impact!r} loses energy, so the motion does not repeat; use e = 1 or r = 1", "impact")
     other = turning_point(there, there.mass * other_speed**2 / 2)
     period = 2 * (fall_time(here, abs(theta0)) + fall_time(there, other))
     if here is lower:
@@ -77,7 +80,9 @@ def turning_point(layer: Layer, energy: float) -> float:
     for a, b in pairwise(nodes):
         if layer.potential(b) >= energy:
             return float(brentq(lambda x: layer.potential(x) - energy, a, b, xtol=1e-300, rtol=1e-15, maxiter=5000))
-    raise ParameterError(f"the motion passes the kinematic limit abs(theta) = {layer.kinematic_limit:.6g} rad; start lower")
+    raise ParameterError(
+        f"the motion passes the kinematic limit abs(theta) = {layer.kinematic_limit:.6g} rad; start lower", "theta0"
+    )
 
 
 def fall_time(layer: Layer, peak: float) -> float:
@@ -99,7 +104,7 @@ def fall_time(layer: Layer, peak: float) -> float:
     return float(quad(integrand, 0.0, 1.0, epsabs=1e-14, epsrel=1e-13, limit=200)[0])
 
 
-def unloaded_peak_ratio(stiffness_ratio: Any, mass_ratio: Any = 0.0, *, energy_conserving: bool = False) -> Any:
+def unloaded_peak_ratio(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0, *, energy_conserving: bool = False) -> Any:
     """P_R without loads, any shape (`quasi-bounce-peak`, errata 7):
 
         min(sqrt(k), 1/sqrt(k))                  if the impact keeps the energy (r = 1), for every m
@@ -112,13 +117,13 @@ def unloaded_peak_ratio(stiffness_ratio: Any, mass_ratio: Any = 0.0, *, energy_c
     return np.minimum(ratio, 1 / ratio)
 
 
-def unloaded_half_periods(stiffness_ratio: Any, mass_ratio: Any = 0.0) -> tuple[Any, float]:
+def unloaded_half_periods(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -> tuple[Any, float]:
     """Durations without loads on the lower and on the upper side (`period_case1`): pi sqrt((1+m)/k) and pi, any shape."""
     _check_ratios(stiffness_ratio, mass_ratio)
     return math.pi * np.sqrt((1 + np.asarray(mass_ratio)) / np.asarray(stiffness_ratio)), math.pi
 
 
-def unloaded_period(stiffness_ratio: Any, mass_ratio: Any = 0.0) -> Any:
+def unloaded_period(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -> Any:
     """T0(k, m) = pi (1 + sqrt((1+m)/k)) (`period_case2`), any shape; pi for k -> infinity, unbounded for k -> 0 or m -> infinity.
 
     It holds for e = 1 and for r = 1, since without loads the durations do not depend on the amplitude.
@@ -139,7 +144,7 @@ def reciprocal(system: System, theta0: float) -> tuple[System, float]:
     """
     lower, upper = layers(system)
     if lower.mass != upper.mass or lower.vertical != upper.vertical or lower.outward != -upper.outward:
-        raise ParameterError("the reciprocity of the peak ratio is for m = 0 and forces on the upper mass only")
+        raise ParameterError("the reciprocity of the peak ratio is for m = 0 and forces on the upper mass only", "system")
     k = lower.stiffness
     changes = {"model.stiffness_ratio": 1 / k, "load.vertical": upper.vertical / k, "load.horizontal": upper.outward / k}
     return system.with_(changes), -theta0
@@ -149,11 +154,13 @@ def _fall_speed(layer: Layer, peak: float) -> float:
     if peak == 0:
         raise ParameterError("theta0 must not be 0: a motion with two peaks starts at one of them", "theta0")
     if peak > layer.kinematic_limit:
-        raise ParameterError(f"abs(theta0) must lie in (0, {layer.kinematic_limit:.6g}] rad, the kinematic limit, got {peak!r}")
+        raise ParameterError(
+            f"abs(theta0) must lie in (0, {layer.kinematic_limit:.6g}] rad, the kinematic limit, got {peak!r}", "theta0"
+        )
     start = float(layer.potential(peak))
     highest = max([0.0, *(float(layer.potential(x)) for x in zeros_of_slope(layer) if x < peak)])
     if start <= highest or layer.slope(peak) <= 0:
-        raise ParameterError(f"a motion from theta0 = {layer.side * peak!r} at rest never reaches theta = 0")
+        raise ParameterError(f"a motion from theta0 = {layer.side * peak!r} at rest never reaches theta = 0", "theta0")
     return math.sqrt(2 * start / layer.mass)
 
 
@@ -164,4 +171,6 @@ def _after_impact(system: System, speed: float, side: int) -> float:
 
 def _check_ratios(stiffness_ratio: Any, mass_ratio: Any) -> None:
     if not (np.all(np.asarray(stiffness_ratio) > 0) and np.all(np.asarray(mass_ratio) >= 0)):
-        raise ParameterError(f"need stiffness_ratio > 0 and mass_ratio >= 0, got {stiffness_ratio!r} and {mass_ratio!r}")
+        raise ParameterError(
+            f"need stiffness_ratio > 0 and mass_ratio >= 0, got {stiffness_ratio!r} and {mass_ratio!r}", "stiffness_ratio"
+        )

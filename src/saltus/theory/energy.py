@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
+from saltus.public_functions import Numbers
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
 
 
-def potential_energy(system: System, theta: Any) -> Any:
+def potential_energy(system: System, theta: Numbers) -> Any:
     """P(theta) of `pot_balance0`, constant H and loads on the lower mass included, zero at theta = 0; any shape, over K2:
 
         P = k^P theta^2 / 2 + V [sin(beta0) - sin(beta0 + abs(theta))] + s H [cos(beta0 + abs(theta)) - cos(beta0)]
@@ -24,12 +25,12 @@ def potential_energy(system: System, theta: Any) -> Any:
     return _by_side(system, theta, Layer.potential, odd=False)
 
 
-def potential_slope(system: System, theta: Any) -> Any:
+def potential_slope(system: System, theta: Numbers) -> Any:
     """dP/dtheta, minus the moment on the open layer; at theta = 0 the mean of its two one-sided values. Any shape."""
     return _by_side(system, theta, Layer.slope, odd=True)
 
 
-def total_energy(system: System, theta: Any, velocity: Any, side: Any = None) -> Any:
+def total_energy(system: System, theta: Numbers, velocity: Numbers, side: Numbers | None = None) -> Any:
     """E = T + P over K2, with the kinetic energy of the moving layer, (1+m)^P theta'^2 / 2 on a ground at rest (`kin_eng`).
 
     Args:

@@ -9,9 +9,10 @@ import numpy as np
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError
+from saltus.public_functions import Numbers
 
 
-def high_frequency_onset(frequency: Any, *, beta0: float, vertical: float, damping: float, order: int = 1) -> Any:
+def high_frequency_onset(frequency: Numbers, *, beta0: float, vertical: float, damping: float, order: int = 1) -> Any:
     """Hhat_LP, the least amplitude of H = Hhat sin(Omega tau) under which a period-1 motion exists beside theta = 0, any shape.
 
         order 1:  Hhat_LP = Hcr C pi^3 / (24 Omega),   Hcr = abs(V / tan(beta0)); relative error O(Omega^-2)
@@ -43,10 +44,10 @@ def high_frequency_onset(frequency: Any, *, beta0: float, vertical: float, dampi
         -vertical * math.cos(beta0),
     )
     if closing <= 0:
-        raise ParameterError(f"the onset needs a stable undeformed state, V cos(beta0) below 0, got {-closing:.6g}")
+        raise ParameterError(f"the onset needs a stable undeformed state, V cos(beta0) below 0, got {-closing:.6g}", "vertical")
     slowest = math.sqrt(max(stiffness, damping**2))
     if not np.all(frequency > slowest):
-        raise ParameterError(f"the onset is for high frequency, far above {slowest:.6g} here, got {frequency!r}")
+        raise ParameterError(f"the onset is for high frequency, far above {slowest:.6g} here, got {frequency!r}", "frequency")
     if order not in (1, 2):
         raise ParameterError(f"order must be 1 or 2, got {order!r}", "order")
     onset = closing / math.sin(beta0) * damping * math.pi**3 / (24 * frequency)

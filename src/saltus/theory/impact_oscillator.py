@@ -226,18 +226,20 @@ def wall_orbits(system: System, period: int = 1) -> WallOrbits:
     """
     model, load = system.model, system.load
     if not isinstance(model, WallOscillator):
-        raise ParameterError(f"wall_orbits is for a WallOscillator, got {type(model).__name__}")
+        raise ParameterError(f"wall_orbits is for a WallOscillator, got {type(model).__name__}", "system")
     force = load.channels.get("force")
     if not isinstance(force, Harmonic) or force.order != 1 or load.frequency is None:
-        raise ParameterError(f"wall_orbits needs load.force to be one Harmonic of order 1, got {force!r}")
+        raise ParameterError(f"wall_orbits needs load.force to be one Harmonic of order 1, got {force!r}", "load.force")
     if not model.damping**2 < 4 * model.stiffness:
         most = 2 * math.sqrt(model.stiffness)
-        raise ParameterError(f"wall_orbits needs damping below critical, 2 sqrt(k) = {most:.6g}, got {model.damping!r}")
+        raise ParameterError(
+            f"wall_orbits needs damping below critical, 2 sqrt(k) = {most:.6g}, got {model.damping!r}", "model.damping"
+        )
     if isinstance(period, bool) or period != int(period) or period < 1:
         raise ParameterError(f"period must be a whole number of forcing periods, at least 1, got {period!r}", "period")
     factors = [float(system.impact.velocity_after(model, t, v, 1, 1, load)) / v for t, v in ((0.0, 1.0), (1.0, 0.125))]
     if not math.isclose(*factors, rel_tol=1e-12):
-        raise ParameterError(f"wall_orbits needs an impact law v+ = -e v- with a constant e, got {system.impact!r}")
+        raise ParameterError(f"wall_orbits needs an impact law v+ = -e v- with a constant e, got {system.impact!r}", "impact")
     centre = force.mean / model.stiffness
     orbits = WallOrbits(
         stiffness=model.stiffness,
@@ -250,7 +252,9 @@ def wall_orbits(system: System, period: int = 1) -> WallOrbits:
         centre=centre,
     )
     if orbits._delta < 1e-20 or math.hypot(orbits._slopes[0], orbits._slopes[2]) < 1e-10 or orbits.impedance == 0:
-        raise ParameterError("without damping a resonance leaves the speed of the impact open; give the model some damping")
+        raise ParameterError(
+            "without damping a resonance leaves the speed of the impact open; give the model some damping", "model.damping"
+        )
     return orbits
 
 

@@ -106,9 +106,9 @@ def metainterface(system: System) -> Metainterface:
     """The system's model, refused unless it is an exact `Metainterface`."""
     model = system.model
     if not isinstance(model, Metainterface):
-        raise ParameterError(f"this closed form is for a Metainterface, got a {type(model).__name__}")
+        raise ParameterError(f"this closed form is for a Metainterface, got a {type(model).__name__}", "system")
     if model.smoothing is not None:
-        raise ParameterError("this closed form is for the exact sign of theta; drop the model's smoothing")
+        raise ParameterError("this closed form is for the exact sign of theta; drop the model's smoothing", "model.smoothing")
     return model
 
 
@@ -120,5 +120,7 @@ def constant_loads(system: System) -> dict[str, float]:
     """
     for name, signal in system.load.channels.items():
         if not isinstance(signal, Constant):
-            raise ParameterError(f"this closed form is for constant loads, but load.{name} varies in time; give it as a number")
+            raise ParameterError(
+                f"this closed form is for constant loads, but load.{name} varies in time; give it as a number", f"load.{name}"
+            )
     return {name: s.value for name, s in system.load.channels.items() if isinstance(s, Constant) and "ground" not in name}

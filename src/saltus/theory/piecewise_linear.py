@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import check_count, check_number
 from saltus.errors import ParameterError
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
@@ -105,8 +105,9 @@ def linear_motion(system: System, theta0: float, impacts: int) -> LinearMotion:
             a load that varies in time.
     """
     check_number("theta0", theta0)
-    if theta0 == 0 or impacts < 1:
-        raise ParameterError(f"linear_motion needs theta0 other than 0 and at least 1 impact, got {theta0!r} and {impacts!r}")
+    check_count("impacts", impacts, 1, 100_000)  # whose arcs are kept, each an object
+    if theta0 == 0:
+        raise ParameterError(f"theta0 must not be 0, where nothing moves, got {theta0!r}", "theta0")
     by_side = {layer.side: layer for layer in layers(system)}
     side = 1 if theta0 > 0 else -1
     arcs, times = [_arc(by_side[side], abs(theta0), 0.0)], [0.0]
@@ -128,7 +129,9 @@ def linear_motion(system: System, theta0: float, impacts: int) -> LinearMotion:
 def _arc(layer: Layer, start: float, velocity: float) -> Arc:
     vib = vibration(layer)
     if vib.damping_ratio >= 1:
-        raise ParameterError(f"the damping must be subcritical (mu < 1) for vibrations, got mu = {vib.damping_ratio:.6g}")
+        raise ParameterError(
+            f"the damping must be subcritical (mu < 1) for vibrations, got mu = {vib.damping_ratio:.6g}", "model.damping"
+        )
     decay = vib.damping_ratio * vib.frequency
     frequency = math.sqrt(1 - vib.damping_ratio**2) * vib.frequency
     return Arc(layer, layer.side * vib.centre, decay, frequency, start, velocity)

@@ -9,12 +9,13 @@ import numpy as np
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError
+from saltus.public_functions import Numbers
 from saltus.systems import Load, Metainterface, System
 from saltus.theory.layer import open_layer
 from saltus.theory.loaded_equilibria import zeros_of_slope
 
 
-def critical_horizontal(beta0: float, vertical: Any, swing: float = 0.0) -> Any:
+def critical_horizontal(beta0: float, vertical: Numbers, swing: float = 0.0) -> Any:
     """Hcr = abs(cot(beta0)) sqrt(V^2 - swing^2), the least amplitude at which the undeformed state is lost, any shape of V.
 
     Without a swing this is the paper's QSB line, abs(V / tan(beta0)). Under load (iii), where V + swing cos(tau) goes with
@@ -26,7 +27,9 @@ def critical_horizontal(beta0: float, vertical: Any, swing: float = 0.0) -> Any:
     """
     _check_angle(beta0)
     if np.any(np.asarray(vertical) * math.cos(beta0) > 0):
-        raise ParameterError(f"V cos(beta0) must not be above 0, or theta = 0 is unstable for every H; got V = {vertical!r}")
+        raise ParameterError(
+            f"V cos(beta0) must not be above 0, or theta = 0 is unstable for every H; got V = {vertical!r}", "vertical"
+        )
     least = np.asarray(vertical, dtype=float) ** 2 - swing**2
     if np.any(least < 0):
         raise ParameterError(
@@ -35,7 +38,7 @@ def critical_horizontal(beta0: float, vertical: Any, swing: float = 0.0) -> Any:
     return np.abs(np.sqrt(least) / math.tan(beta0))[()]
 
 
-def fold_curve(beta0: float, opening: Any) -> tuple[Any, Any]:
+def fold_curve(beta0: float, opening: Numbers) -> tuple[Any, Any]:
     """The loads (H, V) at which two deformed equilibria of a symmetric system (k = 1) meet at theta = x >= 0, any shape:
 
         H = x sin(beta0 + x) + cos(beta0 + x),   V = x cos(beta0 + x) - sin(beta0 + x)
@@ -49,7 +52,7 @@ def fold_curve(beta0: float, opening: Any) -> tuple[Any, Any]:
     _check_angle(beta0)
     opening = np.asarray(opening, dtype=float)
     if np.any((opening < 0) | (opening > math.pi - beta0)):
-        raise ParameterError(f"the opening must lie in [0, {math.pi - beta0:.6g}] rad, the straight line")
+        raise ParameterError(f"the opening must lie in [0, {math.pi - beta0:.6g}] rad, the straight line", "opening")
     angle = beta0 + opening
     return (opening * np.sin(angle) + np.cos(angle))[()], (opening * np.cos(angle) - np.sin(angle))[()]
 
@@ -72,7 +75,7 @@ def unloaded_fold(beta0: float) -> tuple[float, float]:
     return -1 / math.sin(beta0 + opening), opening
 
 
-def fold_horizontal(beta0: float, vertical: Any) -> Any:
+def fold_horizontal(beta0: float, vertical: Numbers) -> Any:
     """The abs(H) above which deformed equilibria exist for -sin(beta0) >= V, any shape of V (k = 1, beta0 < pi/2, errata 23).
 
     It is `fold_curve` at the opening with dV/dx = -x sin(beta0 + x) < 0, found by bisection; 0 below `unloaded_fold`, where they
@@ -86,7 +89,7 @@ def fold_horizontal(beta0: float, vertical: Any) -> Any:
     if np.any(vertical > -math.sin(beta0)):
         largest = -math.sin(beta0)
         raise ParameterError(
-            f"a fold needs V <= -sin(beta0) = {largest:.6g}, above which Hcr is the border; got V = {vertical!r}"
+            f"a fold needs V <= -sin(beta0) = {largest:.6g}, above which Hcr is the border; got V = {vertical!r}", "vertical"
         )
     low, high = np.zeros_like(vertical), np.full_like(vertical, unloaded_fold(beta0)[1])
     for _ in range(60):
@@ -96,7 +99,7 @@ def fold_horizontal(beta0: float, vertical: Any) -> Any:
     return np.maximum(fold_curve(beta0, (low + high) / 2)[0], 0.0)[()]
 
 
-def is_monostable(beta0: float, horizontal: Any, vertical: Any) -> Any:
+def is_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
     """Whether the undeformed state is the only equilibrium of a symmetric system (k = 1) under constant H and V (errata 23).
 
     True where V cos(beta0) < -abs(H) sin(beta0), the domain of Fig. 8, and, if V < -sin(beta0) with beta0 < pi/2, abs(H) is
@@ -113,7 +116,7 @@ def is_monostable(beta0: float, horizontal: Any, vertical: Any) -> Any:
     return held[()]
 
 
-def paper_monostable(beta0: float, horizontal: Any, vertical: Any) -> Any:
+def paper_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
     """The domain as Fig. 8 states it, V cos(beta0) < -abs(H) sin(beta0): the undeformed state is stable there, but not alone."""
     _check_angle(beta0)
     return np.asarray(vertical) * math.cos(beta0) < -np.abs(horizontal) * math.sin(beta0)
@@ -130,15 +133,15 @@ def static_angle(beta0: float, horizontal: float, vertical: float) -> float:
     """
     size, critical = abs(horizontal), critical_horizontal(beta0, vertical)
     if size <= critical:
-        raise ParameterError(f"abs(H) = {size:.6g} must exceed Hcr = {critical:.6g} for theta_st to exist")
+        raise ParameterError(f"abs(H) = {size:.6g} must exceed Hcr = {critical:.6g} for theta_st to exist", "horizontal")
     system = System(model=Metainterface(beta0=beta0), load=Load(horizontal=size, vertical=vertical))
     angle = next(zeros_of_slope(open_layer(system, 1)), None)
     if angle is None:
-        raise ParameterError(f"no equilibrium before the kinematic limit under H = {size!r}, V = {vertical!r}")
+        raise ParameterError(f"no equilibrium before the kinematic limit under H = {size!r}, V = {vertical!r}", "horizontal")
     return angle
 
 
-def equivalent_angle(beta0: float, ground_amplitude: Any) -> Any:
+def equivalent_angle(beta0: float, ground_amplitude: Numbers) -> Any:
     """theta_eq = arccos(cos(beta0) - zetahat) - beta0, the opening whose horizontal displacement is zetahat, any shape.
 
     Raises:

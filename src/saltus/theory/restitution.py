@@ -10,6 +10,7 @@ import numpy as np
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError
+from saltus.public_functions import Numbers
 from saltus.systems import EnergyRestitution, System
 from saltus.theory.layer import metainterface
 
@@ -65,7 +66,7 @@ def energy_factor(system: System, velocity: float, side: int, e: float, tau: flo
     """
     before = float(system.model.kinetic_energy(tau, system.model.contact, velocity, side, system.load))
     if before == 0:
-        raise ParameterError("r = T+ / T- has no meaning where the kinetic energy before the impact is 0")
+        raise ParameterError("r = T+ / T- has no meaning where the kinetic energy before the impact is 0", "velocity")
     return float(system.model.kinetic_energy(tau, system.model.contact, e * velocity, -side, system.load)) / before
 
 
@@ -76,16 +77,16 @@ def velocity_factor(system: System, velocity: float, side: int, r: float, tau: f
         ParameterError: velocity = 0, or none solves it (errata 26), with the instant and the velocity.
     """
     if velocity == 0:
-        raise ParameterError("e = theta'+ / theta'- has no meaning at velocity 0")
+        raise ParameterError("e = theta'+ / theta'- has no meaning at velocity 0", "velocity")
     after = float(EnergyRestitution(r).velocity_after(system.model, tau, velocity, side, -side, system.load))
     if math.isnan(after):
         raise ParameterError(
-            f"no velocity of the same sign keeps r = {r!r} of the energy at tau = {tau!r} from theta' = {velocity!r}"
+            f"no velocity of the same sign keeps r = {r!r} of the energy at tau = {tau!r} from theta' = {velocity!r}", "r"
         )
     return after / velocity
 
 
-def energy_jump(system: System, velocity: Any, side: int, e: Any, tau: Any = 0.0) -> Any:
+def energy_jump(system: System, velocity: Numbers, side: int, e: Numbers, tau: Numbers = 0.0) -> Any:
     """[[T]] over K2 at an impact of the metainterface that ends `side`, theta'+ = e theta'-; it broadcasts (errata 5):
 
         from lower:  -[(1+m-e^2) v^2 + 2 v ((1+m-e) sin(beta0) zeta' + (1+m+e) cos(beta0) nu')] / 2

@@ -9,9 +9,10 @@ import numpy as np
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError
+from saltus.public_functions import Numbers
 
 
-def rocking_period(theta0: Any, *, alpha: float) -> Any:
+def rocking_period(theta0: Numbers, *, alpha: float) -> Any:
     """Exact period of free rocking from theta0, at rest, without losses, in units of 1/p, any shape:
 
         p T0 = 4 u R_F(c^2 s^2, s^2 (c^2 + u^2), u^2 + c^2 s^2),
@@ -31,7 +32,7 @@ def rocking_period(theta0: Any, *, alpha: float) -> Any:
     return 4 * np.sqrt(u2) * elliprf(c2 * s2, s2 * (c2 + u2), u2 + c2 * s2)
 
 
-def short_rocking_period(theta0: Any, *, alpha: float) -> Any:
+def short_rocking_period(theta0: Numbers, *, alpha: float) -> Any:
     """p T0 = 4 sqrt(2 abs(theta0) / sin(alpha)), for abs(theta0) << alpha (appendix A), any shape, in units of 1/p.
 
     Raises:
@@ -40,7 +41,7 @@ def short_rocking_period(theta0: Any, *, alpha: float) -> Any:
     return 4 * np.sqrt(2 * _amplitude(theta0, alpha) / math.sin(alpha))
 
 
-def slender_rocking_period(theta0: Any, *, alpha: float) -> Any:
+def slender_rocking_period(theta0: Numbers, *, alpha: float) -> Any:
     """p T0 = 4 arccosh(1 / (1 - abs(theta0) / alpha)), for slender blocks (Housner 1963), any shape, in units of 1/p.
 
     It holds for small alpha and every abs(theta0) < alpha, not only close to alpha as the paper says (errata 17); its relative
@@ -52,7 +53,7 @@ def slender_rocking_period(theta0: Any, *, alpha: float) -> Any:
     return 4 * np.arccosh(1 / (1 - _amplitude(theta0, alpha) / alpha))
 
 
-def rocking_energy_jump(velocity: Any, *, alpha: float, e: float, ground_velocity: Any = 0.0) -> Any:
+def rocking_energy_jump(velocity: Numbers, *, alpha: float, e: float, ground_velocity: Numbers = 0.0) -> Any:
     """[[T]] at an impact with theta'+ = e theta'-, over (4/3) M R^2 p^2 (appendix A, errata 10: the term zeta'^2 cancels):
 
         [[T]] = -(1 - e) / 2 {(1 + e) theta'^2 + 2 theta' zeta' cos(alpha)}
@@ -66,7 +67,7 @@ def rocking_energy_jump(velocity: Any, *, alpha: float, e: float, ground_velocit
     return (-(1 - e) / 2 * ((1 + e) * velocity**2 + 2 * velocity * ground_velocity * math.cos(alpha)))[()]
 
 
-def rocking_energy_decreases(velocity: Any, *, alpha: float, e: float, ground_velocity: Any = 0.0) -> Any:
+def rocking_energy_decreases(velocity: Numbers, *, alpha: float, e: float, ground_velocity: Numbers = 0.0) -> Any:
     """Whether the impact lowers the kinetic energy, e < 1 (appendix A): if either condition holds (errata 12), not both:
 
         theta' zeta' > 0,   or   abs(zeta') < (1 + e) / (2 cos(alpha)) abs(theta')
@@ -100,7 +101,9 @@ def _amplitude(theta0: Any, alpha: float) -> Any:
     _check(alpha, 1.0)
     size = np.abs(np.asarray(theta0, dtype=float))
     if not np.all(size < alpha):
-        raise ParameterError(f"abs(theta0) must be below alpha = {alpha:.6g} rad, or the block overturns; got {theta0!r}")
+        raise ParameterError(
+            f"abs(theta0) must be below alpha = {alpha:.6g} rad, or the block overturns; got {theta0!r}", "theta0"
+        )
     return size
 
 

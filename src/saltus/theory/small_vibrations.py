@@ -10,6 +10,7 @@ import numpy as np
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError
+from saltus.public_functions import Numbers
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
 
@@ -44,14 +45,15 @@ def vibration(layer: Layer) -> Vibration:
     if kappa <= 0:
         name = "lower" if layer.side > 0 else "upper"
         raise ParameterError(
-            f"the {name} layer does not vibrate: its linear stiffness k + V sin(beta0) = {kappa:.6g} must be above 0"
+            f"the {name} layer does not vibrate: its linear stiffness k + V sin(beta0) = {kappa:.6g} must be above 0",
+            "load.vertical",
         )
     frequency = math.sqrt(kappa / layer.mass)
     centre = layer.side * float(layer.push(0.0)) / kappa
     return Vibration(frequency, layer.damping / (2 * math.sqrt(layer.mass * kappa)), centre)
 
 
-def linear_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
+def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     """T0(theta0) of the symmetric undamped system (`t-beta`; k = 1, m = C = 0, e = 1), any shape:
 
         T0 = 4 / sqrt(kappa) arccos(1 / (1 - kappa abs(theta0) / (V cos(beta0)))),   kappa = 1 + V sin(beta0)
@@ -65,12 +67,16 @@ def linear_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
     size = np.abs(np.asarray(theta0, dtype=float))
     if closing <= UPRIGHT:
         if closing < -UPRIGHT or kappa <= 0:
-            raise ParameterError(f"no vibration about theta = 0, stable only for V cos(beta0) below 0, got {-closing:.6g}")
+            raise ParameterError(
+                f"no vibration about theta = 0, stable only for V cos(beta0) below 0, got {-closing:.6g}", "vertical"
+            )
         period = np.full_like(size, 2 * math.pi / math.sqrt(kappa))
         return period if period.ndim else float(period)
     stretch = kappa * size / closing  # the argument of arccos is 1 / (1 + stretch)
     if np.any(stretch <= -1):
-        raise ParameterError(f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the motion diverges")
+        raise ParameterError(
+            f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the motion diverges", "theta0"
+        )
     tangent = np.sqrt(np.abs(stretch) * (2 + stretch))
     if kappa > 0:
         period = 4 / math.sqrt(kappa) * np.arctan(tangent)
@@ -81,7 +87,7 @@ def linear_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
     return period if period.ndim else float(period)
 
 
-def short_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
+def short_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     """T0 for abs(theta0) << abs(V cos(beta0) / (1 + V sin(beta0))) (`t-beta_exp`), any shape:
 
         T0 = 4 sqrt(2 abs(theta0)) / sqrt(-V cos(beta0)), the next factor being 1 + 5/12 kappa abs(theta0) / (V cos(beta0))
@@ -91,11 +97,11 @@ def short_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
     """
     closing = _linear(beta0, vertical)[1]
     if closing <= UPRIGHT:
-        raise ParameterError(f"this expansion needs V cos(beta0) below 0, got {-closing:.6g}")
+        raise ParameterError(f"this expansion needs V cos(beta0) below 0, got {-closing:.6g}", "vertical")
     return 4 * np.sqrt(2 * np.abs(theta0)) / math.sqrt(closing)
 
 
-def upright_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
+def upright_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     """T0 for beta0 close to pi/2 (`t-beta_exp2`), any shape; its error is of order (pi/2 - beta0)^2:
 
         T0 = 4 / sqrt(1+V) arccos(1 / (1 - (1+V) / V abs(theta0) / (pi/2 - beta0)))
@@ -107,15 +113,19 @@ def upright_period(theta0: Any, *, beta0: float, vertical: float) -> Any:
     check_number("vertical", vertical)
     closing, kappa = -vertical * (math.pi / 2 - beta0), 1 + vertical
     if closing <= 0 or kappa == 0:
-        raise ParameterError(f"this expansion needs V (pi/2 - beta0) below 0 and V other than -1, got V = {vertical!r}")
+        raise ParameterError(
+            f"this expansion needs V (pi/2 - beta0) below 0 and V other than -1, got V = {vertical!r}", "vertical"
+        )
     stretch = kappa * np.abs(np.asarray(theta0, dtype=float)) / closing
     if np.any(stretch <= -1):
-        raise ParameterError(f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the motion diverges")
+        raise ParameterError(
+            f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the motion diverges", "theta0"
+        )
     angle = np.arccos(1 / (1 + stretch)) / math.sqrt(kappa) if kappa > 0 else np.arccosh(1 / (1 + stretch)) / math.sqrt(-kappa)
     return 4 * angle
 
 
-def decayed_amplitude(cycle: Any, *, theta0: float, e: float) -> Any:
+def decayed_amplitude(cycle: Numbers, *, theta0: float, e: float) -> Any:
     """Amplitude theta_D of the n-th cycle, from peak to peak (`approx1`, errata 8): e^(4 (n-1)) theta0, n = 1, 2, ...
 
     The paper prints e^(4n). Each impact takes e^2 off the energy, which is proportional to the amplitude while that is small.
@@ -126,7 +136,7 @@ def decayed_amplitude(cycle: Any, *, theta0: float, e: float) -> Any:
     return theta0 * _factor(cycle, e) ** 4
 
 
-def decayed_period(cycle: Any, *, period: float, e: float) -> Any:
+def decayed_period(cycle: Numbers, *, period: float, e: float) -> Any:
     """Duration T_D of the n-th cycle, from peak to peak (`reduced_period`): e^(2 (n-1)) (1+e)^2 T0 / 4, n = 1, 2, ...
 
     Counted from impact to impact instead, the first lasts (1 + 2e) T0 / 4 from the start (errata 8).
@@ -155,7 +165,7 @@ def _factor(cycle: Any, e: float) -> Any:
     """e^(n-1)."""
     check_number("e", e, above=0.0, at_most=1.0)
     if np.any(np.asarray(cycle) < 1):
-        raise ParameterError(f"cycles are counted from 1, got {cycle!r}")
+        raise ParameterError(f"cycles are counted from 1, got {cycle!r}", "cycle")
     return e ** (np.asarray(cycle, dtype=float) - 1)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from saltus.attractors.attractor import UNDECIDED
 from saltus.checks import check_count
 from saltus.errors import ParameterError
+from saltus.public_functions import Numbers, answered
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,8 @@ class BasinEntropy:
         return self.boundary > math.log(2.0)
 
 
-def basin_entropy(labels: Any, box: int = 5) -> BasinEntropy:
+@answered
+def basin_entropy(labels: Numbers, box: int = 5) -> BasinEntropy:
     """The basin entropy of a grid of labels, in one or two dimensions, in boxes of `box` cells a side.
 
     Incomplete boxes at the far edges, and boxes with an undecided cell (-1), are left out. The criterion S_bb > ln 2 holds for
@@ -59,7 +61,7 @@ def basin_entropy(labels: Any, box: int = 5) -> BasinEntropy:
     grid = _labels(labels)
     check_count("box", box, 2)
     if min(grid.shape) < box:
-        raise ParameterError(f"a grid of {grid.shape} cells has no box of {box}; take a finer grid or a smaller box")
+        raise ParameterError(f"a grid of {grid.shape} cells has no box of {box}; take a finer grid or a smaller box", "box")
     cut = grid[tuple(slice(0, n - n % box) for n in grid.shape)]
     boxes = _boxes(cut, box)
     boxes = boxes[(boxes != UNDECIDED).all(axis=1)]
@@ -97,7 +99,8 @@ class UncertaintyExponent:
         return self.cells - self.alpha
 
 
-def uncertainty_exponent(labels: Any, distances: Iterable[int] | None = None) -> UncertaintyExponent:
+@answered
+def uncertainty_exponent(labels: Numbers, distances: Iterable[int] | None = None) -> UncertaintyExponent:
     """The uncertainty exponent of a grid of labels, in one or two dimensions.
 
     A cell is uncertain at eps if a cell with another label lies within eps cells of it, along each axis (undecided cells are not
@@ -134,7 +137,8 @@ def _distances(grid: np.ndarray, given: Iterable[int] | None) -> np.ndarray:
     if len(reach) < 3 or not np.equal(reach, np.round(reach)).all() or reach[0] < 1 or 4 * reach[-1] > min(grid.shape):
         raise ParameterError(
             f"the exponent needs at least three distances, whole numbers of cells up to a quarter of the grid {grid.shape}; "
-            f"got {reach.tolist()}: take a finer grid, 64 cells a side or more"
+            f"got {reach.tolist()}: take a finer grid, 64 cells a side or more",
+            "distances",
         )
     return reach.astype(int)
 
@@ -187,7 +191,8 @@ class Wada:
         )
 
 
-def wada(labels: Any, radius: int = FRACTAL.radius) -> Wada:
+@answered
+def wada(labels: Numbers, radius: int = FRACTAL.radius) -> Wada:
     """Whether every point of the boundary of one basin is one of all basins, as far as a grid of labels shows it.
 
     Boundary cells have a neighbour, along an axis or diagonally, with another label. Around each a neighbourhood grows, up to
@@ -217,7 +222,7 @@ def _labels(labels: Any) -> np.ndarray:
     try:
         array = np.asarray(labels)
         grid = array.astype(int)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array, grid = np.empty((0, 0)), np.empty((0, 0), dtype=int)
     if grid.ndim not in (1, 2) or not grid.size or not np.array_equal(array, grid):
         raise ParameterError(

@@ -23,7 +23,6 @@ from saltus.checks import (
     Window,
     check_axis,
     check_count,
-    check_kind,
     check_memory,
     check_number,
     check_window,
@@ -70,8 +69,6 @@ def _check(
     progress: object,
     **coordinates: Any,
 ) -> None:
-    if found is not None:
-        check_kind("found", found, Attractors, source="find_attractors")
     grid = _grid(with_clock(system), velocity, coordinates, found)
     check_count("periods", periods, 32)
     check_number("within", within, above=0.0)

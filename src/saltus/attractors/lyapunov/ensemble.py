@@ -17,6 +17,7 @@ from saltus.errors import ParameterError
 from saltus.flow import Inputs, Stop, last_states, motions_from, read_inputs, stop_names
 from saltus.progress import Progress, part_of, silent
 from saltus.provenance import provenance
+from saltus.public_functions import Numbers
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def lyapunov_many(
     system: System,
     parameters: Mapping[str, Any] | None = None,
     *,
-    velocity: Any = 0.0,
+    velocity: Numbers = 0.0,
     periods: int = 1000,
     transient: int = 200,
     tol: float = 1e-11,

@@ -15,6 +15,7 @@ from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.attractors.lyapunov.two_trajectory import separation_growth
 from saltus.flow import Motion, Stop, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
+from saltus.public_functions import Numbers
 from saltus.systems import System
 
 ROUNDING = 1e-13  # of a derivative, relative to the largest one
@@ -77,7 +78,7 @@ class Exponents:
 def lyapunov_spectrum(
     system: System,
     *,
-    velocity: Any = 0.0,
+    velocity: Numbers = 0.0,
     periods: int = 1000,
     transient: int = 200,
     tol: float = 1e-12,

@@ -20,10 +20,11 @@ import numpy as np
 from saltus.attractors.manifolds.manifold_growth import Growth, GrowthEnd, Level, Segment
 from saltus.attractors.orbit_certificate import start_at
 from saltus.attractors.stroboscopic_section import section_states
-from saltus.checks import Rectangle, check_count, check_kind, check_number, check_window
+from saltus.checks import Rectangle, check_count, check_number, check_window
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import last_states, motions_from, sensitivities
 from saltus.orbits import PeriodicOrbit
+from saltus.public_functions import answered
 from saltus.systems import System, reversed_system
 
 
@@ -104,6 +105,7 @@ def stable_manifold(
     return _manifold(orbit, True, window, periods, step, points)
 
 
+@answered
 def unstable_manifold(
     orbit: PeriodicOrbit,
     *,
@@ -117,7 +119,6 @@ def unstable_manifold(
 
 
 def _manifold(orbit: PeriodicOrbit, stable: bool, window: Any, periods: int, step: float, points: int) -> Manifold:
-    check_kind("orbit", orbit, PeriodicOrbit, source="find_orbit or search_orbits")
     check_count("periods", periods, 1)
     check_count("points", points, 100)
     check_number("step", step, above=0.0, at_most=1.0)

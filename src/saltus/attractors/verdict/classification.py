@@ -14,13 +14,14 @@ from saltus.checks import check_count, check_number
 from saltus.errors import ParameterError
 from saltus.flow import RECURRENCE
 from saltus.progress import Progress, silent
+from saltus.public_functions import Numbers
 from saltus.systems import System
 
 
 def classify(
     system: System,
     *,
-    velocity: Any = 0.0,
+    velocity: Numbers = 0.0,
     periods: int = 4000,
     transient: int = 500,
     max_period: int = RECURRENCE.compiled_max_period,
@@ -78,7 +79,7 @@ def _start(system: System, velocity: Any, coordinates: dict[str, float]) -> np.n
     names = system.model.coordinates
     if set(coordinates) != set(names):
         wanted, given = ", ".join(f"{name}=..." for name in names), ", ".join(coordinates) or "no coordinate"
-        raise ParameterError(f"the state at the start is {wanted} and velocity=..., got {given}")
+        raise ParameterError(f"the state at the start is {wanted} and velocity=..., got {given}", "coordinates")
     velocities = [velocity] * len(names) if np.ndim(velocity) == 0 else list(velocity)
     if len(velocities) != len(names):
         raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}", "velocity")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import check_count
 from saltus.errors import ParameterError
+from saltus.public_functions import Numbers
 
 FEWEST_ENTRIES = 100  # of a series: lags reach a tenth of them
 CONSTANT = 1e-9  # relative: a series that varies less does not vary
@@ -23,7 +23,7 @@ class ZeroOne:
     samples: int
 
 
-def zero_one_test(series: Any, *, seed: int = 0, count: int = 100) -> ZeroOne:
+def zero_one_test(series: Numbers, *, seed: int = 0, count: int = 100) -> ZeroOne:
     """The 0-1 test of Gottwald and Melbourne (SIAM J. Appl. Dyn. Syst. 8 (2009) 129), by the correlation method.
 
     At random frequencies c in (pi/5, 4 pi/5) the series phi drives p + i q = sum of phi_j exp(i j c), which wanders like a
@@ -45,10 +45,13 @@ def zero_one_test(series: Any, *, seed: int = 0, count: int = 100) -> ZeroOne:
     try:
         values = np.asarray(series, dtype=float)
     except (TypeError, ValueError):
-        raise ParameterError("the 0-1 test takes a series of numbers, one a forcing period") from None
+        raise ParameterError("the 0-1 test takes a series of numbers, one a forcing period", "series") from None
     if values.ndim != 1 or values.size < FEWEST_ENTRIES or not np.isfinite(values).all():
-        raise ParameterError(f"the 0-1 test takes at least {FEWEST_ENTRIES} finite numbers in one row, got shape {values.shape}")
-    check_number("count", count, at_least=1)
+        raise ParameterError(
+            f"the 0-1 test takes at least {FEWEST_ENTRIES} finite numbers in one row, got shape {values.shape}", "series"
+        )
+    check_count("count", count, 1, 100_000)
+    check_count("seed", seed, 0)
     if np.ptp(values) <= CONSTANT * max(1.0, float(np.abs(values).max())):
         return ZeroOne(0.0, 0.0, values.size)
     lags = np.arange(1, values.size // 10 + 1)

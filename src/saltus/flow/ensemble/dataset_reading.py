@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import check_dataset
 from saltus.flow.motion_dataset import rate_name
+from saltus.public_functions import answered
 
 if TYPE_CHECKING:
     import xarray
@@ -14,12 +16,15 @@ if TYPE_CHECKING:
     from saltus.systems import System
 
 
+@answered
 def stop_names(dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
     """Why each motion ended, in the dimensions of the ensemble; the words are those of `Stop`."""
+    check_dataset(dataset, "simulate_many", ("stop",))
     stop = dataset["stop"]
     return np.array(stop.attrs["flag_meanings"].split())[stop.values]
 
 
+@answered
 def stroboscopic(system: System, dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
     """The states (coordinates, then velocities) at the ends of the forcing periods that were kept, in the order of time.
 
@@ -27,4 +32,5 @@ def stroboscopic(system: System, dataset: xarray.Dataset) -> np.ndarray[Any, Any
     """
     names = system.model.coordinates
     states = [*names, *(rate_name(name, names) for name in names)]
+    check_dataset(dataset, "simulate_many with sample", [f"sampled_{name}" for name in states])
     return np.stack([dataset[f"sampled_{name}"].values for name in states], axis=-1)

@@ -19,6 +19,7 @@ from saltus.flow.ensemble.wanted import Sample, Until, Wanted, read_last, read_n
 from saltus.flow.forcing_time import Clock, clock
 from saltus.flow.structures import Program, check_contact, limits_of, program
 from saltus.progress import Progress, silent
+from saltus.public_functions import Numbers
 from saltus.systems import System, check_system, numbers
 
 if TYPE_CHECKING:
@@ -31,12 +32,12 @@ SLIVER = 1e-9  # A duration that ends so near, in forcing periods, to the end of
 def simulate_many(
     system: System,
     *,
-    velocity: Any = 0.0,
+    velocity: Numbers = 0.0,
     parameters: Mapping[str, Any] | None = None,
     periods: float | None = None,
     duration: float | None = None,
     tol: float = 1e-12,
-    time: Any = 0.0,
+    time: Numbers = 0.0,
     side: int | None = None,
     stop_at: Iterable[str] = (),
     sample: Iterable[str] = ("state",),
@@ -129,7 +130,7 @@ def _capture(system: System, columns: dict[str, np.ndarray], limits: tuple[str, 
 
     asked = [name for name in limits if name not in system.model.stops]
     if asked:
-        raise ParameterError(f'until="rest" proves nothing about {asked[0]}; leave out either it or stop_at')
+        raise ParameterError(f'until="rest" proves nothing about {asked[0]}; leave out either it or stop_at', "until")
     if system.model.contacts:
         return np.where(keeps_rest(system, columns), math.inf, 0.0)
     if not system.model.sides:

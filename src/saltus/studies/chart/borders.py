@@ -14,6 +14,7 @@ import numpy as np
 
 from saltus.checks import check_count
 from saltus.progress import Progress, part_of, silent
+from saltus.public_functions import answered
 from saltus.studies.chart.added_motions import ADDED, has_motion, with_motions
 from saltus.studies.chart.border_curves import explained, passes_through
 from saltus.studies.chart.border_starts import border_starts, places
@@ -78,6 +79,7 @@ class Borders:
         return xr.DataTree.from_dict({"ends": xr.Dataset(data), **groups})
 
 
+@answered
 def with_borders(
     system: System,
     chart: xarray.Dataset,

@@ -47,7 +47,7 @@ def stability_chart(
     tol: float = 1e-10,
     seed: int = 0,
     rows: int = 101,
-    store: Any = None,
+    store: Path | str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress = silent,

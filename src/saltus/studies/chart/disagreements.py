@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from saltus.checks import check_dataset
+from saltus.public_functions import answered
 from saltus.studies.chart.border_curves import explained, unseen_folds
 from saltus.studies.chart.borders import Borders
 from saltus.studies.chart.cell_outcomes import CellOutcome
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     import xarray
 
 
+@answered
 def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     """Where chart and curves do not agree, away from the cells through which the curves run.
 
@@ -34,6 +37,7 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     """
     import xarray as xr
 
+    check_dataset(chart, "stability_chart", ("vertical", "horizontal", "count", "amplitude"), ("least",), name="chart")
     cells = read_chart(chart)
     changes = changes_of(cells)
     found = borders.of(cells, changes)

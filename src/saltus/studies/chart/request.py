@@ -14,6 +14,7 @@ from saltus.checks import (
     check_along,
     check_axis,
     check_count,
+    check_dataset,
     check_memory,
     check_number,
     check_path,
@@ -125,6 +126,8 @@ class ChartRequest:
     @classmethod
     def of_chart(cls, system: System, chart: Any) -> ChartRequest:
         """The request of which a chart is the answer."""
+        needed = ("vertical", "horizontal", "count", "amplitude"), ("window", "path", *NUMBERS)
+        check_dataset(chart, "stability_chart", *needed, name="chart")
         attrs = chart.attrs
         low_x, high_x, low_v, high_v = (float(value) for value in attrs["window"])
         numbers = {name: attrs[name].item() if isinstance(attrs[name], np.generic) else attrs[name] for name in NUMBERS}
@@ -189,7 +192,7 @@ def _check_driven(system: Any) -> None:
     """Refuse what has no chart."""
     check_system(system, "stability_chart", coordinates=1)
     if system.load.frequency is None:
-        raise ParameterError("a stability chart needs a load with a frequency, Load(frequency=..., ...)")
+        raise ParameterError("a stability chart needs a load with a frequency, Load(frequency=..., ...)", "load.frequency")
 
 
 def _check_paths(system: System, paths: Any, axes: tuple[np.ndarray, np.ndarray]) -> None:

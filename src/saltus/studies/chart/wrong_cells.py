@@ -9,6 +9,7 @@ import numpy as np
 
 from saltus.attractors import share_interval
 from saltus.checks import check_count
+from saltus.public_functions import answered
 from saltus.studies.chart.cell_outcomes import CellOutcome
 from saltus.studies.chart.cells import computed
 from saltus.studies.chart.changes import COUNTS
@@ -23,6 +24,7 @@ MORE = 4  # times as many starts
 CHAOTIC = (CellOutcome.CHAOS, CellOutcome.MOTIONS_AND_CHAOS)
 
 
+@answered
 def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed: int = 1) -> dict[str, float]:
     """How many cells of a sample are wrong: cells at random are computed again with four times the starts, other ones, and beside
     eight more cells about each, half as far away as its neighbours, so that motions which begin there are found.
@@ -39,6 +41,7 @@ def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed
         other way round; and the `wrong_share` of the wrong ones with its 95 % interval, `wrong_share_low` to `wrong_share_high`.
     """
     check_count("cells", cells, 1)
+    check_count("seed", seed, 0)
     request, chart = ChartRequest.of_chart(system, chart), chart.transpose("vertical", "horizontal", ...)
     size = int(np.prod(request.shape))
     chosen = np.sort(np.random.default_rng(seed).choice(size, min(cells, size), replace=False))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Rectangle, check_bounds, check_count, check_kind, check_step, check_window
+from saltus.checks import Rectangle, check_bounds, check_count, check_step, check_window
 from saltus.errors import ParameterError
 from saltus.orbits import STEP
 from saltus.progress import Progress, part_of, silent
@@ -60,8 +60,6 @@ def _check(
     if starts is not None:
         check_count("starts", starts, 1)
     check_step(step)
-    for name, answer in (("switch", switch), ("bands", bands)):
-        check_kind(name, answer, bool)
     _values(bounds, values, 1)
     area = check_window(window, system)
     from saltus.sweep import check_run, check_store

@@ -1,0 +1,348 @@
+"""The whole public face: every parameter of every public function, class and method, with values of every kind.
+
+What is public is read from `saltus.__all__`, from `saltus.theory`, and from what is marked as answering in the other rooms; of a
+new name the first test asks for arguments that fit. A value is refused by a ParameterError whose `parameter` is
+set and which names the argument, or it is meant; what the argument's annotation excludes is never meant.
+"""
+
+import importlib
+import inspect
+import math
+import time
+import typing
+
+import numpy as np
+import pytest
+import xarray
+
+import saltus
+from saltus import orbits, public_functions, studies, sweep
+from saltus.errors import ParameterError, SaltusError
+
+SYSTEM = saltus.System(
+    model=saltus.Metainterface(beta0=1.4, damping=0.1),
+    load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.3), vertical=-0.5),
+)
+UNFORCED = saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(vertical=-0.5))
+LINEAR = saltus.System(model=saltus.Metainterface(beta0=math.pi / 2), load=saltus.Load(vertical=-0.5))
+WALL = saltus.System(
+    model=saltus.WallOscillator(damping=0.1),
+    load=saltus.Load(frequency=2.6, force=saltus.Harmonic(1.0)),
+    impact=saltus.VelocityReduction(0.8),
+)
+CELL = saltus.UnitCell(alpha0=0.3, beta0=1.4)
+SI = saltus.PhysicalCell(length=0.1, upper_mass=1.0, upper_stiffness=2.0)
+ROOMS = ("attractors", "flow", "orbits", "studies", "sweep", "systems", "theory")
+# Formulas, which are called with numbers, arrays and the symbols of the tracer alike and check nothing; and how orbits are made.
+FORMULAS = (saltus.Model, saltus.Harmonic, saltus.Record, saltus.Contact, saltus.systems.ImpactLaw)
+MADE_INSIDE = ("PeriodicOrbit.known", "PeriodicOrbit.near", "ParameterError.inside")
+
+VALUES = (
+    *(None, "", "x", b"x", True, -1, 0, 0.5, math.nan, math.inf, 1e300, 10**30, 1j, [], {}, (), [1, 2, 3], ["a"], [[]], [None]),
+    *([math.nan], {"a": 1}, {1.0}, np.array([]), np.zeros((2, 2)), np.zeros((2, 3, 2)), np.array(["a"]), np.array(0.3)),
+    *(np.array([1 + 2j]), xarray.Dataset(), object(), len, int, lambda: 1, range(3), SYSTEM, SYSTEM.model, 80.0),
+)
+
+
+class Computed(BaseException):
+    """The checks are over, and something would be computed."""
+
+
+@pytest.fixture(scope="module")
+def made():
+    """What public functions take and only others give."""
+    motion, orbit = saltus.simulate(SYSTEM, theta=0.3, periods=2), saltus.find_orbit(SYSTEM, theta=0.1)
+    branch = saltus.continue_orbit(saltus.find_orbit(SYSTEM, theta=0.1), "load.frequency", (0.8, 1.2))
+    fold = next(s for s in branch.special if s.kind == orbits.SpecialKind.LP)
+    curve = saltus.continue_special(fold, "load.vertical", (-0.51, -0.49), first_bounds=(0.8, 1.2), most_points=10)
+    chart = studies.stability_chart(SYSTEM, horizontal=[0.1, 0.2], vertical=[-0.5, -0.4], starts=2, periods=60)
+    many = saltus.simulate_many(SYSTEM, theta=[0.1, 0.3], periods=4, last=3)
+    return {"motion": motion, "orbit": orbit, "branch": branch, "fold": fold, "curve": curve, "chart": chart, "many": many}
+
+
+def good(made):
+    """What is called, by its name, with arguments that fit."""
+    orbit, branch, fold, curve, chart = (made[name] for name in ("orbit", "branch", "fold", "curve", "chart"))
+    plan = sweep.Plan(function="test_public_face:squares", axes={"x": np.arange(2.0)}, variables={"y": sweep.Variable()})
+    along = {"system": SYSTEM, "path": "load.frequency"}
+    one = {"system": SYSTEM, "theta": 0.3}
+    angles = {"beta0": 1.4, "vertical": -0.5}
+    model, contact = saltus.Metainterface, {"name": "stop", "coordinate": "x"}
+    saddle = next(o for o in branch.orbits if abs(o.multipliers[0]) > 1.01)
+    cell_data = {"length": 0.1, "upper_mass": 1.0, "upper_stiffness": 2.0}
+    labels = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
+    functions = {
+        "saltus.attractors_along": {**along, "values": [1.0, 1.1]},
+        "saltus.basins_of_attraction": {"system": SYSTEM, "theta": [0.0, 1.0], "velocity": [0.0, 1.0]},
+        "saltus.bifurcation_diagram": {"system": SYSTEM},
+        "saltus.capture_speed": {"system": SYSTEM},
+        "saltus.chaotic_bands": {**along, "bounds": (0.9, 1.1)},
+        "saltus.classify": one,
+        "saltus.continue_orbit": {"orbit": orbit, "path": "load.frequency", "bounds": (0.9, 1.1)},
+        "saltus.continue_special": {"special": fold, "path": "load.vertical", "bounds": (-0.6, -0.4)},
+        "saltus.doubling_cascade": {"first": fold, "bounds": (0.8, 1.1)},
+        "saltus.excludes_tori": {"system": SYSTEM},
+        "saltus.find_attractors": {"system": SYSTEM},
+        "saltus.find_orbit": one,
+        "saltus.load_study": {"path": "/nowhere/study.toml"},
+        "saltus.lyapunov_many": one,
+        "saltus.lyapunov_spectrum": one,
+        "saltus.phase_portrait": {"system": UNFORCED},
+        "saltus.register": {"cls": saltus.Metainterface},
+        "saltus.response_spectrum": {"system": SYSTEM},
+        "saltus.search_orbits": {**along, "values": [1.0]},
+        "saltus.sensitivities": {**one, "periods": 1},
+        "saltus.separatrices": {"system": UNFORCED},
+        "saltus.simulate": {**one, "periods": 1},
+        "saltus.simulate_many": {**one, "periods": 1},
+        "saltus.stability_chart": {"system": SYSTEM},
+        "saltus.stable_manifold": {"orbit": saddle},
+        "saltus.switch_branch": {"special": fold, "bounds": (0.8, 1.1)},
+        "saltus.zero_one_test": {"series": np.sin(np.arange(300.0))},
+        "saltus.branch_of": {"diagram": xarray.DataTree(), "number": 0},
+        "attractors.basin_entropy": {"labels": labels},
+        "attractors.uncertainty_exponent": {"labels": labels},
+        "attractors.unstable_manifold": {"orbit": saddle},
+        "attractors.wada": {"labels": labels},
+        "flow.load_releases": {"system": SYSTEM},
+        "flow.stop_names": {"dataset": made["many"]},
+        "flow.stroboscopic": {"system": SYSTEM, "dataset": made["many"]},
+        "orbits.defects": {"orbits": [orbit]},
+        "orbits.is_symmetric": {"system": SYSTEM},
+        "orbits.orbits_of": {"dataset": branch.to_xarray()},
+        "studies.bordered_chart": {"system": SYSTEM},
+        "studies.disagreements": {"chart": chart, "borders": studies.Borders()},
+        "studies.with_borders": {"system": SYSTEM, "chart": chart},
+        "studies.wrong_cells": {"system": SYSTEM, "chart": chart},
+        "sweep.open_store": {"path": "/nowhere/store"},
+        "sweep.remove_store": {"path": "/nowhere/store"},
+        "sweep.run": {"plan": plan},
+        "sweep.status": {"path": "/nowhere/store"},
+        "saltus.energy_gain": {"model": saltus.TwoLayer(beta0=1.4, mass_ratio=0.5), "impact": saltus.NewtonImpact(1.0)},
+        "theory.amplitude_limits": {"system": SYSTEM},
+        "theory.critical_horizontal": angles,
+        "theory.decayed_amplitude": {"cycle": 2, "theta0": 0.3, "e": 0.9},
+        "theory.decayed_period": {"cycle": 2, "period": 5.0, "e": 0.9},
+        "theory.divergence": {"system": LINEAR},
+        "theory.energy_factor": {"system": SYSTEM, "velocity": 0.3, "side": 1, "e": 0.9},
+        "theory.energy_jump": {"system": SYSTEM, "velocity": 0.3, "side": 1, "e": 0.9},
+        "theory.equilibria": {"system": UNFORCED},
+        "theory.equivalent_angle": {"beta0": 1.4, "ground_amplitude": 0.1},
+        "theory.final_time": {"period": 5.0, "e": 0.9},
+        "theory.fold_curve": {"beta0": 1.4, "opening": 0.1},
+        "theory.fold_horizontal": {"beta0": 1.4, "vertical": -1.2},
+        "theory.high_frequency_onset": {"frequency": 3.0, "damping": 0.1, **angles},
+        "theory.housner_restitution": {"alpha": 0.3},
+        "theory.inelastic_contact": {"beta0": 1.4, "mass_ratio": 0.1, "side": 1},
+        "theory.is_monostable": {"horizontal": 0.1, **angles},
+        "theory.layers": {"system": UNFORCED},
+        "theory.linear_equilibria": {"system": UNFORCED},
+        "theory.linear_motion": {"system": UNFORCED, "theta0": 0.1, "impacts": 3},
+        "theory.linear_period": {"theta0": 0.1, **angles},
+        "theory.open_layer": {"system": UNFORCED, "side": 1},
+        "theory.paper_monostable": {"horizontal": 0.1, **angles},
+        "theory.peaks": {"system": UNFORCED, "theta0": 0.1},
+        "theory.pendulum_acceleration": {"system": LINEAR, "tau": 0.0, "theta": 0.1, "velocity": 0.0},
+        "theory.potential_energy": {"system": UNFORCED, "theta": 0.1},
+        "theory.potential_slope": {"system": UNFORCED, "theta": 0.1},
+        "theory.quasi_static_border": {"system": SYSTEM, "plane": ("load.horizontal.amplitude", "load.vertical"), "lowest": -1.0},
+        "theory.reciprocal": {"system": UNFORCED, "theta0": 0.1},
+        "theory.rocking_energy_decreases": {"velocity": 0.1, "alpha": 0.3, "e": 0.9},
+        "theory.rocking_energy_jump": {"velocity": 0.1, "alpha": 0.3, "e": 0.9},
+        "theory.rocking_period": {"theta0": 0.1, "alpha": 0.3},
+        "theory.short_period": {"theta0": 0.1, **angles},
+        "theory.short_rocking_period": {"theta0": 0.1, "alpha": 0.3},
+        "theory.slender_rocking_period": {"theta0": 0.1, "alpha": 0.3},
+        "theory.static_angle": {"horizontal": 0.1, **angles},
+        "theory.subcritical_vertical": {"beta0": 1.4},
+        "theory.total_energy": {"system": UNFORCED, "theta": 0.1, "velocity": 0.1},
+        "theory.undeformed_stability": {"system": UNFORCED},
+        "theory.unloaded_fold": {"beta0": 1.4},
+        "theory.unloaded_half_periods": {"stiffness_ratio": 1.0},
+        "theory.unloaded_peak_ratio": {"stiffness_ratio": 1.0},
+        "theory.unloaded_period": {"stiffness_ratio": 1.0},
+        "theory.upright_period": {"theta0": 0.1, "beta0": 1.5, "vertical": -0.5},
+        "theory.velocity_factor": {"system": SYSTEM, "velocity": 0.3, "side": 1, "r": 0.9},
+        "theory.vibrations": {"system": UNFORCED},
+        "theory.wall_orbits": {"system": WALL},
+    }
+    asked = {name: (getattr(importlib.import_module(_room(name)), name.partition(".")[2]), kw) for name, kw in functions.items()}
+    return asked | {
+        "Branch.at": (branch.at, {"value": 1.0}),
+        "Branch.is_joined": (branch.is_joined, {"before": 0}),
+        "Branch.solved_at": (branch.solved_at, {"value": 1.0}),
+        "Branch.solved_between": (branch.solved_between, {"before": 0, "value": 0.81}),
+        "Contact": (saltus.Contact, contact),
+        "EnergyRestitution": (saltus.EnergyRestitution, {"r": 0.9}),
+        "Harmonic": (saltus.Harmonic, {"amplitude": 0.1}),
+        "Load": (saltus.Load, {"frequency": 1.0, "horizontal": 0.1}),
+        "ImpactPair": (saltus.ImpactPair, {}),
+        "Metainterface": (model, {"beta0": 1.4}),
+        "Metainterface.margin_kind": (SYSTEM.model.margin_kind, {"margin": "line_limit"}),
+        "Metainterface.unit_of": (SYSTEM.model.unit_of, {"coordinate": "theta"}),
+        "Motion.at": (made["motion"].at, {"times": 1.0}),
+        "Motion.to_xarray": (made["motion"].to_xarray, {}),
+        "NewtonImpact": (saltus.NewtonImpact, {}),
+        "Motion.closed_at": (made["motion"].closed_at, {"time": 1.0}),
+        "PeriodicOrbit.defect_after": (orbit.defect_after, {"rounds": 1}),
+        "PeriodicOrbit.motion": (orbit.motion, {}),
+        "PhysicalCell": (saltus.PhysicalCell, cell_data),
+        "PhysicalCell.from_model": (saltus.PhysicalCell.from_model, {"model": SYSTEM.model, **cell_data}),
+        "PhysicalCell.load": (SI.load, {"si": SYSTEM.load}),
+        "PhysicalCell.load_in_si": (SI.load_in_si, {"load": SYSTEM.load}),
+        "PhysicalCell.metainterface": (SI.metainterface, {"beta0": 1.4}),
+        "PhysicalCell.two_layer": (SI.two_layer, {"beta0": 1.4}),
+        "Record": (saltus.Record, {"time": [0.0, 1.0], "value": [0.0, 1.0]}),
+        "RockingBlock": (saltus.RockingBlock, {"alpha": 0.3}),
+        "SpecialCurve.at": (curve.at, {"path": "load.vertical", "value": -0.5}),
+        "System": (saltus.System, {"model": SYSTEM.model, "load": SYSTEM.load, "impact": SYSTEM.impact}),
+        "System.from_dict": (saltus.System.from_dict, {"data": SYSTEM.to_dict()}),
+        "System.from_json": (saltus.System.from_json, {"text": SYSTEM.to_json()}),
+        "System.from_toml": (saltus.System.from_toml, {"text": SYSTEM.to_toml()}),
+        "System.get": (SYSTEM.get, {"path": "load.frequency"}),
+        "System.with_": (SYSTEM.with_, {"changes": {"load.frequency": 1.1}}),
+        "TwoLayer": (saltus.TwoLayer, {"beta0": 1.4}),
+        "TwoStops": (saltus.TwoStops, {}),
+        "UnitCell": (saltus.UnitCell, {"alpha0": 0.3, "beta0": 1.4}),
+        **{
+            f"UnitCell.{name}": (getattr(CELL, name), {"theta": 0.1})
+            for name in ("alpha", "beta", "eta", "phi", "small_phi", "xi")
+        },
+        "UnitCell.alpha_of_phi": (CELL.alpha_of_phi, {"phi": 0.1}),
+        "UnitCell.beta_of_phi": (CELL.beta_of_phi, {"phi": 0.1}),
+        "UnitCell.layout": (CELL.layout, {}),
+        "UnitCell.line_condition": (CELL.line_condition, {}),
+        "UnitCell.phi_velocity": (CELL.phi_velocity, {"theta": 0.1, "velocity": 0.1}),
+        "UnitCell.theta": (CELL.theta, {"phi": 0.1}),
+        "VelocityReduction": (saltus.VelocityReduction, {"e": 0.9}),
+        "WallOscillator": (saltus.WallOscillator, {}),
+    }
+
+
+def squares(arguments, block):
+    """What the sweep computes."""
+    return {"y": block["x"] ** 2}
+
+
+def _room(name):
+    room = name.partition(".")[0]
+    return room if room == "saltus" else f"saltus.{room}"
+
+
+def public():
+    """The names of all functions that answer, of the classes that a user makes, and of their methods with arguments."""
+    for room in ("saltus", *(f"saltus.{room}" for room in ROOMS)):
+        package = importlib.import_module(room)
+        for name in package.__all__:
+            found = getattr(package, name)
+            own = f"{room.removeprefix('saltus.')}.{name}"
+            named_above = room != "saltus" and getattr(saltus, name, None) is found
+            if inspect.isfunction(found) and hasattr(found, "answers") and not named_above and _arguments(found):
+                yield own
+    for cls in (getattr(saltus, name) for name in saltus.__all__):
+        if inspect.isclass(cls) and cls.__module__.startswith("saltus.") and not issubclass(cls, (Exception, str)):
+            yield from _of(cls)
+
+
+def _of(cls):
+    if hasattr(cls.__init__, "__wrapped__") and _arguments(cls):
+        yield cls.__name__
+    formulas = issubclass(cls, FORMULAS) or cls is saltus.Model
+    for name, method in inspect.getmembers(cls, inspect.isroutine):
+        if name.startswith("_") or not callable(method) or not _arguments(method) or not method.__module__.startswith("saltus"):
+            continue
+        if hasattr(method, "answers") or not formulas:
+            yield f"{cls.__name__}.{name}"
+
+
+def _arguments(function):
+    return [p for p in inspect.signature(function).parameters.values() if p.name != "self"]
+
+
+def test_every_public_name_is_asked(made):
+    """A formula of a model is none of them; whatever else there is has arguments here, and answers."""
+    asked = set(good(made))
+    once = {name.partition(".")[2] for name in asked if name.startswith(("Branch.", "Metainterface."))}  # of several classes
+    assert {name for name in public() if name.partition(".")[2] not in once or name in asked} - {*MADE_INSIDE} == asked
+
+
+def test_arguments_that_fit_are_taken(made, alone):
+    for name, (function, fitting) in good(made).items():
+        assert answer(function, fitting) is None or name in REFUSED, name
+
+
+# A study or a store that is nowhere, an empty tree, a fold where only a period doubling begins something: what is wrong with
+# another argument is told first.
+REFUSED = ("saltus.branch_of", "saltus.doubling_cascade", "saltus.switch_branch", "saltus.load_study", "sweep.open_store")
+REFUSED += ("sweep.status",)
+
+
+@pytest.fixture
+def alone(monkeypatch, tmp_path):
+    """A folder of one's own, and nothing is computed."""
+    from saltus.flow import simulation
+    from saltus.flow.ensemble import ensemble
+    from saltus.orbits import problem
+
+    def begun(*_, **__):
+        raise Computed
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(simulation, "follow", begun)
+    monkeypatch.setattr(ensemble, "_run", begun)
+    monkeypatch.setattr(problem.Problem, "evaluate", begun)
+
+
+def answer(function, named):
+    """The error with which a call is refused, if it is."""
+    try:
+        function(**named)
+    except SaltusError as error:
+        return error
+    except Computed:
+        pass
+    return None
+
+
+def asked_of(function):
+    """The parameters of a function and the kinds that they take; `workers` and `scheduler`, which start others, are left out."""
+    described = function.__init__ if inspect.isclass(function) else getattr(function, "__func__", function)
+    hints = public_functions._hints(inspect.unwrap(described))
+    for parameter in _arguments(function):
+        if parameter.name not in ("workers", "scheduler") and parameter.kind is not parameter.VAR_KEYWORD:
+            yield parameter.name, hints.get(parameter.name, typing.Any)
+
+
+@pytest.mark.filterwarnings("ignore")  # of NumPy, where an array of huge numbers is meant
+def test_every_argument_answers_every_kind_of_value(made, alone):
+    """Of more than ten thousand calls with one argument that may be wrong, none raises anything but a sentence that names it."""
+    wrong, tried = [], 0
+    for name, (function, fitting) in good(made).items():
+        for parameter, hint in asked_of(function):
+            for value in VALUES:
+                tried += 1
+                begun = time.process_time()
+                try:
+                    refusal = answer(function, {**fitting, parameter: value})
+                except Exception as error:
+                    wrong.append((name, parameter, value, repr(error)))
+                    continue
+                if refusal is None and not public_functions.fits(value, hint):
+                    wrong.append((name, parameter, value, "is taken"))
+                if isinstance(refusal, ParameterError) and refusal.parameter is None:
+                    wrong.append((name, parameter, value, f"names nothing: {refusal}"))
+                if len(str(refusal)) >= 400 or time.process_time() - begun > 10.0:
+                    wrong.append((name, parameter, value, f"is long: {refusal}"))
+    assert tried > 10_000
+    assert not wrong, "\n".join(f"{name}({parameter}={value!r:.30}) {what:.200}" for name, parameter, value, what in wrong)
+
+
+def test_every_misspelt_argument_is_answered_with_the_near_name(made):
+    for name, (function, fitting) in good(made).items():
+        if any(p.kind is p.VAR_KEYWORD for p in _arguments(function)):
+            continue
+        for parameter in _arguments(function):
+            misspelt = parameter.name + "_"
+            with pytest.raises(ParameterError, match=f"did you mean .*'{parameter.name}'") as refusal:
+                function(**{**fitting, misspelt: 1})
+            assert refusal.value.parameter == misspelt, name
