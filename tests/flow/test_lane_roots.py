@@ -36,10 +36,10 @@ motion_at, only_root = COMPILED["motion_at"], COMPILED["only_root"]
 @njit(types.void(types.float64[::1], types.int64[::1], types.int64), **OPTIONS)
 def find(m, at, order):
     h, sign, start = load(m, STEP), load(m, SIGN), load(m, 0)
-    x, v, a, _ = motion_at(m, at, order, start, h)
+    x, v, a, _ = motion_at(m, at, 0, order, start, h)
     g1, g2 = sign * load(m, 1) * h, sign * load(m, 2) * (h * h)
     g3 = sign * load(m, 3) * (h * h * h)
-    time, speed = only_root(m, at, order, h, start, sign, (sign * start, g1, g2, g3), (x, v, a), ALL)
+    time, speed = only_root(m, at, 0, order, h, start, sign, (sign * start, g1, g2, g3), (x, v, a), ALL)
     store(m, TIME, time)
     store(m, SPEED, speed)
 

@@ -71,6 +71,7 @@ def test_the_least_reaction_is_found_just_before_the_impact_with_which_a_period_
     later = saltus.find_orbit(system, theta=theta, velocity=velocity, period=2)
     value = system.get(AMPLITUDE)
     found = saltus.continue_orbit(later, AMPLITUDE, (value - 1e-4, value + 1e-4))
-    layer = closed_layer(xr.DataTree.from_dict({"/": xr.Dataset(attrs={"bounds": [2.0, 4.0]}), "branch_000": found.to_xarray()}))
+    bounds = {"/": xr.Dataset(attrs={"bounds": [2.0, 4.0]})}
+    layer = closed_layer(xr.DataTree.from_dict(bounds | branch_tables([found.to_xarray()])))
     assert layer["stored"].values == pytest.approx(-3.0444, abs=1e-3)
     assert layer["simulated"].values == pytest.approx(layer["stored"].values, rel=1e-6)
