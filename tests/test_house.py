@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import statistics
 import subprocess
 import sys
@@ -231,3 +232,13 @@ def test_examples_are_short_and_end_in_an_assertion_that_holds(script: Path) -> 
     environment = os.environ | {"PYTHONWARNINGS": "error::RuntimeWarning"}
     result = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment, cwd=script.parent)
     assert result.returncode == 0, result.stderr
+
+
+def test_every_test_that_is_named_for_contributors_is_there() -> None:
+    """`tests/file.py::name`, and `::name` of the file before it."""
+    page, file, found = (SOURCE.parents[1] / "CONTRIBUTING.md").read_text(), "", 0
+    for named in re.findall(r"`(tests/\S+\.py)?::(\w+)`", page):
+        file = named[0] or file
+        assert f"\ndef {named[1]}(" in (SOURCE.parents[1] / file).read_text(), f"{file}::{named[1]}"
+        found += 1
+    assert found > 20

@@ -141,6 +141,8 @@ RECORDS = {
     "words": ("time,a\nunit,m\n0,0\n", "line 2 must be two finite numbers"),
     "decimal_commas": ("0,0,0,1\n0,5,1,2\n", "line 2 must be two finite numbers"),
     "one_column": ("0\n1\n2\n", "line 2 must be two finite numbers"),
+    "long_cell": ("0,0\n1," + "1" * 200_000 + "\n", "line 2 must be two finite numbers"),
+    "long_words": ("0,0\n1," + "x" * 200_000 + "\n", "line 2 must be two finite numbers"),
 }
 
 
@@ -152,6 +154,7 @@ def test_a_bad_record_is_refused_with_its_line(tmp_path, name):
     assert message.startswith(", line 5: load.ground_horizontal")
     assert "q.csv" in message
     assert problem in message
+    assert len(message) < 400
 
 
 def test_records_that_cannot_be_read(tmp_path):
@@ -161,6 +164,9 @@ def test_records_that_cannot_be_read(tmp_path):
     (tmp_path / "q.csv").rmdir()
     (tmp_path / "q.csv").write_bytes(b"\xff\x00\xfe")
     assert "is not a text file" in refusal(tmp_path, QUAKE)
+    assert "is no file" in refusal(tmp_path, QUAKE.replace("q.csv", "/dev/zero"))
+    os.mkfifo(tmp_path / "pipe")
+    assert "is no file" in refusal(tmp_path, QUAKE.replace("q.csv", "pipe"))
 
 
 @pytest.mark.parametrize(
