@@ -1,7 +1,8 @@
 """Files that are complete or not there, and that notice when they are damaged.
 
 Every output is made in memory, written beside its place, brought to the disk and moved there. A netCDF file ends with a checksum
-of all its bytes, behind what HDF5 reads, so that it is checked before HDF5 opens it.
+of all its bytes, behind what HDF5 reads, so that it is checked before HDF5 opens it. A file without one, which another program
+wrote, is first read by a process of its own, as damage can stop HDF5 or keep it for ever.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import hashlib
 import io
 import os
 import secrets
+import subprocess
 import sys
 import tempfile
 import time
@@ -25,6 +27,11 @@ from saltus.errors import ParameterError
 PART = ".part"
 STALE = 60.0  # s; where there are no locks, what has not been touched for so long was left by a killed run
 HEAD, TAIL = b"\nsha256 of the bytes before: ", b" (saltus)\n"  # of the checksum: wiping out 64 bytes leaves one of them
+UNCHECKED = "has no checksum (saltus writes one behind each file), so that damage to its numbers cannot be excluded"
+SLOWEST_READ = 1e6  # bytes/s, with LONGEST_OPEN s beside it: HDF5 that takes longer has lost its way in a damaged file
+LONGEST_OPEN = 120.0  # many times what it takes where other work leaves little of the processor
+HDF5 = b"\x89HDF\r\n\x1a\n"  # with which its files begin
+END_OF_FILE = {0: 40, 1: 44, 2: 28, 3: 28}  # by the version of HDF5's superblock: where it holds the file's length
 
 
 # --- writing ---------------------------------------------------------------------------------------------------------------
@@ -119,15 +126,21 @@ def lock(file: IO[bytes], shared: bool = False) -> bool | None:
 def read_dataset(path: Path | str) -> Any:
     """The Dataset or DataTree in a netCDF file, in memory; its checksum is compared before HDF5 sees it.
 
-    A file without a checksum, which another program wrote, is read as it is.
+    One without a checksum, which another program wrote, is `UNCHECKED`: it is read if a process of its own can read it.
 
     Raises:
         ParameterError: there is no such file, it is damaged, or it is no netCDF file.
     """
-    import xarray
-
     path = Path(path)
     content = checked_content(path)
+    if len(content) == path.stat().st_size and HDF5 in content:
+        _try_elsewhere(path, len(content))
+    return _in_memory(path, content)
+
+
+def _in_memory(path: Path, content: bytes) -> Any:
+    import xarray
+
     try:
         with xarray.open_datatree(io.BytesIO(content), engine="h5netcdf") as tree:
             variables = [variable for node in tree.subtree for variable in node.variables.values()]
@@ -143,6 +156,18 @@ def read_dataset(path: Path | str) -> Any:
         said = next(iter(str(error).splitlines()), "") or type(error).__name__
         raise ParameterError(f"{path} is no netCDF file that can be read ({said:.80})") from error
     return tree if tree.children else tree.to_dataset()
+
+
+def _try_elsewhere(path: Path, size: int) -> None:
+    """Refuse a file that stops the process which reads it, or keeps it for ever."""
+    script = "import sys; from saltus import files; path = files.Path(sys.argv[1]); files._in_memory(path, path.read_bytes())"
+    command = [sys.executable, "-c", script, str(path)]
+    try:
+        code = subprocess.run(command, capture_output=True, timeout=LONGEST_OPEN + size / SLOWEST_READ).returncode
+    except subprocess.TimeoutExpired:
+        raise ParameterError(f"{path} is damaged: HDF5 does not come to the end of it; compute it again") from None
+    if code not in (0, 1):  # 1: an error in words, which this process will meet too
+        raise ParameterError(f"{path} is damaged: it stops the process that reads it; compute it again")
 
 
 @contextlib.contextmanager
@@ -169,6 +194,10 @@ def checked_content(path: Path) -> bytes:
     except OSError as error:
         raise ParameterError(f"{path} cannot be read ({(error.strerror or str(error)).lower()})") from error
     if not has_checksum(content):
+        place = END_OF_FILE.get(content[8]) if content.startswith(HDF5) and len(content) > 52 else None
+        end = len(content) if place is None else int.from_bytes(content[place : place + 8], "little")
+        if end != len(content):
+            raise ParameterError(f"{path} is damaged: it has {len(content)} bytes, and its data end at {end}; compute it again")
         return content
     head, middle, tail = content[:-_END], content[-_END : -len(TAIL)], content[-len(TAIL) :]
     if middle != HEAD + _digest(head) or tail != TAIL:

@@ -144,6 +144,39 @@ def test_zeroed_bytes_are_noticed_before_hdf5_opens_the_file(tmp_path, begin, mo
         read_dataset(path)
 
 
+@pytest.mark.parametrize("wiped", [103, 150, 400])
+@pytest.mark.parametrize("by", [b"", b"\0"])
+def test_a_file_that_has_lost_its_checksum_with_its_last_data_is_noticed(tmp_path, wiped, by):
+    """Where the 103 bytes of the checksum are cut off and nothing else, the data end where HDF5 says: they are as before."""
+    path = write_dataset(tmp_path / "a.nc", small())
+    content = path.read_bytes()
+    path.write_bytes(content[:-wiped] + by * wiped)
+    assert not has_checksum(path.read_bytes())
+    if wiped == 103 and not by:
+        assert read_dataset(path).identical(small())
+    else:
+        with pytest.raises(ParameterError, match=r"a\.nc is damaged: it has \d+ bytes, and its data end at \d+"):
+            read_dataset(path)
+
+
+@pytest.mark.parametrize(
+    ("end", "sentence"),
+    [
+        ("os.kill(os.getpid(), 11)", "it stops the process that reads it"),
+        ("time.sleep(99)", "HDF5 does not come to the end of it"),
+    ],
+)
+def test_a_file_that_ends_or_holds_the_process_that_reads_it_is_told(tmp_path, monkeypatch, end, sentence):
+    """As libhdf5 may do with damage that no checksum tells."""
+    small().to_netcdf(tmp_path / "foreign.nc", engine="h5netcdf")
+    (tmp_path / "h5netcdf").mkdir()
+    (tmp_path / "h5netcdf" / "__init__.py").write_text(f"import os, time\n{end}\n")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
+    monkeypatch.setattr(files, "LONGEST_OPEN", 10.0)
+    with pytest.raises(ParameterError, match=rf"foreign\.nc is damaged: {sentence}; compute it again"):
+        read_dataset(tmp_path / "foreign.nc")
+
+
 @pytest.mark.parametrize("size", [0, 1, 100, 2000, -1, -60, -200])
 def test_a_cut_file_is_told(tmp_path, size):
     path = write_dataset(tmp_path / "a.nc", small())

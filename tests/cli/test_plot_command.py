@@ -58,12 +58,26 @@ def test_what_is_no_result_is_told(refused, tmp_path):
         ("nothing.nc", "there is no file or folder"),
         ("text.nc", "is no netCDF file that can be read"),
         ("empty.nc", "is no netCDF file that can be read"),
-        ("cut.nc", "is no netCDF file that can be read"),
+        ("cut.nc", "is damaged: it has 700 bytes, and its data end at"),
         ("folder", "is not a store: it has no zarr.json"),
         ("foreign.nc", "it does not say of what kind it is; it draws motion, phase_portrait"),
         ("other.nc", "its kind is 'rain fall'"),
     ):
         assert problem in refused("plot", tmp_path / name)
+
+
+def test_a_file_without_a_checksum_is_drawn_and_said_to_be_unchecked(saltus, tmp_path):
+    """A user's own program read a motion and wrote it again; drawn beside the same motion as saltus wrote it."""
+    (tmp_path / "study.toml").write_text(FORCED + ASKS["motion"])
+    assert saltus("run", tmp_path / "study.toml", "-o", tmp_path / "out").exit_code == 0
+    with xarray.open_dataset(tmp_path / "out" / "motion.nc") as data:
+        data.to_netcdf(tmp_path / "mine.nc", engine="h5netcdf")
+    for path, unchecked in ((tmp_path / "out" / "motion.nc", False), (tmp_path / "mine.nc", True)):
+        drawn, verified = saltus("plot", path), saltus("status", "--verify", path)
+        assert (drawn.exit_code, verified.exit_code) == (0, 0)
+        for said in (drawn.stderr, verified.stdout):
+            assert ("has no checksum" in said and "damage to its numbers cannot be excluded" in said) == unchecked
+    assert (tmp_path / "mine.png").read_bytes() == (tmp_path / "out" / "motion.png").read_bytes()
 
 
 def test_a_file_that_opens_only_half_is_told_without_a_traceback(refused, tmp_path, monkeypatch):

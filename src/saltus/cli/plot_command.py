@@ -19,7 +19,7 @@ def plot_store(path: Path, output: Path | None) -> None:
     Raises:
         ParameterError: there is no result of saltus at `path`, a sweep is not complete, a folder cannot be written to.
     """
-    from saltus.files import check_writable
+    from saltus.files import UNCHECKED, check_writable, has_checksum
 
     folder = path.parent if output is None else output
     check_writable(folder)
@@ -34,6 +34,8 @@ def plot_store(path: Path, output: Path | None) -> None:
             f"{path} says that it is of the kind {kind_of(data)!r}, but it cannot be drawn ({said:.120})"
         ) from None
     names = ", ".join(file.name for file in files)
+    if path.is_file() and not has_checksum(path.read_bytes()):
+        Console(highlight=False, stderr=True).print(f"{path} {UNCHECKED}.", markup=False, soft_wrap=True)
     Console(highlight=False).print(f"The picture is in {folder}: {names}", markup=False, soft_wrap=True)
 
 

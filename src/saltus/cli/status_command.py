@@ -62,7 +62,7 @@ def print_verified(path: Path) -> None:
     Raises:
         ParameterError: with all that is damaged; there is no result at `path`.
     """
-    from saltus.files import checked_content, has_checksum
+    from saltus.files import UNCHECKED, checked_content, has_checksum
     from saltus.sweep import damage, parts_of, status
 
     found = [path] if path.is_file() else [*sorted(path.rglob("*.nc")), *sorted(path.rglob("*.zarr"))]
@@ -76,7 +76,7 @@ def print_verified(path: Path) -> None:
                 said, bad = "sound", next((damage(store) for store in stores if store.damaged), "")
             else:
                 checked_content(file)
-                said, bad = "sound" if has_checksum(file.read_bytes()) else "has no checksum: another program wrote it", ""
+                said, bad = "sound" if has_checksum(file.read_bytes()) else UNCHECKED, ""
         except ParameterError as error:
             bad = str(error)
         wrong += [bad] if bad else []
