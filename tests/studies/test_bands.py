@@ -12,8 +12,9 @@ from saltus.checks import check_window
 from saltus.flow import Outcome, find_recurrence
 from saltus.studies import chaotic_bands
 from saltus.studies.diagram.bands import Band, Edge, EdgeKind, band_dataset
-from saltus.studies.diagram.chaos_search import resolve_bands
+from saltus.studies.diagram.chaos_search import _BandSearch, resolve_bands
 from saltus.studies.diagram.chaos_settings import SETTINGS
+from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.simulated import simulate_from, starts_at
 from saltus.systems import Harmonic, Load, System
 
@@ -132,3 +133,13 @@ def test_bands_become_a_dataset_also_where_there_are_none():
     assert data["low_edge"].values.tolist() == ["grazing"]
     assert data["low_special"].values.tolist() == [0.1995]
     assert data["high_edge"].values.tolist() == ["bound"]
+
+
+def test_an_interval_at_whose_ends_no_motion_is_left_to_begin_with_is_halved_all_the_same():
+    """There a motion of a long period was judged, of which no state is kept as settled: such an interval was tried for ever."""
+    search = _BandSearch(DiagramWork(forced(0.2), FREQUENCY), 1.0, (), SETTINGS)
+    for value in (0.5, 0.5009):
+        search.place(value).period = SETTINGS.long_period + 1
+    search.refine()
+    values = [place.value for place in search.places]
+    assert values == pytest.approx([0.5, 0.50045, 0.5009])

@@ -168,7 +168,8 @@ class _Place:
 
     def starts(self, seeds: int, orbits: int) -> np.ndarray:
         """States from which motions at neighbouring values are begun, (n, 2)."""
-        chosen = self.chaos[np.linspace(0, len(self.chaos) - 1, seeds).astype(int)] if self.chaotic else self.chaos[:0]
+        unsettled = len(self.chaos) > 0 and (self.chaotic or not self.orbits)
+        chosen = self.chaos[np.linspace(0, len(self.chaos) - 1, seeds).astype(int)] if unsettled else self.chaos[:0]
         return np.concatenate([chosen, *(orbit[3][None] for orbit in self.orbits[:orbits])])
 
 
@@ -268,6 +269,7 @@ class _BandSearch:
         few = (self.settings.seeds, self.settings.neighbours)
         self.look(middles, [np.concatenate([a.starts(*few), b.starts(*few)]) for a, b in pairs], care)
         for (a, b), middle in zip(pairs, middles, strict=True):
+            self.place(middle)  # also where there is nothing to begin with: all that moves at both ends comes to rest
             self.carried.update(((a.value, middle), (b.value, middle)))
 
     def locate_edges(self) -> None:
