@@ -138,8 +138,8 @@ def test_bands_become_a_dataset_also_where_there_are_none():
 def test_an_interval_at_whose_ends_no_motion_is_left_to_begin_with_is_halved_all_the_same():
     """There a motion of a long period was judged, of which no state is kept as settled: such an interval was tried for ever."""
     search = _BandSearch(DiagramWork(forced(0.2), FREQUENCY), 1.0, (), SETTINGS)
-    for value in (0.5, 0.5009):
+    for value in (0.5, 0.5005):
         search.place(value).period = SETTINGS.long_period + 1
     search.refine()
     values = [place.value for place in search.places]
-    assert values == pytest.approx([0.5, 0.50045, 0.5009])
+    assert values == pytest.approx([0.5, 0.50025, 0.5005], rel=1e-9)
