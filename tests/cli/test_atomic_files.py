@@ -243,3 +243,13 @@ def test_what_has_no_end_is_not_read(tmp_path):
     with pytest.raises(ParameterError, match="is no file that can be read"):
         read_dataset(tmp_path / "pipe")
     assert write_bytes(tmp_path / "empty", b"").read_bytes() == b""
+
+
+def test_arrays_without_names_of_their_axes_are_read_without_a_warning(tmp_path, recwarn):
+    """Other programs leave them out; a remark of h5netcdf's stood before the sentence of the user."""
+    import h5py
+
+    with h5py.File(tmp_path / "other.nc", "w") as file:
+        file["plain"] = np.arange(3.0)
+    assert read_dataset(tmp_path / "other.nc")["plain"].values.tolist() == [0.0, 1.0, 2.0]
+    assert not recwarn.list

@@ -204,6 +204,8 @@ OWN = {
     "near": ("own.py:Dufing", "import saltus.systems as s\nclass Duffing(s.Model): pass\n", "did you mean 'Duffing'?"),
     "syntax": ("own.py:A", "x = 1\ndef (:\n", "own.py cannot be imported (its line 2): SyntaxError"),
     "raises": ("own.py:A", "\n\nraise KeyError('a\\nb')\n", "own.py cannot be imported (its line 3): KeyError"),
+    "exits": ("own.py:A", "import sys\nsys.exit(5)\n", "own.py cannot be imported (its line 2): SystemExit: 5"),
+    "stops": ("own.py:A", "raise GeneratorExit\n", "own.py cannot be imported (its line 1): GeneratorExit"),
     "no_model": ("own.py:A", "class A: pass\n", "A in own.py must be a dataclass that inherits saltus.systems.Model"),
     "module": ("no_such_module_of_ours:A", "", "module 'no_such_module_of_ours' cannot be imported: ModuleNotFoundError"),
     "taken": (

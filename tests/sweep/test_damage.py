@@ -1,6 +1,7 @@
 """Damaged stores: every flipped bit, cut or missing file is noticed, and a rerun computes just that again."""
 
 import json
+import os
 import random
 
 import numpy as np
@@ -10,6 +11,7 @@ from rich.errors import MarkupError
 from saltus.errors import ParameterError, SaltusError, SweepError
 from saltus.sweep import Plan, Variable, open_store, remove_store, run, status
 from saltus.sweep import store_files as files
+from saltus.sweep.store import opened
 
 
 @pytest.fixture
@@ -94,10 +96,19 @@ def test_a_store_is_removed_and_nothing_else_is(waves_plan, store, tmp_path):
 
 def forged(store, change):
     """Change a store's plan, with the right checksums, as whoever means harm would."""
+
+    def change_group(group):
+        plan = json.loads(group["attributes"]["plan"])
+        change(plan)
+        group["attributes"]["plan"] = json.dumps(plan)
+
+    forged_group(store, change_group)
+
+
+def forged_group(store, change):
+    """Change a store's metadata, with the right checksums."""
     group = json.loads((store / files.METADATA).read_text())
-    plan = json.loads(group["attributes"]["plan"])
-    change(plan)
-    group["attributes"]["plan"] = json.dumps(plan)
+    change(group)
     (store / files.METADATA).write_text(json.dumps(group))
     (store / files.CHECKSUMS).unlink()
     files.write_checksums(store)
@@ -151,3 +162,81 @@ def test_words_of_a_store_are_no_markup(tmp_path, capsys):
 def test_a_grid_of_too_many_chunks_is_refused(waves_plan):
     with pytest.raises(ParameterError, match="cuts the grid into 2000000 chunks, and 1000000 are the most"):
         waves_plan(axes={"x": np.arange(2e6), "y": np.arange(1.0)}, chunk={"x": 1})
+
+
+PICKLE = {"zarr_format": 2, "dtype": "|O", "filters": [{"id": "vlen-utf8"}, {"id": "pickle"}], "compressor": None}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda array: array.update(PICKLE, chunks=array["shape"], fill_value="", order="C", attributes={}),
+        lambda array: array.update(shape=[10**9, 10**9]),
+        lambda array: array.update(shape=[-1, 5]),
+        lambda array: array.update(shape=5),
+        lambda array: array["chunk_grid"]["configuration"].update(chunk_shape=[50_000, 50_000]),
+        lambda array: array.update(data_type="string"),
+        lambda array: array.update(data_type=None),
+        lambda array: array.update(codecs=[{"name": "numcodecs.pickle", "configuration": {}}]),
+        lambda array: array.update(codecs=[]),
+        lambda array: array.update(codecs=5),
+        lambda array: array.update(dimension_names=["x", "x"]),
+        lambda array: array.update(storage_transformers=[{"name": "other"}]),
+        lambda array: array.update(node_type="group"),
+    ],
+)
+def test_arrays_that_are_not_those_of_the_plan_are_refused_before_zarr_reads_them(store, change, monkeypatch):
+    """Zarr would follow pickles, codecs and sizes of other origin; none of them reaches it."""
+    import zarr
+
+    forged_group(store, lambda group: change(group["consolidated_metadata"]["metadata"]["height"]))
+    monkeypatch.setattr(zarr, "open_group", lambda *_, **__: pytest.fail("Zarr was given the store"))
+    for question in (status, lambda path: status(path, verify=True), open_store, lambda path: open_store(path, partial=True)):
+        with pytest.raises(ParameterError, match=r"no store that saltus has made: .* is not that of its plan|what it says of"):
+            question(store)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda group: group.pop("consolidated_metadata"),
+        lambda group: group.update(consolidated_metadata=5),
+        lambda group: group["consolidated_metadata"]["metadata"].pop("height"),
+        lambda group: group["consolidated_metadata"]["metadata"].update(more=5),
+        lambda group: group.update(zarr_format=2),
+    ],
+)
+def test_a_list_of_other_arrays_is_refused(store, change):
+    forged_group(store, change)
+    with pytest.raises(ParameterError, match=r"no store that saltus has made: .* is not that of its plan"):
+        open_store(store)
+
+
+@pytest.mark.parametrize("fill", ["a", [1], None, "0xg", {}])
+def test_a_forged_fill_value_is_a_sentence(store, fill):
+    forged_group(store, lambda group: group["consolidated_metadata"]["metadata"]["height"].update(fill_value=fill))
+    with pytest.raises(SaltusError, match=r"cannot be read as a Zarr store|damaged"):
+        open_store(store)
+
+
+def test_a_million_chunks_that_are_not_there_are_counted_at_once(tmp_path):
+    """Once each was asked of the disk alone, and each was looked for in every row: hours."""
+    axes = {"x": np.arange(1e6), "y": np.arange(1.0)}
+    plan = Plan(function="sweep_toys:waves", axes=axes, chunk={"x": 1}, variables={"height": Variable()})
+    with opened(plan, tmp_path / "store"):
+        pass
+    found = status(tmp_path / "store", verify=True)
+    assert (found.done, found.total, found.damaged) == (0, 1_000_000, ())
+
+
+@pytest.mark.parametrize("name", [files.CHECKSUMS, files.FAILURES, "zarr.json", "height/c/0/0"])
+def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(store, name):
+    (store / name).unlink(missing_ok=True)
+    os.mkfifo(store / name)
+    if name == files.FAILURES:
+        assert status(store, verify=True).complete
+    elif name == "height/c/0/0":
+        assert status(store, verify=True).done == 7
+    else:
+        with pytest.raises(ParameterError, match=r"damaged|not a store"):
+            status(store, verify=True)

@@ -70,7 +70,9 @@ def _from_file(source: Source, kind: str, place: str) -> ModuleType:
     sys.modules[spec.name] = module  # dataclasses and pickle look it up there
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # the user's own code may raise anything
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # the user's own code may raise anything, and may end in an exit
         source.refuse((kind, "type"), f"{kind}.type: {place} cannot be imported{_where(error, str(path))}: {_what(error)}")
     return module
 
@@ -78,16 +80,18 @@ def _from_file(source: Source, kind: str, place: str) -> ModuleType:
 def _installed(source: Source, kind: str, place: str) -> ModuleType:
     try:
         return importlib.import_module(place)
-    except Exception as error:  # the user's own code may raise anything
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # the user's own code may raise anything, and may end in an exit
         source.refuse((kind, "type"), f"{kind}.type: module {place!r} cannot be imported: {_what(error)}")
 
 
-def _what(error: Exception) -> str:
+def _what(error: BaseException) -> str:
     message = error.msg if isinstance(error, SyntaxError) else str(error)
     return f"{type(error).__name__}: {' '.join(message.split())}"
 
 
-def _where(error: Exception, path: str) -> str:
+def _where(error: BaseException, path: str) -> str:
     """The line of the user's file at which importing failed."""
     if isinstance(error, SyntaxError) and error.filename == path:
         return f" (its line {error.lineno})"

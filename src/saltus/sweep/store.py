@@ -226,7 +226,10 @@ def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
         raise SweepError(
             f"{path} has {found.done} of {found.total} chunks; run the sweep again to complete it, or give partial=True"
         )
-    return _dataset(_zarr_store(Path(path)))
+    try:
+        return _dataset(_zarr_store(Path(path)))
+    except (AttributeError, IndexError, KeyError, NotImplementedError, TypeError, ValueError) as error:  # as forged metadata may
+        raise ParameterError(f"{path} cannot be read as a Zarr store ({type(error).__name__}: {error!s:.80})", "path") from None
 
 
 def reason(error: OSError) -> str:

@@ -14,6 +14,7 @@ from saltus.public_functions import answered
 from saltus.sweep import store_files as files
 from saltus.sweep.chunk_grid import MOST_CHUNKS, NAME, ChunkGrid, Index
 from saltus.sweep.chunk_results import Failure
+from saltus.sweep.store_arrays import check_arrays
 from saltus.sweep.verification import damaged_chunks
 
 NAMED = 3  # damaged files that a sentence names
@@ -66,12 +67,12 @@ def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
     variables = {name: len(variable["extra"]) for name, variable in plan["variables"].items()}
     damaged = list(files.damaged_files(path)) if verify else []
     broken = _broken_chunks(path, chunks, variables) if verify and not damaged else {}
-    missing, updated = set(broken.values()), 0.0
+    written, missing, updated = files.all_files(path), set(broken.values()), 0.0
     for index in chunks.indices():
-        times = [_written(files.chunk_file(path, name, index, extra)) for name, extra in variables.items()]
-        if not all(times):
+        there = [written.get(files.chunk_name(name, index, extra)) for name, extra in variables.items()]
+        if None in there:
             missing.add(index)
-        updated = max(updated, *times)
+        updated = max((updated, *(file.st_mtime for file in there if file is not None)))
     return StoreStatus(
         path=path,
         kind=str(plan["attrs"].get("kind") or plan["attrs"].get("title") or "sweep"),
@@ -80,7 +81,7 @@ def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
         done=chunks.total - len(missing),
         total=chunks.total,
         failures=tuple(failure for failure in _failures(path) if failure.index in missing),
-        bytes=_size(path),
+        bytes=sum(file.st_size for file in written.values()),
         started=_moment(os.path.getmtime(path / files.METADATA)),
         updated=_moment(updated) if updated else None,
         running=files.in_use(path),
@@ -99,16 +100,20 @@ def _broken_chunks(path: Path, chunks: ChunkGrid, extra: dict[str, int]) -> dict
     """The files of chunks that cannot be read, each with its chunk."""
     import zarr
 
-    arrays: Any = zarr.open_group(str(path), mode="r")
-    broken = damaged_chunks(path, arrays, chunks, extra)
-    return {str(files.chunk_file(path, name, index, extra[name]).relative_to(path)): index for name, index in broken}
+    try:
+        arrays: Any = zarr.open_group(str(path), mode="r", zarr_format=3)
+        broken = list(damaged_chunks(path, arrays, chunks, extra))
+    except (AttributeError, KeyError, NotImplementedError, TypeError, ValueError) as error:
+        raise ParameterError(f"{path} cannot be read as a Zarr store ({type(error).__name__}: {error!s:.80})", "path") from None
+    return {files.chunk_name(name, index, extra[name]): index for name, index in broken}
 
 
 def read_plan(path: Path) -> dict[str, Any]:
     """The plan that the store at `path` was made for, as JSON.
 
     Raises:
-        ParameterError: there is nothing at `path`, or no store, or one that is not of a sweep, or whose metadata are damaged.
+        ParameterError: there is nothing at `path`, or no store, or one that is not of a sweep, or whose metadata are damaged
+            or are not those of its plan.
     """
     if not path.exists():
         raise ParameterError(f"there is no store at {path}", "path")
@@ -125,11 +130,12 @@ def read_plan(path: Path) -> dict[str, Any]:
     try:
         plan = json.loads(group["attributes"]["plan"])
         plan = {key: plan[key] for key in ("function", "arguments", "order", "axes", "chunk", "variables", "attrs")}
-        grid_of(plan)
+        chunks = grid_of(plan)
     except (RecursionError, KeyError, TypeError, ValueError, AttributeError):
         raise ParameterError(f"{path} is a Zarr store, but not of a sweep: it keeps no plan", "path") from None
     if damaged:
         raise ParameterError(f"{path / damaged[0]} is damaged; run the sweep again, or remove the store and begin anew", "path")
+    check_arrays(str(path), group, plan, chunks)
     return plan
 
 
@@ -150,32 +156,15 @@ def grid_of(plan: dict[str, Any]) -> ChunkGrid:
     return chunks
 
 
-def _written(file: Path) -> float:
-    """When a file was written, 0.0 if it is not there."""
-    try:
-        return file.stat().st_mtime
-    except OSError:
-        return 0.0
-
-
 def _failures(path: Path) -> tuple[Failure, ...]:
+    if not (path / files.FAILURES).is_file():  # a pipe may have no end
+        return ()
     try:
         entries = json.loads((path / files.FAILURES).read_text(encoding="utf-8"))
         failures = [Failure(tuple(map(int, e["index"])), str(e["place"]), str(e["error"]), int(e["attempts"])) for e in entries]
     except (OSError, RecursionError, KeyError, TypeError, ValueError):  # a damaged list loses no result
         return ()
     return tuple(sorted(failures, key=lambda failure: failure.index))  # workers fail in any order
-
-
-def _size(path: Path) -> int:
-    total = 0
-    for folder, _, names in os.walk(path):
-        for name in names:
-            try:
-                total += os.path.getsize(os.path.join(folder, name))
-            except OSError:  # written beside its place, and moved there meanwhile
-                continue
-    return total
 
 
 def _moment(seconds: float) -> datetime.datetime:

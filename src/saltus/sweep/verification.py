@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,15 +24,18 @@ def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, 
         chunks: how the grid is cut.
         extra: the number of dimensions of each variable beside the grid's axes.
     """
+    written = files.all_files(path)
     for name, count in extra.items():
-        for row in range(chunks.grid[0]):
-            rows = chunks.slices((row, *(0 for _ in chunks.grid[1:])))[0]
-            if _row_size(arrays[name], rows) < AT_ONCE and _can_be_read(arrays[name], (rows,)):
+        array = arrays[name]
+        for _, indices in itertools.groupby(chunks.indices(), lambda index: index[0]):
+            row = list(indices)
+            there = [index for index in row if files.chunk_name(name, index, count) in written]
+            if not there:
                 continue
-            for index in chunks.indices():
-                there = index[0] == row and files.chunk_file(path, name, index, count).exists()
-                if there and not _can_be_read(arrays[name], chunks.slices(index)):
-                    yield name, index
+            rows, whole = chunks.slices(there[0])[0], len(there) == len(row)
+            if whole and _row_size(array, rows) < AT_ONCE and _can_be_read(array, (rows,)):
+                continue
+            yield from ((name, index) for index in there if not _can_be_read(array, chunks.slices(index)))
 
 
 def _row_size(array: Any, rows: slice) -> float:

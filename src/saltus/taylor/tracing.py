@@ -157,9 +157,9 @@ def ask(model: Any, method: str, *arguments: Any) -> Any:
     """
     try:
         return getattr(model, method)(*arguments)
-    except SaltusError:
+    except (SaltusError, KeyboardInterrupt):
         raise
-    except Exception as error:
+    except BaseException as error:  # a user's own code may end in an exit
         name = f"{type(model).__name__}.{method}"
         raise TraceError(f"{name} failed while it was traced: {type(error).__name__}: {error}") from error
 
