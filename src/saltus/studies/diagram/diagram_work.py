@@ -141,7 +141,7 @@ def _parts() -> dict[str, Any]:
     numbers, judged = len(NUMBERS) + 2 + 3 * KEPT, len(JUDGED) + 2 * COMPANIONS + 3 * SETTLED
     kinds = [
         Part("motions", f"{HERE}:motions", numbers, chunk=1000),
-        Part("judgements", f"{HERE}:judgements", judged, chunk=16),
+        Part("judgements", f"{HERE}:judgements", judged, chunk=64),
         Part("branches", f"{HERE}:branches", BRANCH_BYTES, chunk=1, dtype="u1", threaded=False),
         Part("distances", f"{HERE}:distances", 1, chunk=2000),
     ]
