@@ -74,3 +74,9 @@ def shown(value: Any, most: int = 60) -> str:
     except Exception:  # a user's own class may raise anything
         text = f"an object of type {type(value).__name__}"
     return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def printable(text: str, most: int = 400) -> str:
+    """Text out of a file, for a terminal: on one line, without characters that it would obey, not longer than `most`."""
+    plain = "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in text[: most + 1])
+    return plain if len(plain) <= most else plain[: most - 3] + "..."

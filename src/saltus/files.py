@@ -26,6 +26,7 @@ from saltus.errors import ParameterError
 
 PART = ".part"
 STALE = 60.0  # s; where there are no locks, what has not been touched for so long was left by a killed run
+COPIES = 2  # of a file's bytes that reading it makes
 HEAD, TAIL = b"\nsha256 of the bytes before: ", b" (saltus)\n"  # of the checksum: wiping out 64 bytes leaves one of them
 UNCHECKED = "has no checksum (saltus writes one behind each file), so that damage to its numbers cannot be excluded"
 SLOWEST_READ = 1e6  # bytes/s, with LONGEST_OPEN s beside it: HDF5 that takes longer has lost its way in a damaged file
@@ -190,6 +191,7 @@ def checked_content(path: Path) -> bytes:
     try:
         if path.exists() and not path.is_file():  # a device or a pipe may have no end
             raise ParameterError(f"{path} is no file that can be read")
+        check_memory(str(path), COPIES * path.stat().st_size, "its bytes")  # a sparse file may have any number of them
         content = path.read_bytes()
     except OSError as error:
         raise ParameterError(f"{path} cannot be read ({(error.strerror or str(error)).lower()})") from error

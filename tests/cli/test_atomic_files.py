@@ -253,3 +253,11 @@ def test_arrays_without_names_of_their_axes_are_read_without_a_warning(tmp_path,
         file["plain"] = np.arange(3.0)
     assert read_dataset(tmp_path / "other.nc")["plain"].values.tolist() == [0.0, 1.0, 2.0]
     assert not recwarn.list
+
+
+def test_a_file_of_more_bytes_than_there_is_memory_is_refused_before_it_is_read(tmp_path):
+    path = tmp_path / "sparse.nc"
+    with path.open("wb") as file:
+        file.truncate(1 << 43)
+    with pytest.raises(ParameterError, match=r"sparse.nc is too large: its bytes need about .* GB of memory"):
+        read_dataset(path)

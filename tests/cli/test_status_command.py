@@ -110,3 +110,16 @@ def test_what_is_no_store_is_told(tmp_path, capsys):
 )
 def test_sizes_are_given_in_the_unit_that_fits(count, text):
     assert size(count) == text
+
+
+def test_what_a_store_says_of_itself_is_never_obeyed_by_the_terminal(told, tmp_path):
+    axes = {"a": np.linspace(0.0, 1.0, 2)}
+    hostile = Plan(
+        function=f"{__name__}:hypotenuse", axes=axes, variables={"c": Variable()}, attrs={"kind": "\x1b[2J\u202e" * 40}
+    )
+    with opened(hostile, tmp_path / "store"):
+        pass
+    said = " ".join(told(tmp_path / "store"))
+    assert "\x1b" not in said
+    assert "\u202e" not in said
+    assert len(said) < 600

@@ -12,7 +12,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, printable
 
 if TYPE_CHECKING:
     from saltus.sweep import StoreStatus
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 SEARCH = "diagram"  # the kind of a store of which nobody knows beforehand how many parts there will be
 BAR_WIDTH = 40  # columns of the bar
 FAILURES_NAMED = 5  # failed chunks that are named
+LONGEST_KIND = 40  # characters of what a store says that it is
 
 
 def print_status(path: Path, verify: bool = False) -> None:
@@ -38,7 +39,8 @@ def print_status(path: Path, verify: bool = False) -> None:
     found = status(path, verify=verify)
     further = list(parts_of(path, verify))
     console = Console(highlight=False)
-    console.print(Text(f"{found.kind[:1].upper()}{found.kind[1:].replace('_', ' ')} ", style="bold"), end="")
+    kind = printable(found.kind, LONGEST_KIND)
+    console.print(Text(f"{kind[:1].upper()}{kind[1:].replace('_', ' ')} ", style="bold"), end="")
     console.print(f"in {path}", markup=False, soft_wrap=True)
     if console.is_terminal and found.kind != SEARCH:
         console.print(ProgressBar(total=found.total, completed=found.done, width=BAR_WIDTH), "", sep="\n")
@@ -46,7 +48,7 @@ def print_status(path: Path, verify: bool = False) -> None:
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
     for head, text in (*rows(found), *parts(further)):
-        table.add_row(head, Text(text))
+        table.add_row(head, Text(printable(text)))
     console.print(table)
     damaged = next((each for each in (found, *further) if each.damaged), None)
     if damaged is not None:
