@@ -238,7 +238,8 @@ def _is_iterable_of(value: Any, part: Any) -> bool:
 
 def _is_numeric(value: Any) -> bool:
     try:
-        return np.asarray(value).dtype.kind in "fiu"
+        array = np.asarray(value)
+        return array.dtype.kind in "fiu" or (array.dtype.kind == "b" and array.ndim > 0)  # True alone is no number
     except Exception:  # arrays of several shapes, one for each coordinate; and a user's own class may raise anything
         return isinstance(value, (tuple, list)) and all(_is_numeric(each) for each in value)
 

@@ -80,6 +80,7 @@ class Manifold:
         return f"Manifold({kind}, of {self.orbit!r}, multiplier {self.multiplier:.6g}, length {self.length:.4g})"
 
 
+@answered
 def stable_manifold(
     orbit: PeriodicOrbit,
     *,
