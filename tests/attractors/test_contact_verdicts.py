@@ -1,8 +1,6 @@
 """Verdicts on motions with several contacts: rest, orbits, chaos; their exponents."""
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -10,7 +8,7 @@ import pytest
 import saltus
 from saltus.attractors import classify, lyapunov_spectrum
 from saltus.errors import ParameterError
-from saltus.systems import Contact, Harmonic, Load, Model, NewtonImpact, System, TwoLayer
+from saltus.systems import Harmonic, Load, NewtonImpact, System, TwoLayer, TwoStops
 
 
 def layers(H, m=0.1, e=(0.0, 0.0), transfer=0.0):
@@ -21,24 +19,10 @@ def layers(H, m=0.1, e=(0.0, 0.0), transfer=0.0):
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class FreeRoom(Model):
-    """x'' = F(tau) between walls at -1 and 1."""
-
-    coordinates: ClassVar[tuple[str, ...]] = ("x",)
-    channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
-
-    @property
-    def contacts(self):
-        return (Contact(name="left", coordinate="x", position=-1.0), Contact(name="right", coordinate="x", sign=-1, position=1.0))
-
-    def force(self, t, x, velocity, load):
-        return load.force(t)
-
-
 CHAOTIC = System(
-    model=FreeRoom(), load=Load(frequency=1.0, force=Harmonic(amplitude=2.0, phase=math.pi / 2)), impact=NewtonImpact(e=0.9)
+    model=TwoStops(stiffness=0.0),
+    load=Load(frequency=1.0, force=Harmonic(amplitude=2.0, phase=math.pi / 2)),
+    impact=NewtonImpact(e=0.9),
 )
 
 

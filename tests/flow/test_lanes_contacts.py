@@ -1,8 +1,6 @@
 """Ensembles of models with several contacts: the same motions as the scalar kernel's, in lanes and on all cores."""
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -11,27 +9,9 @@ from test_contacts import BETA80, layers
 import saltus
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import Outcome, find_recurrence, stop_names
-from saltus.systems import Contact, Harmonic, InelasticImpact, Load, Metainterface, Model, NewtonImpact, System, VelocityReduction
+from saltus.systems import Harmonic, InelasticImpact, Load, Metainterface, NewtonImpact, System, TwoStops, VelocityReduction
 
 CASES = 150
-
-
-@dataclass(frozen=True, kw_only=True)
-class BetweenWalls(Model):
-    """x'' = F(tau) - c x' for -1 <= x <= 1: two contacts of one coordinate."""
-
-    damping: float = 0.1
-
-    coordinates: ClassVar[tuple[str, ...]] = ("x",)
-    channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
-
-    @property
-    def contacts(self):
-        return (Contact(name="left", coordinate="x", position=-1.0), Contact(name="right", coordinate="x", sign=-1, position=1.0))
-
-    def force(self, t, x, velocity, load):
-        return load.force(t) - self.damping * velocity
 
 
 def random_parameters(count, seed):
@@ -116,7 +96,11 @@ def test_the_reduced_model_is_met_where_its_closed_layer_stays_closed():
 
 
 def test_two_stops_of_one_coordinate_are_two_contacts_in_lanes():
-    system = System(model=BetweenWalls(), load=Load(frequency=1.0, force=Harmonic(amplitude=0.8)), impact=NewtonImpact(e=0.7))
+    system = System(
+        model=TwoStops(stiffness=0.0, damping=0.1),
+        load=Load(frequency=1.0, force=Harmonic(amplitude=0.8)),
+        impact=NewtonImpact(e=0.7),
+    )
     x = np.linspace(-0.9, 0.9, 37)
     result = saltus.simulate_many(system, x=x, velocity=0.5, periods=3)
     for i in range(len(x)):

@@ -1,8 +1,6 @@
 """Periodic orbits with several contacts: against closed forms, the reduced model, simulation, and through their switchings."""
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -11,16 +9,14 @@ import saltus
 from saltus.errors import MotionError, ParameterError
 from saltus.orbits import SpecialKind, defects, orbits_of
 from saltus.systems import (
-    Contact,
     Harmonic,
     Load,
     Metainterface,
-    Model,
     NewtonImpact,
     System,
     TwoLayer,
+    TwoStops,
     VelocityReduction,
-    register,
 )
 
 BETA80 = math.radians(80)
@@ -35,32 +31,9 @@ def layers(H=0.2, V=-0.5, W=1.0, transfer=0.0, e=(0.0, 0.0), m=0.0, C=0.1):
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class RoomOscillator(Model):
-    """x'' = F(tau) - c x' - k x for -d <= x <= d."""
-
-    stiffness: float = 0.2
-    damping: float = 0.0
-    room: float = 1.0
-
-    coordinates: ClassVar[tuple[str, ...]] = ("x",)
-    channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
-
-    @property
-    def contacts(self):
-        return (
-            Contact(name="left", coordinate="x", position=-self.room),
-            Contact(name="right", coordinate="x", sign=-1, position=self.room),
-        )
-
-    def force(self, t, x, velocity, load):
-        return load.force(t) - self.damping * velocity - self.stiffness * x
-
-
 def room(A=0.8, W=1.0, e=0.7, **numbers):
     return System(
-        model=RoomOscillator(**numbers),
+        model=TwoStops(**{"stiffness": 0.2} | numbers),
         load=Load(frequency=W, force=Harmonic(amplitude=A, phase=math.pi / 2)),
         impact=NewtonImpact(e=e),
     )
@@ -227,7 +200,6 @@ def test_a_branch_and_its_orbits_survive_a_file(branch):
 
 
 def test_a_doubled_orbit_begins_at_a_period_doubling():
-    register(RoomOscillator)
     orbit = saltus.find_orbit(room(A=0.5, W=1.0, e=0.9, stiffness=0.0, damping=0.02), x=0.1, velocity=0.9)
     branch = saltus.continue_orbit(orbit, "load.frequency", (0.3, 2.0))
     doublings = [special for special in branch.special if special.kind == SpecialKind.PD]
