@@ -18,9 +18,8 @@ def reproduce_paper(names: Sequence[str], output: Path, force: bool) -> None:
         results = reproduce(names, output, force, progress)
     console, table = Console(highlight=False), Table(box=None, show_header=False)
     for result in results:
-        table.add_row(
-            result.name, f"{result.seconds:.1f} s of a core" if result.made else "up to date", FIGURES[result.name].title
-        )
+        time = f"{result.seconds:.1f} s of processor time" if result.made else "up to date"
+        table.add_row(result.name, time, FIGURES[result.name].title)
     console.print(table)
     claims = with_summaries(claim for result in results for claim in result.claims)
     verdicts = Table(HEADINGS[0], box=None, padding=(0, 1, 0, 0))

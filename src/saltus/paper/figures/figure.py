@@ -35,11 +35,10 @@ class PaperFigure:
     draw: Callable[[Any], Any] | None = None
     table: Callable[[Any], str] | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
-
     module: str  # that computes it
 
     def compute(self, **parameters: Any) -> Any:
-        """The data of all panels together, with other parameters than the paper's."""
+        """The data of all panels together, for parameters that need not be the paper's."""
         ((_, made, _),) = compute_panels({self.name: self.panels(**parameters)})
         return self.join(made)
 
