@@ -89,10 +89,31 @@ def test_the_reduced_model_is_met_where_its_closed_layer_stays_closed():
     two = saltus.simulate_many(both, theta_1=np.maximum(theta, 0), theta_2=np.minimum(theta, 0), velocity=(0.0, 0.0), **options)
     np.testing.assert_allclose((two.theta_1 + two.theta_2).values, one.theta.values, rtol=0, atol=1e-13)
     np.testing.assert_allclose(two.sampled_theta_1 + two.sampled_theta_2, one.sampled_theta, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(two.largest_theta_1, one.largest_theta, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(two.largest_coordinate, one.largest_theta, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(two.smallest_coordinate, one.smallest_theta, rtol=0, atol=1e-12)
     np.testing.assert_allclose(two.overall_least_speed, one.overall_least_speed, rtol=0, atol=1e-12)
     assert (two.impact_count == one.impact_count).all()
     assert (two.period_impact_count.values == one.period_impact_count.values).all()
+
+
+def test_the_extrema_of_a_period_are_those_of_all_coordinates():
+    """Of an impact pair the largest and the least of z and x over each of the last periods, from dense output at 4000 instants
+    and at the impacts."""
+    system = System(
+        model=saltus.ImpactPair(mass_ratio=0.3, clearance=0.7, damping=0.05),
+        load=Load(frequency=1.1, force=Harmonic(amplitude=0.2)),
+        impact=NewtonImpact(e=0.6),
+    )
+    z = np.linspace(-0.5, 0.5, 9)
+    found = saltus.simulate_many(system, z=z, x=0.1, velocity=(0.2, -0.1), periods=12, sample=("extrema",), last=3)
+    for i in range(len(z)):
+        motion = saltus.simulate(system, z=float(z[i]), x=0.1, velocity=(0.2, -0.1), periods=12)
+        for k in range(3):
+            span = system.load.period * np.array([9 + k, 10 + k])
+            hits = motion.impacts.time[(motion.impacts.time > span[0]) & (motion.impacts.time < span[1])]
+            values = np.asarray(motion.at(np.append(np.linspace(*span, 4000), hits))[0])
+            assert values.max() - 1e-9 <= float(found.largest_coordinate[i, k]) < values.max() + 1e-5
+            assert values.min() - 1e-5 < float(found.smallest_coordinate[i, k]) <= values.min() + 1e-9
 
 
 def test_two_stops_of_one_coordinate_are_two_contacts_in_lanes():

@@ -15,7 +15,7 @@ import numpy as np
 
 from saltus.flow.ensemble.dataset_reading import stop_names, stroboscopic
 from saltus.flow.ensemble.ensemble import simulate_many
-from saltus.flow.ensemble.ensemble_dataset import rate_name
+from saltus.flow.ensemble.ensemble_dataset import extrema_names, rate_name
 from saltus.flow.load_release import load_releases
 from saltus.flow.stops import Stop
 from saltus.progress import Progress, silent
@@ -77,7 +77,7 @@ class Recurrence:
     periods: np.ndarray  # (n,): forcing periods that it was followed
     last: np.ndarray  # (n, d): the state at the end
     states: np.ndarray  # (n, kept, d): the stroboscopic states, the last one last, nan where there were fewer
-    extrema: np.ndarray | None = None  # (n, kept, 2): largest and smallest first coordinate in each of these periods
+    extrema: np.ndarray | None = None  # (n, kept, 2): largest and smallest of all coordinates in each of these periods
     impact_counts: np.ndarray | None = None  # (n, kept): impacts in each of these periods
 
     def __len__(self) -> int:
@@ -112,13 +112,13 @@ class Recurrence:
 
     @property
     def highest(self) -> np.ndarray:
-        """The largest first coordinate over the motion's period, (n,); -inf where none was recorded."""
+        """The largest of all coordinates over the motion's period, (n,); -inf where none was recorded."""
         assert self.extrema is not None
         return np.asarray(np.nanmax(np.where(self.within_period, self.extrema[:, :, 0], np.nan), axis=1, initial=-np.inf))
 
     @property
     def lowest(self) -> np.ndarray:
-        """The smallest first coordinate over the motion's period, (n,); inf where none was recorded."""
+        """The smallest of all coordinates over the motion's period, (n,); inf where none was recorded."""
         assert self.extrema is not None
         return np.asarray(np.nanmin(np.where(self.within_period, self.extrema[:, :, 1], np.nan), axis=1, initial=np.inf))
 
@@ -229,10 +229,8 @@ def _state_names(system: System) -> list[str]:
 
 def _read(system: System, result: xarray.Dataset, with_states: bool) -> Recurrence:
     """What was recorded of the motions, whose outcomes are not known yet."""
-    name, last = system.model.coordinates[0], last_states(system, result)
-    extrema = None
-    if f"largest_{name}" in result:
-        extrema = np.stack([result[f"largest_{name}"].values, result[f"smallest_{name}"].values], axis=-1)
+    names, last = extrema_names(system.model.coordinates), last_states(system, result)
+    extrema = np.stack([result[name].values for name in names], axis=-1) if names[0] in result else None
     return Recurrence(
         outcome=np.full(len(last), Outcome.MOVING, dtype=np.int8),
         period=np.zeros(len(last), dtype=int),

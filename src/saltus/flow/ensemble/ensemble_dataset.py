@@ -59,10 +59,16 @@ def start_name(name: str) -> str:
     return f"start_{name}"
 
 
+def extrema_names(names: tuple[str, ...]) -> tuple[str, str]:
+    """The names in a dataset of the extrema: of the coordinate, or of all of several, the largest of which counts."""
+    of = names[0] if len(names) == 1 else "coordinate"
+    return f"largest_{of}", f"smallest_{of}"
+
+
 def result_names(names: tuple[str, ...]) -> set[str]:
     """Every name that a dataset may need for itself, of a model with these coordinates."""
     states = [*names, *(rate_name(name, names) for name in names)]
-    extrema = [f"{which}_{names[0]}" for which in ("largest", "smallest")]
+    extrema = extrema_names(names)
     further = [*(f"{kind}_{name}" for kind in ("sampled", "start") for name in states), *(f"overall_{name}" for name in extrema)]
     return {*FIXED, *DIMENSIONS, *states, *extrema, *further}
 
@@ -184,16 +190,15 @@ def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
     missing = np.arange(kept)[None, :] < (kept - done)[:, None]
     samples = np.take_along_axis(ends.samples, order[:, :, None], axis=1)
     samples[missing] = np.nan
-    first, column = writer.names[0], 0
+    first, column, extrema = writer.names[0], 0, extrema_names(writer.names)
     slowest = "the least speed before an impact, inf without impacts"
     unit = writer.units[first]
+    meant = [f"the {which} {first if len(writer.names) == 1 else 'of all coordinates'}" for which in ("largest", "smallest")]
     variables = {
         "state": [
             (f"sampled_{n}", writer.units[n], f"{n} at the end of the forcing period") for n in (*writer.names, *writer.rates)
         ],
-        "extrema": [
-            (f"{which}_{first}", unit, f"the {which} {first} in the forcing period") for which in ("largest", "smallest")
-        ],
+        "extrema": [(name, unit, f"{text} in the forcing period") for name, text in zip(extrema, meant, strict=True)],
         Sample.SPEED: [("least_speed", unit, f"{slowest}, in the forcing period")],
         Sample.IMPACT_COUNT: [("period_impact_count", "1", "impacts in the forcing period")],
     }
@@ -203,9 +208,8 @@ def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
                 writer.add(variable, np.ascontiguousarray(samples[:, :, column]), its_unit, text, "period")
                 column += 1
     if Sample.EXTREMA in sample:
-        for i, which in enumerate(("largest", "smallest")):
-            text = f"the {which} {first} from the start to the end"
-            writer.add(f"overall_{which}_{first}", ends.numbers[:, EndNumber.HIGHEST + i], unit, text)
+        for i, (name, text) in enumerate(zip(extrema, meant, strict=True)):
+            writer.add(f"overall_{name}", ends.numbers[:, EndNumber.HIGHEST + i], unit, f"{text} from the start to the end")
     if Sample.SPEED in sample:
         writer.add("overall_least_speed", ends.numbers[:, EndNumber.LEAST_SPEED], unit, f"{slowest}, from the start to the end")
 

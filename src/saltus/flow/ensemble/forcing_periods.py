@@ -50,7 +50,7 @@ def fill(lane, i, code, sizes, at, m, flags, lanes, jobs, tables):
     put_all(m, at[LanePart.CONSTANTS], lane, constants[lane])
     begin_time(lane, m, numbers[i], labels[i])
     begin_overall(lane, m)
-    begin_records(lane, at, m)
+    begin_records(lane, sizes, at, m)
     mode, side = begin_contact(lane, code, sizes, at, m, lanes, env, state[i], labels[i, JobLabel.PIECE])
     label[lane, LaneLabel.MODE] = mode
     put(m, Slot.SIDE, lane, float(side))
@@ -92,11 +92,14 @@ def begin_overall(lane, m):
 
 
 @inline_jit
-def begin_records(lane, at, m):
-    """Start what is recorded of a forcing period, with the position at its beginning."""
-    x = get(m, at[LanePart.POSITION], lane)
-    put(m, Slot.HIGHEST, lane, x)
-    put(m, Slot.LOWEST, lane, x)
+def begin_records(lane, sizes, at, m):
+    """Start what is recorded of a forcing period, with the positions at its beginning."""
+    high = low = get(m, at[LanePart.POSITION], lane)
+    for row in range(1, sizes[Size.OWN]):
+        x = get(m, at[LanePart.POSITION] + row, lane)
+        high, low = max(high, x), min(low, x)
+    put(m, Slot.HIGHEST, lane, high)
+    put(m, Slot.LOWEST, lane, low)
     put(m, Slot.LEAST_SPEED, lane, np.inf)
     put(m, Slot.IMPACTS, lane, 0.0)
 
@@ -144,7 +147,7 @@ def begin_period(lane, sizes, m, lanes, tables):
 
 
 @inline_jit
-def end_here(lane, at, m):
+def end_here(lane, sizes, at, m):
     """Take the state of a lane for that at the end of its forcing period (compare `sampling.pass_ends`)."""
     for row in range(2 * row_count(at)):  # positions, then velocities, lie one behind the other
         put(m, at[LanePart.ENDED_POSITION] + row, lane, get(m, at[LanePart.POSITION] + row, lane))
@@ -154,17 +157,17 @@ def end_here(lane, at, m):
     total_up(lane, m)
     put(m, Slot.NEXT_CHECK, lane, get(m, Slot.NEXT_CHECK, lane) - get(m, Slot.IMPACTS, lane))
     put(m, Slot.PERIODS_DONE, lane, get(m, Slot.PERIODS_DONE, lane) + 1.0)
-    begin_records(lane, at, m)
+    begin_records(lane, sizes, at, m)
 
 
 @inline_jit
-def go_back(lane, at, m, t):
+def go_back(lane, sizes, at, m, t):
     """Put a lane back to the end of its last forcing period, at time t."""
     for row in range(2 * row_count(at)):
         put(m, at[LanePart.POSITION] + row, lane, get(m, at[LanePart.ENDED_POSITION] + row, lane))
     put(m, Slot.SIDE, lane, get(m, Slot.ENDED_SIDE, lane))
     put(m, Slot.NOW, lane, t)
-    begin_records(lane, at, m)
+    begin_records(lane, sizes, at, m)
 
 
 @inline_jit
@@ -220,12 +223,12 @@ def arrive(lane, past, sizes, at, m, lanes, tables, results):
         if past:
             put(m, Slot.PERIODS_DONE, lane, done + 1.0)
         else:
-            end_here(lane, at, m)
+            end_here(lane, sizes, at, m)
         recurrence = end_period(lane, sizes, at, m, lanes, results)
         if last:
             return Status.DONE, 0
         if recurrence > 0:
-            go_back(lane, at, m, t_end)
+            go_back(lane, sizes, at, m, t_end)
             return Status.SETTLED, recurrence
         put(m, Slot.PERIOD, lane, period + 1.0)
         put(m, Slot.NOW, lane, start + (now - t_end))
@@ -243,7 +246,7 @@ def finish(lane, status, detail, code, sizes, at, m, flags, lanes, results):
     none = get(m, Slot.PERIODS_DONE, lane) == 0.0
     part = get(m, Slot.NOW, lane) > get(m, Slot.PERIOD_START, lane) or get(m, Slot.IMPACTS, lane) > 0.0 or none
     if part and status != Status.DONE and status != Status.SETTLED and status != Status.OUTSIDE:  # within a forcing period
-        end_here(lane, at, m)
+        end_here(lane, sizes, at, m)
     else:
         total_up(lane, m)
     if get(m, Slot.PERIODS_DONE, lane) > 0.0:

@@ -25,7 +25,7 @@ class Slot(IntEnum):
     RATE_UP = 7
     RATE_DOWN = 8
     CAPTURE_SPEED = 9  # a lower speed of the gap after an impact is proved to be captured
-    HIGHEST = 10  # coordinate since the forcing period began, and so on to IMPACTS
+    HIGHEST = 10  # of all coordinates since the forcing period began, and so on to IMPACTS
     LOWEST = 11
     LEAST_SPEED = 12  # before an impact
     IMPACTS = 13

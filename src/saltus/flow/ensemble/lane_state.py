@@ -50,9 +50,10 @@ def scalar_state(lane, sizes, at, m, flags, settings, lanes):
 def record_extrema(lane, where, m, steps, poly):
     """Record the extrema of the scalar kernel's last call, and forget its steps and events."""
     for i in range(where[Where.STEPS]):
-        above, below = turning_range(steps[2][i, 0], where[Where.ORDER], 0.0, steps[1][i, 1], poly)
-        put(m, Slot.HIGHEST, lane, max(get(m, Slot.HIGHEST, lane), above))
-        put(m, Slot.LOWEST, lane, min(get(m, Slot.LOWEST, lane), below))
+        for row in range(where[Where.OWN]):
+            above, below = turning_range(steps[2][i, row], where[Where.ORDER], 0.0, steps[1][i, 1], poly)
+            put(m, Slot.HIGHEST, lane, max(get(m, Slot.HIGHEST, lane), above))
+            put(m, Slot.LOWEST, lane, min(get(m, Slot.LOWEST, lane), below))
     where[Where.STEPS] = where[Where.EVENTS] = 0
 
 

@@ -11,7 +11,7 @@ from saltus.flow.contact_side import side_of_state
 from saltus.flow.ensemble.lane_layout import FAST, Code, Flag, LaneArray, LaneSetting, Size, Slot
 from saltus.flow.ensemble.lane_steps import both_at, commit, margins_certain, natural_step, row_count, series_true, sweep
 from saltus.flow.ensemble.meeting import meet
-from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE, pass_ends, record_range
+from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE, pass_ends, record_others, record_range
 from saltus.flow.memory_layout import SERIES_LENGTH, LanePart
 from saltus.taylor import (
     WIDTH,
@@ -131,7 +131,8 @@ def step_all(code, scalar, sizes, at, m, flags, settings, limits, helpers, lanes
         v_begin = select(mask(past), load(m, at[LanePart.ENDED_VELOCITY]), v_begin)
     if sizes[Size.EXTREMA] > 0:
         x, v = load(m, at[LanePart.NEW_POSITION]), load(m, at[LanePart.NEW_VELOCITY])
-        record_range(m, at, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, space[0], space[1])
+        record_range(m, at, 0, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, space[0], space[1])
+        record_others(m, at, sizes, h, past, tau, moved, helpers, space[0], space[1])
     commit(at, m, moved, resolved, absolute(load(m, at[LanePart.NEW_VELOCITY])))
     flags[Flag.AT_CONTACT] = (flags[Flag.AT_CONTACT] & ~moved) | resolved
     return scalar, captured, past

@@ -1,4 +1,4 @@
-"""What is recorded of a trajectory: extrema of its first coordinate, the ends of its forcing periods, whether it repeats itself.
+"""What is recorded of a trajectory: extrema of its coordinates, the ends of its forcing periods, whether it repeats itself.
 
 Its compiled part goes into one module with that of `driver.py`.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.ensemble.lane_layout import Helper, Size, Slot
-from saltus.flow.ensemble.lane_steps import both_at, motion_at, row_count
+from saltus.flow.ensemble.lane_steps import both_at, motion_at, row_count, sweep
 from saltus.flow.memory_layout import SERIES_LENGTH, LanePart
 from saltus.taylor import (
     WIDTH,
@@ -37,14 +37,14 @@ MOST_MOVES = 60  # steps of Newton's method to a turning point: more than bisect
 
 
 @lean_jit
-def turning_value(m, at, order, low, high, v0, chosen):
-    """The position where the velocity, monotonic and of two signs at the ends, the first that of `v0`, vanishes."""
+def turning_value(m, at, row, order, low, high, v0, chosen):
+    """The position where a velocity, monotonic and of two signs at the ends, the first that of `v0`, vanishes."""
     h, tau = high - low, 0.5 * (low + high)
-    active, start = chosen, load(m, at[LanePart.POSITION])
+    active, start, before = chosen, load(m, at[LanePart.POSITION] + row), row * SERIES_LENGTH
     for _ in range(MOST_MOVES):
-        _, v, a, _ = motion_at(m, at, 0, order, start, tau)
-        before = mask(bits(v * v0 > 0.0))
-        low, high = select(before, tau, low), select(before, high, tau)
+        _, v, a, _ = motion_at(m, at, row, order, start, tau)
+        first = mask(bits(v * v0 > 0.0))
+        low, high = select(first, tau, low), select(first, high, tau)
         following = tau - v / a
         inside = mask(bits(following >= low) & bits(following <= high))
         following = select(inside, following, 0.5 * (low + high))
@@ -53,26 +53,26 @@ def turning_value(m, at, order, low, high, v0, chosen):
         active &= bits(moved > 1e-9 * h)
         if active == 0:
             break
-    return both_at(m, at[LanePart.POSITIONS], at[LanePart.VELOCITIES], order, start, tau)[0]
+    return both_at(m, at[LanePart.POSITIONS] + before, at[LanePart.VELOCITIES] + before, order, start, tau)[0]
 
 
 @lean_jit
-def record_range(m, at, sizes, h, bend, begin, v_begin, end, x, v, chosen, helpers, poly, series):
-    """Take the extrema of the first coordinate from `begin` to `end` of this step into HIGHEST and LOWEST, for chosen lanes.
+def record_range(m, at, row, sizes, h, bend, begin, v_begin, end, x, v, chosen, helpers, poly, series):
+    """Take the extrema of a coordinate from `begin` to `end` of this step into HIGHEST and LOWEST, for chosen lanes.
 
     Where the velocity is monotonic for certain, by its derivative at the start and the bound `bend` of how far that strays, an
     extremum within the step is where it vanishes. Where neither that is certain nor that the velocity keeps its sign, all
     turning points are looked for, lane by lane.
     """
-    order = sizes[Size.ORDER]
+    order, positions = sizes[Size.ORDER], at[LanePart.POSITIONS] + row * SERIES_LENGTH
     high, low = load(m, Slot.HIGHEST), load(m, Slot.LOWEST)
-    v0, first = load(m, at[LanePart.VELOCITY]), 2.0 * load(m, at[LanePart.POSITIONS] + 2) * h * h
-    last = first + 6.0 * load(m, at[LanePart.POSITIONS] + 3) * (h * h * h)
+    v0, first = load(m, at[LanePart.VELOCITY] + row), 2.0 * load(m, positions + 2) * h * h
+    last = first + 6.0 * load(m, positions + 3) * (h * h * h)
     monotonic = bits(minimum(first, last) > bend) | bits(maximum(first, last) < -bend)
     turns = bits(v_begin * v < 0.0) & monotonic & chosen
     top, bottom = maximum(high, x), minimum(low, x)
     if turns:
-        turning = turning_value(m, at, order, begin, end, v_begin, turns)
+        turning = turning_value(m, at, row, order, begin, end, v_begin, turns)
         top, bottom = select(mask(turns), maximum(top, turning), top), select(mask(turns), minimum(bottom, turning), bottom)
     store(m, Slot.HIGHEST, select(mask(chosen), top, high))
     store(m, Slot.LOWEST, select(mask(chosen), bottom, low))
@@ -82,11 +82,23 @@ def record_range(m, at, sizes, h, bend, begin, v_begin, end, x, v, chosen, helpe
         for lane in range(WIDTH):
             if (unclear >> lane) & 1:
                 for k in range(order + 1):
-                    series[k] = get(m, at[LanePart.POSITIONS] + k, lane)
+                    series[k] = get(m, positions + k, lane)
                 turning_range = helpers[Helper.TURNING_RANGE]
                 above, below = turning_range(series, order, vector_lane(begin, lane), vector_lane(end, lane), poly)
                 put(m, Slot.HIGHEST, lane, max(get(m, Slot.HIGHEST, lane), above))
                 put(m, Slot.LOWEST, lane, min(get(m, Slot.LOWEST, lane), below))
+
+
+@lean_jit
+def record_others(m, at, sizes, h, past, end, chosen, helpers, poly, series):
+    """`record_range` of all coordinates but the first, up to the new state; in lanes `past` a period's end, from there on."""
+    since, order = load(m, Slot.PERIOD_END) - load(m, Slot.NOW), sizes[Size.ORDER]
+    for row in range(1, sizes[Size.OWN]):
+        _, _, _, bend = sweep(m, at, row, order, load(m, at[LanePart.POSITION] + row), h)
+        begin = select(mask(past), since, splat(0.0))
+        v_begin = select(mask(past), load(m, at[LanePart.ENDED_VELOCITY] + row), load(m, at[LanePart.VELOCITY] + row))
+        x, v = load(m, at[LanePart.NEW_POSITION] + row), load(m, at[LanePart.NEW_VELOCITY] + row)
+        record_range(m, at, row, sizes, h, bend, begin, v_begin, end, x, v, chosen, helpers, poly, series)
 
 
 @lean_jit
@@ -105,7 +117,11 @@ def pass_ends(m, at, sizes, h, bend, past, helpers, poly, series):
     x, v = load(m, at[LanePart.ENDED_POSITION]), load(m, at[LanePart.ENDED_VELOCITY])
     if sizes[Size.EXTREMA] > 0:
         v_begin = load(m, at[LanePart.VELOCITY])
-        record_range(m, at, sizes, h, bend, splat(0.0), v_begin, since, x, v, past, helpers, poly, series)
+        record_range(m, at, 0, sizes, h, bend, splat(0.0), v_begin, since, x, v, past, helpers, poly, series)
+        for row in range(1, sizes[Size.OWN]):
+            q, w = load(m, at[LanePart.ENDED_POSITION] + row), load(m, at[LanePart.ENDED_VELOCITY] + row)
+            w_begin, (_, _, _, bent) = load(m, at[LanePart.VELOCITY] + row), sweep(m, at, row, order, q, h)
+            record_range(m, at, row, sizes, h, bent, splat(0.0), w_begin, since, q, w, past, helpers, poly, series)
     high, low, least, impacts = load(m, Slot.HIGHEST), load(m, Slot.LOWEST), load(m, Slot.LEAST_SPEED), load(m, Slot.IMPACTS)
     replace(m, Slot.ENDED_SIDE, chosen, load(m, Slot.SIDE))
     replace(m, Slot.ENDED_HIGHEST, chosen, high)
@@ -118,6 +134,10 @@ def pass_ends(m, at, sizes, h, bend, past, helpers, poly, series):
     replace(m, Slot.OVERALL_IMPACTS, chosen, load(m, Slot.OVERALL_IMPACTS) + impacts)
     replace(m, Slot.HIGHEST, chosen, x)
     replace(m, Slot.LOWEST, chosen, x)
+    for row in range(1, sizes[Size.OWN]):
+        q = load(m, at[LanePart.ENDED_POSITION] + row)
+        replace(m, Slot.HIGHEST, chosen, maximum(load(m, Slot.HIGHEST), q))
+        replace(m, Slot.LOWEST, chosen, minimum(load(m, Slot.LOWEST), q))
     replace(m, Slot.LEAST_SPEED, chosen, splat(np.inf))
     replace(m, Slot.IMPACTS, chosen, splat(0.0))
     replace(m, Slot.NEXT_CHECK, chosen, load(m, Slot.NEXT_CHECK) - impacts)

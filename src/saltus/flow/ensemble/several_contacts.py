@@ -15,7 +15,7 @@ from saltus.flow.ensemble.contacts_of_lane import tell_closed
 from saltus.flow.ensemble.lane_layout import FAST, Code, Flag, Helper, JobArray, LaneArray, LaneSetting, Size, Slot
 from saltus.flow.ensemble.lane_steps import both_at, commit, natural_step, row_count, series_true, sweep
 from saltus.flow.ensemble.meeting import meet
-from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE, pass_ends, record_range
+from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE, pass_ends, record_others, record_range
 from saltus.flow.kernel_layout import WHERE_LENGTH, Mode
 from saltus.flow.memory_layout import SERIES_LENGTH, LanePart, State
 from saltus.taylor import (
@@ -198,6 +198,7 @@ def step_all(code, scalar, sizes, at, m, flags, settings, limits, helpers, lanes
         v_begin = select(mask(past), load(m, at[LanePart.ENDED_VELOCITY]), v_begin)
     if sizes[Size.EXTREMA] > 0:
         x, v = load(m, at[LanePart.NEW_POSITION]), load(m, at[LanePart.NEW_VELOCITY])
-        record_range(m, at, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, space[0], space[1])
+        record_range(m, at, 0, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, space[0], space[1])
+        record_others(m, at, sizes, h, past, tau, moved, helpers, space[0], space[1])
     commit(at, m, moved, resolved, load(m, Slot.NEW_SPEED))
     return alive & ~moved, 0, past

@@ -18,7 +18,7 @@ class Sample(StrEnum):
     """What may be kept of each of the last forcing periods; the order is that of the variables in the result."""
 
     STATE = "state"  # at the end of the period, stroboscopically
-    EXTREMA = "extrema"  # of the first coordinate
+    EXTREMA = "extrema"  # of the coordinate, or of all of several
     SPEED = "speed"  # the least abs(v-) of the impacts
     IMPACT_COUNT = "impact_count"
 
