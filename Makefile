@@ -4,8 +4,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 BENCH_READY := $(VENV)/.ready-bench
+DOCS_READY := $(VENV)/.ready-docs
 
-.PHONY: help reproduce test thorough release-check lint bench lock clean
+.PHONY: help reproduce test thorough release-check lint bench docs lock clean
 
 help:
 	@echo "make reproduce   compute and draw the paper into results/"
@@ -13,8 +14,9 @@ help:
 	@echo "make thorough    run the tests that take minutes each: many structures, many random cases, whole figures"
 	@echo "make release-check   compute the whole paper anew and judge every claim at full size"
 	@echo "make bench       measure speed against other integrators, side by side"
+	@echo "make docs        build the documentation as a site, docs/_build/html/index.html; needs no network once it is installed"
 	@echo "make lint        ruff and mypy only"
-	@echo "make lock        renew both locks from pyproject.toml"
+	@echo "make lock        renew all locks from pyproject.toml"
 
 reproduce: $(READY)
 	$(BIN)/saltus reproduce
@@ -39,6 +41,10 @@ lint: $(READY)
 bench: $(BENCH_READY)
 	$(BIN)/python benchmarks/run.py $(BENCH)
 
+# Warnings are errors. The gallery runs an example again only where it has changed.
+docs: $(DOCS_READY)
+	$(BIN)/python -m sphinx -b html -W --keep-going docs docs/_build/html
+
 # Debian splits ensurepip off into python3-venv; pip can fill a bare environment from outside.
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -55,11 +61,16 @@ $(BENCH_READY): $(READY) requirements-bench.lock
 		echo "Siconos is not installed here (as root: apt-get install python3-siconos gcc); without it its comparison is left out"
 	@touch $@
 
+$(DOCS_READY): $(READY) requirements-docs.lock
+	$(PYTHON) -m pip --python $(BIN)/python install --quiet --require-hashes -r requirements-docs.lock
+	@touch $@
+
 lock:
 	$(PYTHON) -m venv $(VENV)/lock && $(VENV)/lock/bin/pip install --quiet uv
 	$(VENV)/lock/bin/uv export --quiet --extra test --no-emit-project --no-header --format requirements.txt -o requirements.lock
 	$(VENV)/lock/bin/uv export --quiet --extra bench --no-emit-project --no-header --format requirements.txt -o requirements-bench.lock
+	$(VENV)/lock/bin/uv export --quiet --extra docs --no-emit-project --no-header --format requirements.txt -o requirements-docs.lock
 	rm -rf $(VENV)/lock uv.lock
 
 clean:
-	rm -rf $(VENV) results
+	rm -rf $(VENV) results docs/_build docs/gallery docs/reference/api

@@ -1,4 +1,8 @@
-"""Where motions of the metainterface end: three attractors under one load, their basins, and the curves that part them."""
+"""
+Three attractors, their basins and the curves between
+=====================================================
+
+Where motions of the metainterface end: three attractors under one load, their basins, and the curves that part them."""
 
 import numpy as np
 

@@ -1,4 +1,8 @@
-"""Four cells in a row, of which the first is let go: how its motion reaches the last one through the springs between them."""
+"""
+A chain of four cells
+=====================
+
+Four cells in a row, of which the first is let go: how its motion reaches the last one through the springs between them."""
 
 import numpy as np
 

@@ -1,4 +1,8 @@
-"""Infinitely many impacts in a finite time: the free metainterface with impact loss comes to rest, exactly (Zeno).
+"""
+Infinitely many impacts in a finite time
+========================================
+
+Infinitely many impacts in a finite time: the free metainterface with impact loss comes to rest, exactly (Zeno).
 
 The paper's `finaltime` gives the same instant for small amplitudes: (1 + e)/(1 - e)/4 of the undamped period.
 """

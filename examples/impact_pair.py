@@ -1,4 +1,8 @@
-"""An impact damper: a loose mass in a case on a spring takes the case's resonance down by its impacts."""
+"""
+An impact damper
+================
+
+An impact damper: a loose mass in a case on a spring takes the case's resonance down by its impacts."""
 
 import numpy as np
 

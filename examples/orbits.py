@@ -1,4 +1,8 @@
-"""The metainterface at H = 0.5: an orbit, its branch along the frequency through folds and a grazing, and a fold's own curve."""
+"""
+A branch through folds and a grazing, and a cusp
+================================================
+
+The metainterface at H = 0.5: an orbit, its branch along the frequency through folds and a grazing, and a fold's own curve."""
 
 import numpy as np
 

@@ -1,4 +1,8 @@
-"""The metainterface of the paper under load (i): a motion, its impacts, and what the mechanism says to it."""
+"""
+A motion of the metainterface
+=============================
+
+The metainterface of the paper under load (i): a motion, its impacts, and what the mechanism says to it."""
 
 import numpy as np
 

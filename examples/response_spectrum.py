@@ -1,4 +1,8 @@
-"""A response spectrum at H = 1: the branch of period 1 and, found by search alone, a detached loop of period 3."""
+"""
+A response spectrum with a detached loop
+========================================
+
+A response spectrum at H = 1: the branch of period 1 and, found by search alone, a detached loop of period 3."""
 
 import tempfile
 from pathlib import Path

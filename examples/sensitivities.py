@@ -1,4 +1,8 @@
-"""Derivatives of motions with impacts: to the state at the start, to parameters, and of the times of events."""
+"""
+Derivatives through impacts
+===========================
+
+Derivatives of motions with impacts: to the state at the start, to parameters, and of the times of events."""
 
 import math
 

@@ -1,4 +1,8 @@
-"""Both layers as they really move: how far the reduced model, whose other layer never opens, is from them.
+"""
+Both layers as they move
+========================
+
+Both layers as they really move: how far the reduced model, whose other layer never opens, is from them.
 
 Under Omega = 1, V = -0.5, C = 0.1 the reduced motion is exact for small loads. At H = 0.2 the closed layer opens for a moment
 before each crossing, so that the impact law never acts, and the steady amplitude is 0.5694 in place of 0.5856.

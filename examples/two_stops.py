@@ -1,4 +1,8 @@
-"""A mass between two stops: period-1 motions that hit each stop once, against their closed form.
+"""
+A mass between two stops
+========================
+
+A mass between two stops: period-1 motions that hit each stop once, against their closed form.
 
 With x'' = A cos(tau) between the stops at -1 and 1, and impacts at tau = phi + n pi, half a period takes the mass from one stop
 to the other with the speed v after each impact: sin(phi) = -v (1 - e) / (2 e A) and cos(phi) = (1 - v pi (1 + e) / (4 e)) / A.

@@ -1,0 +1,27 @@
+"""In which order the gallery shows the examples, and how each begins."""
+
+import matplotlib.pyplot as plt
+
+ORDER = ("quickstart",)
+
+
+def place(name):
+    """Where a file stands in the gallery; what is not listed comes last, by its name."""
+    stem = name.rpartition("/")[2].removesuffix(".py")
+    return (ORDER.index(stem) if stem in ORDER else len(ORDER), stem)
+
+
+class InOrder:
+    """The key by which sphinx-gallery sorts files."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def __call__(self, name):
+        return place(name)
+
+
+def reset(_, __):
+    """Every example begins with Matplotlib's own settings."""
+    plt.rcdefaults()
+    plt.rcParams["figure.dpi"] = 120

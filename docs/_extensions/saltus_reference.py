@@ -1,0 +1,170 @@
+"""The reference: pages of the public names, the command line, the keys of studies and the paper's errata, written from the code."""
+
+import inspect
+import re
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+
+import typer
+from public_names import ROOMS, public_names
+
+import saltus
+from saltus.cli.app import app
+from saltus.config.questions import QUESTIONS, functions_of, keys_of
+from saltus.systems import IMPACTS, MODELS
+
+FOLDER = Path(__file__).parents[1] / "reference" / "api"
+
+
+def setup(application):
+    """Called by Sphinx."""
+    application.connect("builder-inited", write_all)
+    application.connect("autodoc-process-docstring", plain_text_as_rst, priority=400)  # before napoleon
+    application.connect("missing-reference", where_it_is_public)
+    return {"parallel_read_safe": True}
+
+
+def write_all(_):
+    """Write every page that comes from the code; one that has not changed keeps its time, and is not read again."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    pages = {f"{room}.rst": room_page(room, names) for room, names in public_names().items()}
+    pages |= {"command_line.md": command_line(), "study_keys.md": study_keys(), "known_errata.md": known_errata()}
+    for name, text in pages.items():
+        path = FOLDER / name
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+# --- names -----------------------------------------------------------------------------------------------------------------
+
+
+def room_page(room, names):
+    """The names of a room: a table of them, then each with signature, types and example."""
+    lines = [ROOMS[room], "=" * len(ROOMS[room]), "", ".. autosummary::", "   :nosignatures:", ""]
+    lines += [f"   ~{name}" for name in names]
+    for name in names:
+        found = getattr(saltus, name.removeprefix("saltus.")) if name.count(".") == 1 else _inside(name)
+        if inspect.isclass(found):
+            lines += ["", f".. autoclass:: {name}", "   :members:"]
+            if issubclass(found, (tuple, str)) or issubclass(found, Exception):
+                lines += ["   :exclude-members: count, index, with_traceback, add_note"]
+        else:
+            lines += ["", f".. autofunction:: {name}"]
+    return "\n".join(lines) + "\n"
+
+
+def _inside(name):
+    room, own = name.removeprefix("saltus.").split(".")
+    return getattr(getattr(saltus, room, None) or __import__(f"saltus.{room}", fromlist=["_"]), own)
+
+
+def plain_text_as_rst(_app, _what, _name, _found, _options, lines):
+    """Docstrings are plain text: an indented paragraph after an empty line is an equation, stars and bars are what they are."""
+    given, equation = list(lines), 0  # by how much the text before an equation is indented, and one
+    lines.clear()
+    for number, line in enumerate(given):
+        indent = len(line) - len(line.lstrip())
+        if line.strip() and indent < equation:
+            equation = 0
+        if equation or line.lstrip().startswith((">>>", "...")):
+            lines.append(line)
+            continue
+        lines.append("".join(_escaped(part) for part in re.split(r"(`[^`]*`(?:\w)?)", line)))
+        if _next_is_deeper(given, number, indent):
+            equation = indent + 1
+            lines[-1:] = [lines[-1] + ":"] if line.rstrip().endswith(":") else [lines[-1], "", " " * indent + "::"]
+
+
+def where_it_is_public(_app, env, node, content):
+    """Types in signatures are named by the file that defines them: link the name that users import, if there is one."""
+    target = node.get("reftarget", "")
+    known = {name.rpartition(".")[2]: name for names in public_names().values() for name in names}
+    if node.get("refdomain") != "py" or not target.startswith("saltus."):
+        return None
+    public = known.get(target.rpartition(".")[2])
+    if public is None:
+        return content  # of an inner file, for which there is no page
+    return env.get_domain("py").resolve_xref(env, node["refdoc"], _app.builder, "obj", public, node, content)
+
+
+def _next_is_deeper(lines, number, indent):
+    """Whether an empty line and then a deeper one follow a line of text."""
+    after = lines[number + 1 : number + 3]
+    deeper = len(after) == 2 and not after[0].strip() and len(after[1]) - len(after[1].lstrip()) > indent
+    return bool(deeper and lines[number].strip() and not after[1].lstrip().startswith(">>>"))
+
+
+def _escaped(part):
+    if part.startswith("`"):
+        return part if part.endswith("`") else f"{part[:-1]}\\ {part[-1]}"  # `DataArray`s
+    text = re.sub(r"(?<=.)\*|^\*(?! )|\|", lambda found: "\\" + found[0], part)
+    return re.sub(r"(\w)_(?=\W|$)", r"\1\\_", text)
+
+
+# --- command line ------------------------------------------------------------------------------------------------------------
+
+
+def command_line():
+    """The commands with their arguments and options, as `saltus COMMAND --help` has them."""
+    lines = ["# The command line", "", "Every command has `--help`. Its exit status is 0, 2 after a refusal (one sentence says why), or 130"]
+    lines += ["after Ctrl-C.", ""]
+    for name, command in typer.main.get_command(app).commands.items():
+        arguments = [p for p in command.params if not p.opts[0].startswith("-")]
+        shown = " ".join((p.metavar or p.name.upper()) for p in arguments)
+        lines += [f"## `saltus {name}`", "", f"```\nsaltus {name} [OPTIONS] {shown}\n```", "", _plain(command.help), ""]
+        lines += ["| argument or option | |", "|---|---|"]
+        for p in command.params:
+            label = ", ".join(f"`{option}`" for option in (*p.opts, *p.secondary_opts)) if p.opts[0].startswith("-") else f"`{p.metavar}`"
+            lines.append(f"| {label} | {_plain(getattr(p, 'help', '') or '').replace('|', '/')} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _plain(text):
+    """Rich's marks as Markdown."""
+    text = re.sub(r"\[cyan\](.*?)\[/\]", r"`\1`", text or "")
+    return re.sub(r"\\\[(\w+)\]", r"`[\1]`", text)
+
+
+# --- studies -----------------------------------------------------------------------------------------------------------------
+
+
+def study_keys():
+    """All tables of a study, with every key and the default that the code gives it."""
+    lines = ["# All keys of a study", "", "What each means is on the page [A study in a file](../../study.md)."]
+    lines += ["A key without a default must be given, or is one of several that may be.", ""]
+    lines += ["## `[model]`", "", "| type | key | default |", "|---|---|---|"]
+    lines += [row for name, cls in sorted(MODELS.items()) if cls.__module__.startswith("saltus.") for row in _fields(name, cls)]
+    lines += ["", "## `[impact]`", "", "| type | key | default |", "|---|---|---|"]
+    lines += [row for name, cls in sorted(IMPACTS.items()) for row in _fields(name, cls)]
+    for kind in QUESTIONS:
+        defaults = {k: v.default for function in functions_of(kind) for k, v in inspect.signature(function).parameters.items()}
+        lines += ["", f"## `[{kind}]`", "", "| key | default |", "|---|---|"]
+        lines += [f"| `{key}` | {_default(defaults.get(key, inspect.Parameter.empty))} |" for key in sorted(keys_of(kind))]
+    return "\n".join(lines) + "\n"
+
+
+def _fields(name, cls):
+    parameters = inspect.signature(cls).parameters.values()
+    return [f"| `{name}` | `{p.name}` | {_default(p.default)} |" for p in parameters] or [f"| `{name}` | | |"]
+
+
+def _default(value):
+    return "" if value is inspect.Parameter.empty or "object at" in repr(value) else f"`{value!r}`"
+
+
+# --- errata -------------------------------------------------------------------------------------------------------------------
+
+
+def known_errata():
+    """The errata 1 to 28 of the paper that were known; what follows was found while building saltus (docs/errata.md)."""
+    known = tomllib.loads((files("saltus.paper") / "errata.toml").read_text(encoding="utf-8"))
+    lines = ["# The known errata of the paper, 1 to 28", "", "What is right, as short as can be. The derivations are in the docstrings that"]
+    lines += ["name them, and in the tests called after them. From 29 on they are our own: [disagreements](../../errata.md).", ""]
+    lines += ["| | where | what is right |", "|---|---|---|"]
+    for number, erratum in known.items():
+        if int(number) <= 28:
+            cells = [erratum[key].replace("|", r"\|").replace("*", r"\*").replace("\n", " ") for key in ("place", "correct")]
+            lines.append(f"| {number} | {cells[0]} | {cells[1]} |")
+    return "\n".join(lines) + "\n"
