@@ -1,4 +1,4 @@
-"""The reference: pages of the public names, the command line, the keys of studies and the paper's errata, written from the code."""
+"""The reference, written from the code: public names, the command line, the keys of studies, the paper's known errata."""
 
 import inspect
 import re
@@ -107,18 +107,22 @@ def _escaped(part):
 
 def command_line():
     """The commands with their arguments and options, as `saltus COMMAND --help` has them."""
-    lines = ["# The command line", "", "Every command has `--help`. Its exit status is 0, 2 after a refusal (one sentence says why), or 130"]
-    lines += ["after Ctrl-C.", ""]
+    lines = ["# The command line", "", "Every command has `--help`. Its exit status is 0, or 2 after a refusal (one sentence"]
+    lines += ["says why), or 130 after Ctrl-C.", ""]
     for name, command in typer.main.get_command(app).commands.items():
-        arguments = [p for p in command.params if not p.opts[0].startswith("-")]
-        shown = " ".join((p.metavar or p.name.upper()) for p in arguments)
-        lines += [f"## `saltus {name}`", "", f"```\nsaltus {name} [OPTIONS] {shown}\n```", "", _plain(command.help), ""]
+        arguments = " ".join(p.metavar or p.name.upper() for p in command.params if not _is_option(p))
+        lines += [f"## `saltus {name}`", "", f"```text\nsaltus {name} [OPTIONS] {arguments}\n```", "", _plain(command.help), ""]
         lines += ["| argument or option | |", "|---|---|"]
         for p in command.params:
-            label = ", ".join(f"`{option}`" for option in (*p.opts, *p.secondary_opts)) if p.opts[0].startswith("-") else f"`{p.metavar}`"
-            lines.append(f"| {label} | {_plain(getattr(p, 'help', '') or '').replace('|', '/')} |")
+            labels = [*p.opts, *p.secondary_opts] if _is_option(p) else [p.metavar]
+            text = _plain(getattr(p, "help", None) or "").replace("|", "/")
+            lines.append(f"| {', '.join(f'`{label}`' for label in labels)} | {text} |")
         lines.append("")
     return "\n".join(lines)
+
+
+def _is_option(parameter):
+    return parameter.opts[0].startswith("-")
 
 
 def _plain(text):
@@ -160,8 +164,9 @@ def _default(value):
 def known_errata():
     """The errata 1 to 28 of the paper that were known; what follows was found while building saltus (docs/errata.md)."""
     known = tomllib.loads((files("saltus.paper") / "errata.toml").read_text(encoding="utf-8"))
-    lines = ["# The known errata of the paper, 1 to 28", "", "What is right, as short as can be. The derivations are in the docstrings that"]
-    lines += ["name them, and in the tests called after them. From 29 on they are our own: [disagreements](../../errata.md).", ""]
+    lines = ["# The known errata of the paper, 1 to 28", "", "What is right, as short as can be. The derivations are in the"]
+    lines += ["docstrings that name them, and in the tests called after them. From 29 on they are our own:"]
+    lines += ["[disagreements](../../errata.md).", ""]
     lines += ["| | where | what is right |", "|---|---|---|"]
     for number, erratum in known.items():
         if int(number) <= 28:
