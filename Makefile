@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 BENCH_READY := $(VENV)/.ready-bench
 DOCS_READY := $(VENV)/.ready-docs
 
-.PHONY: help reproduce test thorough release-check lint bench docs lock clean
+.PHONY: help reproduce test thorough release-check lint bench docs dist lock clean
 
 help:
 	@echo "make reproduce   compute and draw the paper into results/"
@@ -15,6 +15,7 @@ help:
 	@echo "make release-check   compute the whole paper anew and judge every claim at full size"
 	@echo "make bench       measure speed against other integrators, side by side"
 	@echo "make docs        build the documentation as a site, docs/_build/html/index.html; needs no network once it is installed"
+	@echo "make dist        build the wheel, and try it in empty environments with the newest and the lowest packages"
 	@echo "make lint        ruff and mypy only"
 	@echo "make lock        renew all locks from pyproject.toml"
 
@@ -44,6 +45,11 @@ bench: $(BENCH_READY)
 # Warnings are errors. The gallery runs an example again only where it has changed.
 docs: $(DOCS_READY)
 	$(BIN)/python -m sphinx -b html -W --keep-going docs docs/_build/html
+
+# DIST passes options on: make dist DIST=--tests
+dist: $(READY)
+	$(PYTHON) -m pip --python $(BIN)/python install --quiet uv
+	$(BIN)/python release/try_wheel.py $(DIST)
 
 # Debian splits ensurepip off into python3-venv; pip can fill a bare environment from outside.
 $(READY): requirements.lock pyproject.toml

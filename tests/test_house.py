@@ -46,7 +46,7 @@ MAY_IMPORT = {
     "plots": set(),
     "config": {"systems", "flow", "attractors", "studies"},
     "paper": {"systems", "theory", "flow", "continuation", "orbits", "attractors", "sweep", "studies", "plots"},
-    "cli": {"systems", "theory", "flow", "orbits", "attractors", "sweep", "studies", "plots", "config", "paper"},
+    "cli": {"systems", "theory", "flow", "taylor", "orbits", "attractors", "sweep", "studies", "plots", "config", "paper"},
 }
 HEAVY = (
     *("scipy", "numba", "xarray", "matplotlib", "h5netcdf", "zarr", "distributed"),

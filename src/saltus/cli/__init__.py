@@ -1,4 +1,4 @@
-"""The command line: `saltus simulate`, `run`, `plot`, `status`, `info` and `reproduce`, each in the file of its name.
+"""The command line: `saltus simulate`, `run`, `plot`, `status`, `info`, `doctor` and `reproduce`, each in the file of its name.
 
 Only typer and rich are imported before a command runs, so that help is immediate.
 """

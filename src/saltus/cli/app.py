@@ -175,6 +175,22 @@ def info(study: Study) -> None:
 
 
 @app.command()
+def doctor() -> None:
+    """Say what saltus runs on, and whether it computes what it should there.
+
+    The machine and the width of its vectors, the folder of compiled code, the
+    versions of all packages beside those allowed; then a motion whose closed
+    form is known, alone and in lanes. To be sent along with a question.
+
+    Example: [cyan]saltus doctor[/]
+    """
+    with guarded():
+        from saltus.cli.doctor_command import print_doctor
+
+        print_doctor()
+
+
+@app.command()
 def reproduce(
     names: Annotated[
         list[str] | None,

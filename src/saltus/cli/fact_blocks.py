@@ -1,14 +1,17 @@
-"""The blocks of text that `saltus info` prints, and how numbers stand in them."""
+"""The blocks of text that `saltus info` and `saltus doctor` print, and how numbers stand in them."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError
 from saltus.systems import Constant, Harmonic, Load, Signal, Sum
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 Row = tuple[str, ...]
 
@@ -20,6 +23,18 @@ class Block:
     title: str
     rows: list[Row]
     heads: Row = ()
+
+
+def block_table(block: Block) -> Table:
+    """The rows of a block as a table for the terminal."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, show_header=bool(block.heads))
+    for head in block.heads or ("", ""):
+        table.add_column(head, header_style="dim", overflow="fold")
+    for row in block.rows:
+        table.add_row(*row)
+    return table
 
 
 def number(value: Any) -> str:

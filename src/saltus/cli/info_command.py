@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
-from saltus.cli.fact_blocks import Block
+from saltus.cli.fact_blocks import block_table
 from saltus.cli.facts import describe
 
 LEAST_START = 1e-6  # rad; below it a free vibration is too small to speak of
@@ -26,13 +25,4 @@ def print_info(path: Path) -> None:
     for block in describe(study.system, start):
         console.print()
         console.print(block.title, style="bold", markup=False)
-        console.print(_table(block))
-
-
-def _table(block: Block) -> Table:
-    table = Table(box=None, pad_edge=False, show_header=bool(block.heads))
-    for head in block.heads or ("", ""):
-        table.add_column(head, header_style="dim", overflow="fold")
-    for row in block.rows:
-        table.add_row(*row)
-    return table
+        console.print(block_table(block))

@@ -1,0 +1,120 @@
+"""Build the wheel and the source archive, and try the wheel in empty environments: `make dist`.
+
+Each Python on the path that saltus allows, with the newest packages and with the lowest that pyproject.toml allows, gets an
+environment of its own with nothing but the wheel and what it needs. There `saltus doctor` compares a motion with its closed form,
+a study is run and read back, and with --tests the tests run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PYTHONS = ("3.11", "3.12", "3.13", "3.14")  # those that some numba in the allowed range supports
+STUDY = ROOT / "examples" / "resonance.toml"
+VERSIONS = """
+import json, platform
+from importlib import metadata
+names = ("numba", "numpy", "scipy", "xarray", "zarr", "matplotlib")
+print(json.dumps({"python": platform.python_version()} | {name: metadata.version(name) for name in names}))
+"""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One environment: which Python, and whether packages are the lowest allowed ones."""
+
+    python: str
+    lowest: bool
+
+    def run(self, wheel: Path, folder: Path, tests: bool) -> str:
+        """Install and try; the row of the table that says how it went."""
+        python = folder / "venv" / "bin" / "python"
+        uv("venv", "--quiet", "--python", self.python, folder / "venv")
+        resolution = "lowest-direct" if self.lowest else "highest"
+        extra = "[cluster,test]" if tests else ""
+        uv("pip", "install", "--quiet", "--python", python, "--resolution", resolution, f"saltus{extra} @ {wheel.as_uri()}")
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+        environment["SALTUS_CACHE_DIR"] = str(folder / "cache")
+
+        def call(*command: str | Path) -> str:
+            done = subprocess.run(
+                [python, *command],
+                cwd=folder,
+                env=environment,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                check=False,
+            )
+            if done.returncode:
+                raise SystemExit(
+                    f"{self.title}: {' '.join(map(str, command))} ended with {done.returncode}\n{done.stdout[-4000:]}"
+                )
+            return done.stdout
+
+        found = json.loads(call("-c", VERSIONS))
+        call("-m", "saltus", "doctor")
+        call("-m", "saltus", "run", STUDY, "--output", folder / "results")
+        call("-m", "saltus", "status", "--verify", folder / "results")
+        passed = "not run"
+        if tests:
+            shutil.copytree(ROOT / "tests", folder / "checkout" / "tests")
+            for name in ("examples", "docs", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "pyproject.toml"):
+                source, target = ROOT / name, folder / "checkout" / name
+                shutil.copytree(source, target) if source.is_dir() else shutil.copy(source, target)
+            passed = call("-m", "pytest", "-q", folder / "checkout", "--rootdir", folder / "checkout").splitlines()[-1]
+        return f"| {self.title} | " + " | ".join(f"{value}" for value in found.values()) + f" | {passed} |"
+
+    @property
+    def title(self) -> str:
+        """What is tried."""
+        return f"Python {self.python}, {'lowest' if self.lowest else 'newest'} packages"
+
+
+def uv(*arguments: str | Path) -> None:
+    """Run uv, which resolves to the lowest versions as pip cannot."""
+    subprocess.run([sys.executable, "-m", "uv", *arguments], check=True)
+
+
+def build(target: Path) -> Path:
+    """Build both archives from what is committed; the wheel."""
+    with tempfile.TemporaryDirectory() as folder:
+        archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, stdout=subprocess.PIPE)
+        subprocess.run(["tar", "-x", "-C", folder], input=archive.stdout, check=True)
+        subprocess.run([sys.executable, "-m", "hatchling", "build", "-d", target], cwd=folder, check=True)
+    (wheel,) = target.glob("*.whl")
+    return wheel
+
+
+def main() -> None:
+    """Build, then try all that can be had here."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--tests", action="store_true", help="run the tests in each environment as well")
+    options = parser.parse_args()
+    target = ROOT / "dist"
+    shutil.rmtree(target, ignore_errors=True)
+    wheel = build(target)
+    there = [python for python in PYTHONS if shutil.which(f"python{python}")]
+    print(f"{wheel.name}: {wheel.stat().st_size / 2**20:.1f} MiB")
+    print("| environment | Python | numba | NumPy | SciPy | xarray | Zarr | Matplotlib | tests |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for python in there:
+        for lowest in (False, True):
+            with tempfile.TemporaryDirectory() as folder:
+                print(Trial(python, lowest).run(wheel, Path(folder), options.tests), flush=True)
+    missing = [python for python in PYTHONS if python not in there]
+    if missing:
+        print(f"Not tried, as they are not on this machine: Python {', '.join(missing)}.")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,126 @@
+"""`saltus doctor`: what saltus runs on, and whether it computes what it should there."""
+
+from __future__ import annotations
+
+import math
+import os
+import platform
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+
+from rich.console import Console
+
+from saltus.cli.fact_blocks import Block, block_table
+from saltus.cli.guard import BAD_INPUT, stop
+
+PERIODS = 10  # of the trial motion: fifteen impacts, which would show a wrong root or a wrong impact law
+LARGEST_ERROR = 1e-12  # of the trial motion at tol = 1e-14; rounding alone gives some 1e-15 for each impact
+MEBIBYTE = 2.0**20
+
+
+def print_doctor() -> None:
+    """Print the machine, the cache and the versions, then try a motion with a closed form, alone and in lanes.
+
+    What is wrong ends the command with one sentence, after all of it is printed.
+    """
+    console = Console(highlight=False)
+    wrong: list[str] = []
+    for block in (_machine(), _cache(wrong), _versions(wrong), _trial(console, wrong)):
+        console.print(f"\n{block.title}", style="bold", markup=False)
+        console.print(block_table(block))
+    if wrong:
+        stop("; ".join(wrong), BAD_INPUT)
+    console.print("\nsaltus works here.")
+
+
+def _machine() -> Block:
+    from llvmlite.binding import get_host_cpu_name
+
+    from saltus.checks import free_memory
+    from saltus.flow import available_cores
+    from saltus.taylor import WIDTH
+
+    rows = [
+        ("system", platform.platform()),
+        ("processor", get_host_cpu_name()),
+        ("cores", f"{available_cores()} that this process may use"),
+        ("memory", f"{free_memory() / 2**30:.1f} GiB free"),
+        ("lanes", f"{WIDTH} motions at once in a vector" + (" (SALTUS_LANES)" if "SALTUS_LANES" in os.environ else "")),
+    ]
+    return Block("Machine", rows)
+
+
+def _cache(wrong: list[str]) -> Block:
+    from saltus.taylor import cache_directory
+
+    folder = cache_directory()  # says in a remark why another one is used
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    size = sum(path.stat().st_size for path in files) / MEBIBYTE
+    kernels = sum(path.suffix == ".py" for path in files)
+    wanted = os.environ.get("SALTUS_CACHE_DIR")
+    if wanted and not folder.is_relative_to(Path(wanted)):
+        wrong.append(f"compiled code is not kept in {wanted}, which SALTUS_CACHE_DIR names")
+    rows = [
+        ("folder", str(folder)),
+        ("compiled", f"{kernels} kernels and models, {size:.0f} MiB"),
+        (
+            "private",
+            "yes: it is the user's own, nobody else may write to it, and code is compared with its digest before it runs",
+        ),
+    ]
+    return Block("Compiled code", rows)
+
+
+def _versions(wrong: list[str]) -> Block:
+    from saltus import __version__
+
+    rows = [("saltus", __version__, "", ""), ("Python", platform.python_version(), ">=3.11", "")]
+    try:
+        rows += _requirements(wrong)
+    except metadata.PackageNotFoundError:
+        wrong.append("saltus is not installed but run from its files, so the versions were not compared with those allowed")
+    return Block("Versions", rows, ("", "installed", "allowed", ""))
+
+
+def _requirements(wrong: list[str]) -> Iterator[tuple[str, str, str, str]]:
+    """Each package that saltus needs, or that one of its extras needs and is there."""
+    from packaging.requirements import Requirement
+
+    for text in metadata.requires("saltus") or []:
+        need = Requirement(text)
+        extra = need.marker is not None and "extra" in str(need.marker)
+        if extra and not need.marker.evaluate({"extra": "cluster"}):  # type: ignore[union-attr]
+            continue
+        try:
+            there = metadata.version(need.name)
+        except metadata.PackageNotFoundError:
+            there = ""
+        fits = need.specifier.contains(there, prereleases=True) if there else extra
+        if not fits:
+            wrong.append(f"{need.name} {there or 'is missing:'} {'is not allowed:' if there else ''} saltus needs {need}")
+        remark = "for clusters: pip install saltus[cluster]" if extra and not there else "" if fits else "not allowed"
+        yield need.name, there or "no", str(need.specifier), remark
+
+
+def _trial(console: Console, wrong: list[str]) -> Block:
+    """x'' + x = 0 from (0, 1) with a wall at x = 1/2 that gives all velocity back: impacts at pi/6 + 4 pi n / 3."""
+    import numpy as np
+
+    from saltus.flow import simulate, simulate_many
+    from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscillator
+
+    system = System(model=WallOscillator(wall=0.5), load=Load(frequency=1.0, force=Harmonic(0.0)), impact=VelocityReduction(1.0))
+    since = (2 * math.pi * PERIODS - math.pi / 6) % (4 * math.pi / 3)
+    x, velocity = math.sin(5 * math.pi / 6 + since), math.cos(5 * math.pi / 6 + since)
+    with console.status("compiling what is not compiled yet, and trying it"):
+        one = simulate(system, x=0.0, velocity=1.0, periods=PERIODS, tol=1e-14)
+        many = simulate_many(system, x=np.zeros(64), velocity=1.0, periods=PERIODS, tol=1e-14)
+    errors = {
+        "one motion": math.hypot(one.x - x, one.velocity - velocity),
+        "64 motions in lanes": float(np.hypot(many.x - x, many.velocity - velocity).max()),
+    }
+    for name, error in errors.items():
+        if not error <= LARGEST_ERROR:
+            wrong.append(f"{name} of an oscillator with a wall is wrong by {error:.1e}: please tell the developers")
+    return Block("Trial", [(name, f"differs from the closed form by {error:.1e}") for name, error in errors.items()])

@@ -1,0 +1,61 @@
+"""What is published: the wheel holds all that saltus reads, and every place says the same version."""
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import saltus
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The names of the files in a wheel that is built here."""
+    folder = tmp_path_factory.mktemp("dist")
+    subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder], cwd=ROOT, check=True)
+    (path,) = folder.glob("*.whl")
+    with zipfile.ZipFile(path) as archive:
+        return archive.namelist()
+
+
+def test_the_wheel_holds_every_file_of_the_package(wheel):
+    source = ROOT / "src"
+    there = {path.relative_to(source).as_posix() for path in (source / "saltus").rglob("*") if path.is_file()}
+    there = {name for name in there if "__pycache__" not in name}
+    assert there <= set(wheel)
+    assert {"saltus/py.typed", "saltus/__init__.pyi"} <= there  # without which no type checker sees a type
+
+
+def test_the_wheel_holds_nothing_else(wheel):
+    info = f"saltus-{PROJECT['version']}.dist-info/"
+    assert all(name.startswith(("saltus/", info)) for name in wheel)
+    assert f"{info}licenses/LICENSE" in wheel
+
+
+def test_all_places_say_the_same_version():
+    version = PROJECT["version"]
+    assert saltus.__version__ == version
+    assert re.search(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(), re.M)[1] == version
+    assert json.loads((ROOT / ".zenodo.json").read_text())["version"] == version
+    assert re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.M)[1] == version
+
+
+def test_what_saltus_imports_it_also_requires():
+    """A package that another one brings along may be gone with that one's next release."""
+    names = {"tomli-w": "tomli_w", "lazy-loader": "lazy_loader"}
+    texts = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["cluster"]]
+    required = {re.match(r"[\w-]+", text)[0] for text in texts}
+    allowed = {names.get(name, name) for name in required} | {"saltus", *sys.stdlib_module_names}
+    statement = re.compile(r"^\s*(?:from|import) ([A-Za-z_]\w*)", re.M)
+    code = [re.sub(r'""".*?"""', "", path.read_text(), flags=re.S) for path in (ROOT / "src").rglob("*.py")]
+    imported = {name for text in code for name in statement.findall(text)}
+    assert "numba" in imported
+    assert imported - allowed == {"llvmlite"}  # of one release with numba, which fixes its version
