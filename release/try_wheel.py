@@ -38,7 +38,7 @@ class Trial:
     def run(self, wheel: Path, folder: Path, tests: bool) -> str:
         """Install and try; the row of the table that says how it went."""
         python = folder / "venv" / "bin" / "python"
-        uv("venv", "--quiet", "--python", self.python, folder / "venv")
+        uv("venv", "--quiet", "--python", shutil.which(f"python{self.python}") or "", folder / "venv")
         resolution = "lowest-direct" if self.lowest else "highest"
         extra = "[cluster,test]" if tests else ""
         uv("pip", "install", "--quiet", "--python", python, "--resolution", resolution, f"saltus{extra} @ {wheel.as_uri()}")
@@ -85,6 +85,12 @@ def uv(*arguments: str | Path) -> None:
     subprocess.run([sys.executable, "-m", "uv", *arguments], check=True)
 
 
+def works(python: str) -> bool:
+    """Whether this machine has a Python; a command of its name may be a pointer to none."""
+    command = shutil.which(f"python{python}")
+    return command is not None and subprocess.run([command, "-c", ""], capture_output=True, check=False).returncode == 0
+
+
 def build(target: Path) -> Path:
     """Build both archives from what is committed; the wheel."""
     with tempfile.TemporaryDirectory() as folder:
@@ -103,7 +109,7 @@ def main() -> None:
     target = ROOT / "dist"
     shutil.rmtree(target, ignore_errors=True)
     wheel = build(target)
-    there = [python for python in PYTHONS if shutil.which(f"python{python}")]
+    there = [python for python in PYTHONS if works(python)]
     print(f"{wheel.name}: {wheel.stat().st_size / 2**20:.1f} MiB")
     print("| environment | Python | numba | NumPy | SciPy | xarray | Zarr | Matplotlib | tests |")
     print("|---|---|---|---|---|---|---|---|---|")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from saltus.cli.fact_blocks import Block, block_table
+from saltus.cli.fact_blocks import Block, Row, block_table
 from saltus.cli.guard import BAD_INPUT, stop
 
 PERIODS = 10  # of the trial motion: fifteen impacts, which would show a wrong root or a wrong impact law
@@ -41,7 +41,7 @@ def _machine() -> Block:
     from saltus.flow import available_cores
     from saltus.taylor import WIDTH
 
-    rows = [
+    rows: list[Row] = [
         ("system", platform.platform()),
         ("processor", get_host_cpu_name()),
         ("cores", f"{available_cores()} that this process may use"),
@@ -61,7 +61,7 @@ def _cache(wrong: list[str]) -> Block:
     wanted = os.environ.get("SALTUS_CACHE_DIR")
     if wanted and not folder.is_relative_to(Path(wanted)):
         wrong.append(f"compiled code is not kept in {wanted}, which SALTUS_CACHE_DIR names")
-    rows = [
+    rows: list[Row] = [
         ("folder", str(folder)),
         ("compiled", f"{kernels} kernels and models, {size:.0f} MiB"),
         (
@@ -75,7 +75,7 @@ def _cache(wrong: list[str]) -> Block:
 def _versions(wrong: list[str]) -> Block:
     from saltus import __version__
 
-    rows = [("saltus", __version__, "", ""), ("Python", platform.python_version(), ">=3.11", "")]
+    rows: list[Row] = [("saltus", __version__, "", ""), ("Python", platform.python_version(), ">=3.11", "")]
     try:
         rows += _requirements(wrong)
     except metadata.PackageNotFoundError:
@@ -123,4 +123,5 @@ def _trial(console: Console, wrong: list[str]) -> Block:
     for name, error in errors.items():
         if not error <= LARGEST_ERROR:
             wrong.append(f"{name} of an oscillator with a wall is wrong by {error:.1e}: please tell the developers")
-    return Block("Trial", [(name, f"differs from the closed form by {error:.1e}") for name, error in errors.items()])
+    rows: list[Row] = [(name, f"differs from the closed form by {error:.1e}") for name, error in errors.items()]
+    return Block("Trial", rows)
