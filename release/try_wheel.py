@@ -39,9 +39,12 @@ class Trial:
         """Install and try; the row of the table that says how it went."""
         python = folder / "venv" / "bin" / "python"
         uv("venv", "--quiet", "--python", shutil.which(f"python{self.python}") or "", folder / "venv")
+        install = ("pip", "install", "--quiet", "--python", python)
         resolution = "lowest-direct" if self.lowest else "highest"
-        extra = "[cluster,test]" if tests else ""
-        uv("pip", "install", "--quiet", "--python", python, "--resolution", resolution, f"saltus{extra} @ {wheel.as_uri()}")
+        extras = ("--extra", "cluster", "--extra", "test") if tests else ()
+        uv(*install, "--resolution", resolution, *extras, "-r", ROOT / "pyproject.toml")  # what the wheel needs is direct here
+        uv(*install, "--no-deps", wheel)
+        uv("pip", "check", "--quiet", "--python", python)
         environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
         environment["SALTUS_CACHE_DIR"] = str(folder / "cache")
 
@@ -104,12 +107,13 @@ def build(target: Path) -> Path:
 def main() -> None:
     """Build, then try all that can be had here."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", choices=PYTHONS, help="try this Python alone")
     parser.add_argument("--tests", action="store_true", help="run the tests in each environment as well")
     options = parser.parse_args()
     target = ROOT / "dist"
     shutil.rmtree(target, ignore_errors=True)
     wheel = build(target)
-    there = [python for python in PYTHONS if works(python)]
+    there = [python for python in PYTHONS if works(python) and options.only in (None, python)]
     print(f"{wheel.name}: {wheel.stat().st_size / 2**20:.1f} MiB")
     print("| environment | Python | numba | NumPy | SciPy | xarray | Zarr | Matplotlib | tests |")
     print("|---|---|---|---|---|---|---|---|---|")
@@ -119,7 +123,7 @@ def main() -> None:
                 print(Trial(python, lowest).run(wheel, Path(folder), options.tests), flush=True)
     missing = [python for python in PYTHONS if python not in there]
     if missing:
-        print(f"Not tried, as they are not on this machine: Python {', '.join(missing)}.")
+        print(f"Not tried here: Python {', '.join(missing)}.")
 
 
 if __name__ == "__main__":
