@@ -120,6 +120,10 @@ class Problem:
         self._where[STRUCTURE_SIZES] = self._run.structure.sizes
         self._settings, self._records = np.array([0.0, 0.0, tol]), record_table(system, [])
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled and copied as what it is made from: compiled code is loaded again where it is read."""
+        return type(self), (self.system, self.signature, self.paths, self.tol)
+
     @cached_property
     def passes_contact(self) -> bool:
         """Whether orbits are followed through a contact that is no singularity, whatever the parameters at `paths`."""
