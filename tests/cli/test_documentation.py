@@ -1,14 +1,11 @@
-"""What the documentation shows is true, and the examples run."""
+"""The tables of the pages are those of the code (that the code on them runs: tests/pages)."""
 
 import dataclasses
 import inspect
 import re
-import sys
-import types
 from pathlib import Path
 
 import numpy as np
-import pytest
 from shared_systems import forced
 
 import saltus
@@ -55,21 +52,6 @@ def test_the_impact_laws_are_all_named():
 
 
 # --- Python ------------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "README.md",
-        *(f"docs/{page}.md" for page in ("attractors", "contacts", "ensembles", "models", "orbits", "smoothing", "validity")),
-    ],
-)
-def test_every_snippet_runs(name, monkeypatch):
-    text = (ROOT / name).read_text(encoding="utf-8")
-    code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)).replace(", 200)", ", 12)")  # coarser grids
-    module = types.ModuleType("snippet")
-    monkeypatch.setitem(sys.modules, "snippet", module)
-    exec(compile(code, name, "exec"), vars(module))
 
 
 def section(title):
