@@ -26,6 +26,7 @@ def test_the_parts_are_listed(saltus):
 def test_the_options_reach_the_paper(saltus, monkeypatch, arguments, names, output, force):
     calls = []
     monkeypatch.setattr("saltus.paper.reproduce", lambda *given: calls.append(given) or [])
+    monkeypatch.setattr("saltus.paper.report_as_pdf", lambda folder: None)
     assert saltus("reproduce", *arguments).exit_code == 0
     assert calls[0][:3] == (names, output, force)
 
@@ -39,6 +40,18 @@ def test_an_unknown_part_is_refused(refused, tmp_path):
 def test_an_unwritable_folder_is_refused(refused, tmp_path):
     (tmp_path / "file").touch()
     assert "is a file; name another with --output" in refused("reproduce", "fig08", "-o", tmp_path / "file")
+
+
+def test_the_report_of_no_results_is_refused(refused, tmp_path):
+    assert "holds no results of `saltus reproduce`" in refused("report", tmp_path)
+
+
+def test_the_report_is_renewed_and_a_missing_browser_told(saltus, monkeypatch, tmp_path):
+    monkeypatch.setattr("saltus.paper.report.browser.BROWSERS", ())
+    assert "there is no report.pdf" in saltus("reproduce", "table1", "-o", tmp_path).stdout
+    (tmp_path / "report.html").unlink()
+    assert "Parts in the report: table1" in saltus("report", tmp_path).stdout
+    assert (tmp_path / "report.html").exists()
 
 
 def test_an_interrupt_leaves_whole_files_only(started, tmp_path):

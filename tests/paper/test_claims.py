@@ -9,8 +9,8 @@ from picture_checks import check_provenance, clipped
 from saltus.errors import SaltusError
 from saltus.paper import FIGURES, ClaimVerdict
 from saltus.paper.claims.claim import judge, judge_claim, measured, printed_unit, with_summaries
-from saltus.paper.claims.claim_tables import ClaimEntry, ListForm, Listing, Origin, claim_tables, section_titles
-from saltus.paper.claims.ledger import ledger, listed, tally, to_markdown
+from saltus.paper.claims.claim_tables import ClaimEntry, ListForm, Origin, claim_tables, section_titles
+from saltus.paper.claims.ledger import ledger, tally, to_markdown
 from saltus.paper.errata import errata
 from saltus.paper.release_check import failures
 
@@ -135,11 +135,10 @@ def test_every_summary_rests_on_claims_that_there_are_and_that_are_measured():
         assert all(entries[other].is_measured for other in entry.rests_on), id
 
 
-def test_every_claim_has_evidence_or_a_reason_and_what_is_listed_first_has_a_headline():
+def test_every_claim_has_evidence_or_a_reason():
     for claims in claim_tables().values():
         for id, entry in claims.items():
             assert bool(entry.evidence or entry.undecided) == entry.is_measured, id
-            assert bool(entry.headline) == (entry.listing is not None), id
 
 
 def test_every_erratum_has_a_second_kind_of_evidence_and_every_proof_is_a_test():
@@ -186,13 +185,6 @@ def test_the_table_escapes_bars_and_has_each_claim_once_under_its_section():
     assert "\\|θ\\| > 0" in text
     assert text.index("## 2 Mechanical model") < text.index("## 5.1 Small vibrations")
     assert text.count("| x |") == 2
-
-
-def test_findings_are_listed_first_where_the_statement_fails_as_printed_and_nowhere_else():
-    finding = {"listing": Listing.FINDINGS, "headline": "found", "erratum": 4}
-    claims = [judged(False, True, **finding), judged(True, **finding), judged(True, listing=Listing.VALIDITY, headline="beware")]
-    found = {listing: [text for _, text in lines] for listing, lines in listed(claims)}
-    assert found == {Listing.FINDINGS: ["found"], Listing.VALIDITY: ["beware"]}
 
 
 def test_a_claim_that_was_not_measured_or_is_in_no_table_is_an_error(monkeypatch):

@@ -56,7 +56,7 @@ def test_a_second_run_makes_nothing(tmp_path):
     assert calls == [3]
     assert second[0].claims == first[0].claims
     assert {p.name for p in tmp_path.iterdir()} == {
-        "fig99.nc", "fig99.png", "fig99.pdf", "claims.json", "claims.md", "index.html", ".saltus",
+        "fig99.nc", "fig99.png", "fig99.pdf", "claims.json", "claims.md", "report.html", ".saltus",
     }  # fmt: skip
 
 

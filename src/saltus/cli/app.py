@@ -202,8 +202,8 @@ def reproduce(
 ) -> None:
     """Compute and draw the paper: figures, tables, and every claim beside the value found here.
 
-    Writes PNG, PDF and netCDF files, and a report to open. What is up to date
-    is skipped.
+    Writes PNG, PDF and netCDF files, and report.html to open (report.pdf too,
+    where a browser is found that can print it). What is up to date is skipped.
 
     Example: [cyan]saltus reproduce[/] for everything
 
@@ -216,6 +216,26 @@ def reproduce(
             list_parts()
         else:
             reproduce_paper(names or [], output, force)
+
+
+@app.command()
+def report(
+    results: Annotated[Path, typer.Argument(metavar="FOLDER", help="The folder that `saltus reproduce` has written to.")] = Path(
+        "results"
+    ),
+) -> None:
+    """Write the report on the paper anew from results that are there; nothing is computed.
+
+    Writes report.html, claims.md and claims.json, and report.pdf where a
+    browser is found that can print it. Parts that other versions have made are
+    shown, and marked.
+
+    Example: [cyan]saltus report results[/]
+    """
+    with guarded():
+        from saltus.cli.reproduce_command import renew_report
+
+        renew_report(results)
 
 
 def main() -> None:

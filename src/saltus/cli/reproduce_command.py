@@ -1,4 +1,4 @@
-"""`saltus reproduce`: the paper."""
+"""`saltus reproduce`: the paper; `saltus report`: its report from results that are there."""
 
 from __future__ import annotations
 
@@ -29,7 +29,25 @@ def reproduce_paper(names: Sequence[str], output: Path, force: bool) -> None:
         verdicts.add_row(*row.cells())
     console.print(verdicts)
     console.print(tally(claims), markup=False, soft_wrap=True)
-    console.print(f"Results are in {output}: open {output / 'index.html'}", markup=False, soft_wrap=True)
+    _print_report(console, output)
+
+
+def renew_report(output: Path) -> None:
+    """Write the report of the results in `output` anew, computing nothing, and say what is in it."""
+    from saltus.paper import report_from_results
+
+    names, console = report_from_results(output), Console(highlight=False)
+    console.print(f"Parts in the report: {', '.join(names)}", markup=False, soft_wrap=True)
+    _print_report(console, output)
+
+
+def _print_report(console: Console, output: Path) -> None:
+    """Print the report as PDF if that can be done, and say where both are."""
+    from saltus.paper import report_as_pdf
+
+    why_not = report_as_pdf(output)
+    beside = f"{why_not}." if why_not else f"{output / 'report.pdf'} is the same to print."
+    console.print(f"Results are in {output}: open {output / 'report.html'}. {beside}", markup=False, soft_wrap=True)
 
 
 def list_parts() -> None:

@@ -2,6 +2,7 @@ from .claims.claim import Claim, ClaimVerdict, with_summaries
 from .claims.ledger import HEADINGS, ledger, tally
 from .figures.figure import PaperFigure
 from .parts import FIGURES
+from .report.report import report_as_pdf, report_from_results
 from .reproduction import Result, reproduce
 
 __all__ = [
@@ -12,6 +13,8 @@ __all__ = [
     "PaperFigure",
     "Result",
     "ledger",
+    "report_as_pdf",
+    "report_from_results",
     "reproduce",
     "tally",
     "with_summaries",

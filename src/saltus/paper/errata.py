@@ -13,7 +13,8 @@ class Erratum:
     """One erratum of `errata.toml`."""
 
     place: str  # equation label, section or figure
-    correct: str  # with the reason, where a line says it
+    correct: str
+    derivation: str  # why, in short
 
 
 @cache

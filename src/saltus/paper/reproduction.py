@@ -10,11 +10,11 @@ from typing import Any
 
 from saltus.errors import ParameterError, near
 from saltus.files import check_writable, write_dataset, write_figure, write_text
-from saltus.paper import report
 from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import Claim
 from saltus.paper.figures.figure import PaperFigure
 from saltus.paper.panel_work import compute_panels
+from saltus.paper.report.report import write_report
 from saltus.plots import style
 from saltus.progress import Progress, silent
 
@@ -51,7 +51,7 @@ def reproduce(
     seconds = _make([figure for figure in chosen if force or not state.up_to_date(figure, output)], output, progress)
     progress(1.0, "writing the report")
     results = [_result(figure, output, seconds) for figure in chosen]
-    report.write(FIGURES.values(), output, {result.name: result.claims for result in results})
+    write_report(FIGURES.values(), output, {result.name: result.claims for result in results})
     return results
 
 

@@ -13,7 +13,7 @@ from enum import StrEnum
 from typing import Any
 
 from saltus.errors import SaltusError, near
-from saltus.paper.claims.claim_tables import ClaimEntry, Listing, Origin, claim_tables
+from saltus.paper.claims.claim_tables import ClaimEntry, Origin, claim_tables
 
 
 class ClaimVerdict(StrEnum):
@@ -41,8 +41,9 @@ class Claim:
     verdict: ClaimVerdict
     evidence: str
     erratum: int | None = None
-    listing: Listing | None = None
     headline: str = ""
+    table: tuple[tuple[str, ...], ...] = ()  # a part of the evidence, its first row the headings
+    beside_table: str = ""  # the evidence without what is in the table
 
     def to_dict(self) -> dict[str, Any]:
         """As written to claims.json."""
@@ -51,8 +52,8 @@ class Claim:
     @classmethod
     def from_dict(cls, row: Mapping[str, Any]) -> Claim:
         """The claim that `to_dict` wrote."""
-        listing = Listing(row["listing"]) if row["listing"] else None
-        return cls(**{**row, "verdict": ClaimVerdict(row["verdict"]), "origin": Origin(row["origin"]), "listing": listing})
+        table = tuple(tuple(map(str, line)) for line in row["table"])
+        return cls(**{**row, "verdict": ClaimVerdict(row["verdict"]), "origin": Origin(row["origin"]), "table": table})
 
     @property
     def verdict_text(self) -> str:
@@ -117,19 +118,22 @@ def judge(part: str, measures: Measures) -> list[Claim]:
 
 def judge_claim(id: str, entry: ClaimEntry, measured: Measured) -> Claim:
     """One claim: a number against the printed one, or a formula or statement by its residual or whether it holds."""
-    evidence = entry.filled(entry.evidence, measured.fields)
     if measured.outcome is None:
-        reason = entry.filled(entry.undecided, measured.fields)
-        return _row(id, entry, ("as stated", "", ClaimVerdict.UNDECIDED), f"{reason}; {evidence}" if evidence else reason)
-    paper, value, verdict = (_compared if entry.printed is not None else _checked)(entry, measured)
-    if entry.proof and verdict is ClaimVerdict.CORRECTED:
-        evidence += f"; independently: {entry.proof}"
-    if entry.second and verdict is ClaimVerdict.CORRECTED:
-        evidence += f"; independently: {entry.filled(entry.second, measured.fields)}"
-        if measured.second is None or not _holds(measured.second, entry.tolerance):
-            verdict = ClaimVerdict.UNDECIDED  # one kind of evidence against the paper is not enough
-    headline = entry.filled(entry.headline, measured.fields)
-    return replace(_row(id, entry, (paper, value, verdict), evidence), headline=headline)
+        judged, templates = ("as stated", "", ClaimVerdict.UNDECIDED), [entry.undecided, entry.evidence]
+    else:
+        judged, templates = (_compared if entry.printed is not None else _checked)(entry, measured), [entry.evidence]
+    if judged[2] is ClaimVerdict.CORRECTED:
+        # A proof is the name of a test and not a template, but holds no braces.
+        templates += [f"independently: {one}" for one in (entry.proof, entry.second) if one]
+        if entry.second and (measured.second is None or not _holds(measured.second, entry.tolerance)):
+            judged = *judged[:2], ClaimVerdict.UNDECIDED  # one kind of evidence against the paper is not enough
+    template, table = "; ".join(filter(None, templates)), entry.table(measured.fields)
+    return replace(
+        _row(id, entry, judged, entry.filled(template, measured.fields)),
+        headline="" if measured.outcome is None else entry.filled(entry.headline, measured.fields),
+        table=tuple(map(tuple, table)),
+        beside_table=entry.filled(template, measured.fields, beside_table=True) if table else "",
+    )
 
 
 def _row(id: str, entry: ClaimEntry, judged: tuple[str, str, ClaimVerdict], evidence: str) -> Claim:
@@ -145,7 +149,6 @@ def _row(id: str, entry: ClaimEntry, judged: tuple[str, str, ClaimVerdict], evid
         verdict=verdict,
         evidence=evidence,
         erratum=entry.erratum,
-        listing=entry.listing,
         headline=entry.headline,
     )
 

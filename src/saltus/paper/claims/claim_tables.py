@@ -17,10 +17,9 @@ the part (a figure, table or group of statements) bears on:
     undecided    a template of the reason for which the numbers decide nothing; the part then measures None
     not_checked  the reason for which the statement is not checked: nothing is measured for it
     rests_on     the ids of the claims of which this one is a summary: nothing is measured for it either
-    listing      "findings" or "validity": where the report lists the claim before all others
-    headline     a template of what it says there
+    headline     a template of what the report says on its first page, for the claims that `highlights.toml` lists
     lists        how a field that is a list is written: `each` row of fields or value (then as `{}`), what stands `between`, and
-                 what if there is `none`
+                 what if there is `none`; if the report shows it as a table, the templates of its `columns` by their headings
     like         another claim, whose keys are taken where this one has none
 """
 
@@ -34,6 +33,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+BESIDE_TABLE = "as in the table"  # stands for a list where the table is shown beside the evidence
+
 
 class Origin(StrEnum):
     """Who says what a claim states."""
@@ -42,20 +43,14 @@ class Origin(StrEnum):
     OURS = "ours"  # a check of our own, counted apart from the paper's claims
 
 
-class Listing(StrEnum):
-    """The lists with which the report begins."""
-
-    FINDINGS = "findings"  # what changes a conclusion of the paper
-    VALIDITY = "validity"  # where the reduced model may not be believed
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ListForm:
-    """How rows of fields are written one after the other."""
+    """How rows of fields are written one after the other, and the templates of their columns by heading."""
 
     each: str
     between: str = ", "
     none: str = ""
+    columns: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +67,6 @@ class ClaimEntry:
     undecided: str = ""
     not_checked: str = ""
     rests_on: tuple[str, ...] = ()
-    listing: Listing | None = None
     headline: str = ""
     printed: str | None = None
     corrected: str | None = None
@@ -86,10 +80,20 @@ class ClaimEntry:
         """Whether a part of the paper measures something for it."""
         return not (self.not_checked or self.rests_on)
 
-    def filled(self, template: str, fields: Mapping[str, Any]) -> str:
-        """A template, such as the evidence, with the fields put in."""
-        texts = {name: self._listed(self.lists[name], rows) for name, rows in fields.items() if name in self.lists}
+    def filled(self, template: str, fields: Mapping[str, Any], beside_table: bool = False) -> str:
+        """A template, such as the evidence, with the fields put in; `beside_table` leaves out the lists that `table` has."""
+        forms = {name: form for name, form in self.lists.items() if name in fields}
+        texts = {name: self._listed(form, fields[name]) for name, form in forms.items()}
+        if beside_table:
+            texts |= {name: BESIDE_TABLE for name, form in forms.items() if form.columns}
         return template.format(**{**fields, **texts})
+
+    def table(self, fields: Mapping[str, Any]) -> list[list[str]]:
+        """The rows of the list that has columns, below their headings; nothing where no list has any."""
+        for name, form in self.lists.items():
+            if form.columns and name in fields:
+                return [list(form.columns), *([self.filled(cell, row) for cell in form.columns.values()] for row in fields[name])]
+        return []
 
     def _listed(self, form: ListForm, rows: Iterable[Any]) -> str:
         texts = (self.filled(form.each, row) if isinstance(row, Mapping) else form.each.format(row) for row in rows)
@@ -132,6 +136,5 @@ def _entry(own: Mapping[str, Any], everything: Mapping[str, Mapping[str, Any]]) 
     keys.pop("like", None)
     keys["rests_on"] = tuple(keys.get("rests_on", ()))
     keys["origin"] = Origin(keys.get("origin", Origin.PAPER))
-    keys["listing"] = Listing(keys["listing"]) if "listing" in keys else None
     lists = {name: ListForm(**form) for name, form in keys.pop("lists", {}).items()}
     return ClaimEntry(**keys, lists=lists)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from saltus.paper.claims.claim import Claim, ClaimVerdict
-from saltus.paper.claims.claim_tables import Listing, Origin, section_titles
+from saltus.paper.claims.claim_tables import Origin, section_titles
 
 PAPER_VERDICTS = (
     ClaimVerdict.AS_PRINTED,
@@ -16,10 +16,6 @@ PAPER_VERDICTS = (
     ClaimVerdict.NOT_CHECKED,
     ClaimVerdict.DISAGREES,
 )
-LISTING_TITLES = {
-    Listing.FINDINGS: "What changes a conclusion of the paper",
-    Listing.VALIDITY: "Where the reduced model may not be believed",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,32 +65,21 @@ def tally(claims: Iterable[Claim]) -> str:
 
 
 def to_markdown(claims: Iterable[Claim]) -> str:
-    """The counts section by section, what is listed first, and the table of claims of each section."""
+    """The counts section by section, and the table of claims of each section."""
     claims = list(claims)
-    lines = ["# The paper's claims, computed", "", tally(claims), "", *ledger_table(claims), ""]
-    for listing, headlines in listed(claims):
-        lines += [f"## {LISTING_TITLES[listing]}", "", *(f"* {text} (`{claim.id}`)" for claim, text in headlines), ""]
+    lines = [
+        "# The paper's claims, computed",
+        "",
+        tally(claims),
+        "",
+        *_table([HEADINGS, *(row.cells() for row in ledger(claims))]),
+        "",
+    ]
     for section, title in section_titles().items():
         here = [claim for claim in claims if claim.section == section]
         if here:
             lines += [f"## {section} {title}", "", *_claims_table(here), ""]
     return "\n".join(lines).rstrip() + "\n"
-
-
-def ledger_table(claims: Iterable[Claim]) -> list[str]:
-    """The lines of the table of counts in Markdown."""
-    return _table([HEADINGS, *(row.cells() for row in ledger(claims))])
-
-
-def listed(claims: Iterable[Claim]) -> Iterator[tuple[Listing, list[tuple[Claim, str]]]]:
-    """What the report says first: the headlines of each listing; a finding counts where the statement fails as printed."""
-    claims = list(claims)
-    for listing in Listing:
-        here = [c for c in claims if c.listing is listing]
-        if listing is Listing.FINDINGS:
-            here = [c for c in here if c.verdict is ClaimVerdict.CORRECTED]
-        if here:
-            yield listing, [(claim, claim.headline or claim.statement) for claim in here]
 
 
 def _claims_table(claims: Iterable[Claim]) -> list[str]:

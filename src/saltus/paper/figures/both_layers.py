@@ -13,7 +13,7 @@ from saltus.flow import Outcome, Recurrence, find_recurrence, simulate
 from saltus.paper.claims.claim import Measured, measured
 from saltus.paper.figure_data import dataset, joined
 from saltus.paper.figures import fig04, fig05
-from saltus.paper.figures.both_layers_panels import draw
+from saltus.paper.figures.both_layers_panels import MEANINGS, draw
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.harmonic_loads import AMPLITUDE, FREQUENCY, under_force
 from saltus.systems import NewtonImpact, System, TwoLayer
@@ -230,6 +230,22 @@ def exact_below(data: Any, frequency: float) -> tuple[float, float]:
 def shares(data: Any, variant: int) -> dict[str, float]:
     """The share of the reduced attractors with each fate in a variant."""
     return {name: float(np.mean(data["fate"].values[variant] == i)) for i, name in enumerate(FATES)}
+
+
+def share_table(data: Any) -> list[list[str]]:
+    """The shares of the reduced attractors with each fate, as text: a row for each variant of the full model, below headings."""
+    rows = [["m, e, g", *MEANINGS]]
+    for i, numbers in enumerate(zip(*(data[name].values for name in ("mass_ratio", "e", "transfer")), strict=True)):
+        rows.append([", ".join(f"{number:g}" for number in numbers), *(f"{share:.0%}" for share in shares(data, i).values())])
+    return rows
+
+
+def exact_portraits(data: Any) -> list[tuple[str, int, int]]:
+    """How many motions of each panel of Figs. 4 and 5 are those of both layers, with m = 0, and of how many."""
+    panels = data["panel"].values.astype(str)
+    return [
+        (name, int(data["exact"].values[panels == name].sum()), int((panels == name).sum())) for name in dict.fromkeys(panels)
+    ]
 
 
 def measure(data: Any) -> dict[str, Measured]:

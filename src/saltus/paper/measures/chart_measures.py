@@ -135,7 +135,7 @@ def agreement(data: Any) -> Measured:
         unknown = differ.sizes["change"]
         judged += [counted["changes"] > 0 and unknown <= CRITERIA.few * counted["changes"]]
         judged += [counted["sampled"] > 0 and counted["sampled_agree"] >= (1 - CRITERIA.apart) * counted["sampled"]]
-        rows.append({"frequency": float(tree.attrs["frequency"]), "unknown": unknown, "added": added, **counted})
+        rows.append({**_named(tree), "unknown": unknown, "added": added, **counted})
     return measured(bool(judged) and all(judged), panels=rows)
 
 
@@ -145,10 +145,16 @@ def right_cells(data: Any) -> Measured:
     panels = list(data.children.values())
     counts = [{name: int(tree["chart"].attrs[name]) for name in names} for tree in panels]
     number, wrong = (sum(one[name] for one in counts) for name in ("checked_cells", "wrong_cells"))
-    rows = [{"frequency": float(tree.attrs["frequency"]), **one} for tree, one in zip(panels, counts, strict=True)]
+    rows = [{**_named(tree), **one} for tree, one in zip(panels, counts, strict=True)]
     low, high = share_interval(wrong, number)
     share = wrong / number if number else math.nan
     return measured(high < CRITERIA.wrong, share=share, low=low, high=high, number=number, wrong=wrong, panels=rows)
+
+
+def _named(tree: Any) -> dict[str, float]:
+    """By which numbers evidence names a panel."""
+    beta0, damping = _parameters(tree)
+    return {"frequency": float(tree.attrs["frequency"]), "beta0": beta0, "damping": damping}
 
 
 def over_parameters(data: Any) -> dict[str, Measured]:

@@ -1,0 +1,58 @@
+"""What the report says first: the findings that change a conclusion of the paper, and where the reduced model may be believed."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from saltus.paper.claims.claim import Claim, ClaimVerdict
+
+BEARS_OUT = (ClaimVerdict.CORRECTED, ClaimVerdict.HOLDS)  # a finding: the statement fails as printed, or our own check holds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One finding of `highlights.toml` with the claims that bear it out."""
+
+    title: str
+    paper: str  # what the paper concludes
+    instead: str
+    claims: tuple[Claim, ...]
+
+    @property
+    def numbers(self) -> str:
+        """What was measured, in the words of the first claim; empty where that has no headline."""
+        return self.claims[0].headline
+
+    @property
+    def errata(self) -> list[int]:
+        """The numbers of the errata that say more."""
+        return sorted({claim.erratum for claim in self.claims if claim.erratum})
+
+
+def findings(claims: Iterable[Claim]) -> list[Finding]:
+    """The findings whose first claim was judged and of whose claims none contradicts them, in their order."""
+    known = {claim.id: claim for claim in claims}
+    found = []
+    for keys in highlight_tables()["findings"]:
+        here = tuple(known[id] for id in keys["claims"] if id in known)
+        if keys["claims"][0] in known and all(claim.verdict in BEARS_OUT for claim in here):
+            found.append(Finding(**{**keys, "claims": here}))
+    return found
+
+
+def validity(claims: Iterable[Claim]) -> list[Claim]:
+    """The claims whose headlines say where the reduced model ends, in the order of `highlights.toml`."""
+    known = {claim.id: claim for claim in claims}
+    listed = [known[id] for id in highlight_tables()["validity"] if id in known]
+    return [claim for claim in listed if claim.headline and claim.verdict in BEARS_OUT]
+
+
+@cache
+def highlight_tables() -> dict[str, Any]:
+    """`findings`, each with its keys, and `validity`, the ids of claims, as the file has them."""
+    return tomllib.loads((files("saltus.paper") / "highlights.toml").read_text(encoding="utf-8"))
