@@ -26,7 +26,7 @@ from saltus.paper.highlights import findings, highlight_tables, validity
 from saltus.paper.report.data_tables import data_tables
 from saltus.paper.report.embedded_pictures import embedded
 from saltus.paper.report.exact_features import chart_features, diagram_features
-from saltus.paper.report.report import Linker
+from saltus.paper.report.report import Linker, placed
 
 PARTS = ["fig02", "fig08", "table1"]
 EMPTY = {"meta", "link", "img", "input", "br", "hr"}
@@ -281,6 +281,14 @@ def test_ids_and_errata_in_words_become_links_and_nothing_else_does():
     assert linked("fig09-chaos", "fig09-chaos") == "fig09-chaos"
 
 
+def test_labels_of_equations_become_their_numbers():
+    said = str(placed("condition after rest_def_red, Kinetic Energy, <b>"))
+    assert re.sub("<span[^>]*>|</span>", "", said) == "condition after eq.\xa0(47), eq.\xa0(91), &lt;b&gt;"
+    assert "eq.\xa0(89)" in placed("smoothing")
+    assert placed("the smoothing of section 6") == "the smoothing of section 6"
+    assert "eq.\xa0(1)" in Linker(set())("by `gen_conf`")
+
+
 # --- data -------------------------------------------------------------------------------------------------------------------
 
 
@@ -350,5 +358,5 @@ def test_shares_of_both_layers_are_those_of_the_fates():
     headings, row = share_table(data)
     shares = dict(zip(headings, row, strict=True))
     assert (shares["m, e, g"], shares["exact"], shares["falls to rest"]) == ("0.001, 0.5, 0", "75%", "25%")
-    portraits = xr.Dataset({"panel": ("motion", ["4a", "4a", "5b"]), "exact": ("motion", [1, 0, 1])})
+    portraits = xr.Dataset({"panel": ("motion", ["fig04a", "fig04a", "fig05b"]), "exact": ("motion", [1, 0, 1])})
     assert exact_portraits(portraits) == [("4a", 1, 2), ("5b", 1, 1)]

@@ -22,3 +22,9 @@ def errata() -> dict[int, Erratum]:
     """All errata by number."""
     tables = tomllib.loads((files("saltus.paper") / "errata.toml").read_text(encoding="utf-8"))
     return {int(number): Erratum(**keys) for number, keys in tables.items()}
+
+
+@cache
+def equation_numbers() -> dict[str, int]:
+    """The numbers of the paper's equations by the labels that claims and errata name."""
+    return tomllib.loads((files("saltus.paper") / "equations.toml").read_text(encoding="utf-8"))

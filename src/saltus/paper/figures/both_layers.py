@@ -243,9 +243,8 @@ def share_table(data: Any) -> list[list[str]]:
 def exact_portraits(data: Any) -> list[tuple[str, int, int]]:
     """How many motions of each panel of Figs. 4 and 5 are those of both layers, with m = 0, and of how many."""
     panels = data["panel"].values.astype(str)
-    return [
-        (name, int(data["exact"].values[panels == name].sum()), int((panels == name).sum())) for name in dict.fromkeys(panels)
-    ]
+    found = {name: data["exact"].values[panels == name] for name in dict.fromkeys(panels)}
+    return [(name.removeprefix("fig").lstrip("0"), int(exact.sum()), exact.size) for name, exact in found.items()]
 
 
 def measure(data: Any) -> dict[str, Measured]:

@@ -16,7 +16,7 @@ from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import Claim, ClaimVerdict
 from saltus.paper.claims.claim_tables import Origin
 from saltus.paper.claims.ledger import HEADINGS, ledger, tally, to_markdown
-from saltus.paper.errata import errata
+from saltus.paper.errata import equation_numbers, errata
 from saltus.paper.figures.figure import PaperFigure
 from saltus.paper.highlights import findings, validity
 from saltus.paper.report.browser import print_pdf
@@ -113,6 +113,7 @@ def _environment() -> Any:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["placed"] = placed
     environment.filters["style_class"] = lambda verdict: verdict.name.lower().replace("_", "-")
     return environment
 
@@ -138,10 +139,38 @@ class Linker:
             code, number, id = match["code"], match["number"], match["id"]
             target = id if id else f"erratum-{number}" if number and int(number) in errata() else None
             if code or (target and target != without):
-                made = Markup("<code>{}</code>").format(code) if code else Markup('<a href="#{}">{}</a>').format(target, match[0])
+                made = _equation(code) or Markup("<code>{}</code>").format(code) if code else _link(target, match[0])
                 parts += [escape(text[end : match.start()]), made]
                 end = match.end()
         return Markup("").join([*parts, escape(text[end:])])
+
+
+def placed(text: str) -> Any:
+    """Where something is in the paper: labels of equations become their numbers, and the rest is escaped."""
+    from markupsafe import Markup, escape
+
+    parts = []
+    for part in text.split(", "):
+        words = [_equation(word) if word != "smoothing" else None for word in part.split(" ")]
+        shown = _equation(part) or Markup(" ").join(
+            word or escape(plain) for word, plain in zip(words, part.split(" "), strict=True)
+        )
+        parts.append(shown)
+    return Markup(", ").join(parts)
+
+
+def _equation(label: str) -> Any:
+    """An equation by its number, or None where the label is none of the paper's."""
+    from markupsafe import Markup
+
+    number = equation_numbers().get(label)
+    return Markup('<span title="{}">eq.\xa0({})</span>').format(label, number) if number else None
+
+
+def _link(target: str | None, words: str) -> Any:
+    from markupsafe import Markup
+
+    return Markup('<a href="#{}">{}</a>').format(target, words)
 
 
 def _alternatives(ids: Iterable[str]) -> str:
