@@ -58,15 +58,18 @@ def data_tables(path: Path) -> DataTables:
     """
     import h5netcdf
 
-    variables: dict[tuple[str, ...], list[str]] = {}
+    variables: dict[tuple[str, str, str], list[str]] = {}
+    dims: dict[tuple[str, str, str], str] = {}
     parameters: dict[str, dict[str, str]] = {}
     settings: dict[str, dict[str, str]] = {}
     with h5netcdf.File(io.BytesIO(checked_content(path)), "r") as file:
         for panel, inner, group in _groups(file):
             for name, variable in group.variables.items():
                 units, meaning = (str(variable.attrs.get(key, "")) for key in ("units", "long_name"))
-                row = (f"{inner}/{name}".strip("/"), ", ".join(variable.dimensions), units, meaning or _words("meanings", name))
+                row = (f"{inner}/{name}".strip("/"), units, meaning or _words("meanings", name))
                 variables.setdefault(row, []).append(panel)
+                if row not in dims:  # to look them up is slow, and panels have the same
+                    dims[row] = ", ".join(variable.dimensions)
             for name, value in group.attrs.items():
                 if name == "system" and panel not in parameters.get("model.type", {}):
                     for number, text in _flat(json.loads(str(value))):
@@ -75,8 +78,8 @@ def data_tables(path: Path) -> DataTables:
                     settings.setdefault(name, {}).setdefault(panel, _text(value))
     return DataTables(
         variables=[
-            VariableRow(panels=_panels(panels), path=path, dims=dims, units=units, meaning=meaning)
-            for (path, dims, units, meaning), panels in variables.items()
+            VariableRow(panels=_panels(panels), path=row[0], dims=dims[row], units=row[1], meaning=row[2])
+            for row, panels in variables.items()
         ],
         parameters=[_parameter_row(name, values, settings.get("path", {})) for name, values in parameters.items()],
         settings=[_value_row(name, _words("settings", name), values) for name, values in settings.items()],
@@ -84,11 +87,14 @@ def data_tables(path: Path) -> DataTables:
 
 
 def _groups(group: Any, panel: str = "", inner: str = "") -> Iterator[tuple[str, str, Any]]:
-    """Every group as its panel, its path within that and itself; those that are numbered alike share a path."""
+    """Every group as its panel, its path within that and itself; of those that are numbered alike the first stands for all."""
     yield panel, inner, group
+    seen = set()
     for name, child in group.groups.items():
         below = re.sub(r"_\d+$", "_…", f"{inner}/{name}") if panel else inner
-        yield from _groups(child, panel or name, below)
+        if not panel or below not in seen:
+            yield from _groups(child, panel or name, below)
+        seen.add(below)
 
 
 def _flat(value: Any, path: str = "") -> Iterator[tuple[str, str]]:
