@@ -257,11 +257,11 @@ def test_a_limit_of_validity_is_shown_while_its_claim_says_so():
 
 def test_evidence_that_has_columns_is_a_table_and_its_text_refers_to_it():
     panels = ListForm(each="{w:g}: {x:.1f}", columns={"Ω": "{w:g}", "x": "{x:.1f}"})
-    entry = ClaimEntry(place="eq", statement="s", evidence="found at {panels}", origin=Origin.OURS, lists={"panels": panels})
+    entry = ClaimEntry(place="eq", statement="s", evidence="found at: {panels}", origin=Origin.OURS, lists={"panels": panels})
     claim = judge_claim("x", entry, measured(True, panels=[{"w": 0.5, "x": 1.0}, {"w": 2.0, "x": 3.0}]))
     assert claim.table == (("Ω", "x"), ("0.5", "1.0"), ("2", "3.0"))
-    assert claim.evidence == "found at 0.5: 1.0, 2: 3.0"
-    assert claim.beside_table == "found at as in the table"
+    assert claim.evidence == "found at: 0.5: 1.0, 2: 3.0"
+    assert claim.beside_table == "found at (see the table)"
     assert type(claim).from_dict(json.loads(json.dumps(claim.to_dict()))) == claim
 
 

@@ -6,6 +6,7 @@ of its claims, and `judge` joins both. `ledger` counts the verdicts.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from decimal import Decimal
@@ -13,7 +14,7 @@ from enum import StrEnum
 from typing import Any
 
 from saltus.errors import SaltusError, near
-from saltus.paper.claims.claim_tables import ClaimEntry, Origin, claim_tables
+from saltus.paper.claims.claim_tables import BESIDE_TABLE, ClaimEntry, Origin, claim_tables
 
 
 class ClaimVerdict(StrEnum):
@@ -132,8 +133,13 @@ def judge_claim(id: str, entry: ClaimEntry, measured: Measured) -> Claim:
         _row(id, entry, judged, entry.filled(template, measured.fields)),
         headline="" if measured.outcome is None else entry.filled(entry.headline, measured.fields),
         table=tuple(map(tuple, table)),
-        beside_table=entry.filled(template, measured.fields, beside_table=True) if table else "",
+        beside_table=_without_list(entry.filled(template, measured.fields, beside_table=True)) if table else "",
     )
+
+
+def _without_list(evidence: str) -> str:
+    """What refers to the table follows without the comma or colon that led to the list."""
+    return re.sub(rf"[,:;]?( ?{re.escape(BESIDE_TABLE)})", r"\1", evidence)
 
 
 def _row(id: str, entry: ClaimEntry, judged: tuple[str, str, ClaimVerdict], evidence: str) -> Claim:

@@ -33,7 +33,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-BESIDE_TABLE = "as in the table"  # stands for a list where the table is shown beside the evidence
+BESIDE_TABLE = "(see the table)"  # stands for a list where the table is shown beside the evidence
 
 
 class Origin(StrEnum):

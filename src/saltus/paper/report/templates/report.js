@@ -6,6 +6,9 @@ for (const link of document.querySelectorAll("a.enlarge")) {
     event.preventDefault();
     picture.src = link.firstElementChild.src;
     picture.alt = link.firstElementChild.alt;
+    // At its own size, but on a small screen of many points no wider than twice the screen, or than it is sharp.
+    const natural = link.firstElementChild.naturalWidth;
+    picture.style.width = `${Math.min(natural, Math.max(natural / devicePixelRatio, 2 * innerWidth))}px`;
     dialog.showModal();
   });
 }
