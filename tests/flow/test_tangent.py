@@ -20,9 +20,9 @@ from saltus.systems import (
     WallOscillator,
 )
 from saltus.systems.parameters import numbers
+from saltus.taylor import record_table, trace
 from saltus.taylor.derivatives import tangent_leaves
 from saltus.taylor.graph import Expr, differentiate, ordered
-from saltus.taylor.tracing import record_table, trace
 
 WEIGHTS = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # central differences of order 8
 STEP = 2e-3

@@ -8,8 +8,8 @@ from numba import njit, types
 from saltus.flow import function_types
 from saltus.flow.compiled import load_structure
 from saltus.systems.parameters import numbers
+from saltus.taylor import record_table, trace
 from saltus.taylor.private_numba import pointers
-from saltus.taylor.tracing import record_table, trace
 
 
 @cache

@@ -6,7 +6,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow import motions_from, stroboscopic
-from saltus.systems import Load, Record, System, check_system
+from saltus.systems import Load, System, check_system
 
 
 def with_clock(system: System, asking: str = "the search of attractors", any_model: bool = False) -> System:
@@ -25,15 +25,16 @@ def with_clock(system: System, asking: str = "the search of attractors", any_mod
 
 
 def check_periodic(system: System) -> None:
-    """Refuse loads by records of samples: what goes on for ever under them is not defined.
+    """Refuse loads by records of samples and by pulses: what goes on for ever under them is not defined.
 
     Raises:
         ParameterError: with the channel.
     """
     for name, signal in system.load.channels.items():
-        if any(isinstance(term, Record) for term in getattr(signal, "terms", (signal,))):
+        if signal.once:
+            kind = next(type(term).__name__ for term in getattr(signal, "terms", (signal,)) if term.once)
             raise ParameterError(
-                f"load.{name} is a Record, which does not repeat, so nothing settles under it; use Harmonic", f"load.{name}"
+                f"load.{name} is a {kind}, which does not repeat, so nothing settles under it; use Harmonic", f"load.{name}"
             )
 
 

@@ -14,7 +14,7 @@ from saltus.bounds.energy_barrier import CLIMB, climb
 from saltus.bounds.gap_equation import SPEED, Leaves, Opening, reads
 from saltus.bounds.intervals import SLACK, Interval, enclose
 from saltus.systems import System, broadcast_arrays, check_parameters, check_system, finite_array, parameter_table
-from saltus.taylor import Expr, Trace, differentiate, number, record_table, substitute, trace
+from saltus.taylor import Expr, Trace, differentiate, number, record_tables, substitute, trace
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def proved_speeds(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray
     result = np.zeros(columns[0].size)
     if not traced.sides:
         return result
-    records = _record_ranges(system, traced)
+    records = _record_ranges(system, traced, given)
     law = _Law(traced)
     for start in range(0, result.size, CAPTURE.batch):
         part = slice(start, start + CAPTURE.batch)
@@ -126,17 +126,19 @@ def keeps_rest(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
     return np.asarray(np.min(lowest, axis=0) > 0.0)
 
 
-def _record_ranges(system: System, traced: Trace) -> list[Interval]:
-    """Bounds of every record (and derivative) that the trace reads, over all time; scales left out."""
-    breaks, table = record_table(system, traced.records)
+def _record_ranges(system: System, traced: Trace, columns: Mapping[str, np.ndarray]) -> list[Interval]:
+    """Bounds of every record (and derivative) that the trace reads, over all time and all numbers; scales left out."""
+    breaks, tables = record_tables(system, traced.records, columns)
     if not breaks.size:
         return []
-    length = np.concatenate([[0.0], np.diff(breaks), [0.0]])
+    edge = np.zeros((len(breaks), 1))
+    length = np.concatenate([edge, np.diff(breaks, axis=1), edge], axis=1).reshape(-1)
     span = Interval(np.zeros_like(length), length)
     ranges = []
-    for row in table:
-        drifts = np.any(row[[0, -1], 1:] != 0.0)  # before and after the record, without end
-        value = reduce(lambda total, c: total * span + Interval(c), row.T[-2::-1], Interval(row.T[-1]))
+    for rows in np.moveaxis(tables, 1, 0):
+        drifts = np.any(rows[:, [0, -1], 1:] != 0.0)  # before and after the record, without end
+        pieces = rows.reshape(-1, rows.shape[-1]).T
+        value = reduce(lambda total, c: total * span + Interval(c), pieces[-2::-1], Interval(pieces[-1]))
         ranges.append(Interval(-np.inf, np.inf) if drifts else value.over_cells())
     return ranges
 

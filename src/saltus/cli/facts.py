@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.cli.fact_blocks import Block, Row, number
 from saltus.cli.model_facts import MODEL_FACTS
-from saltus.systems import Load, Record, System
+from saltus.systems import Load, System
 
 PHASES = 64  # Instants at which a load is compared with its mirror image: no harmonic below the 32nd can hide between them.
 
@@ -53,14 +53,21 @@ def symmetry(system: System) -> str:
 
 def _equal(load: Load, other: Load, shift: float) -> bool:
     """Whether `load` at t + shift is `other` at t in every channel."""
-    span = load.period or max((s.time[-1] for s in _records(load)), default=1.0)
+    span = load.period or max((_end(s) for s in _passing(load)), default=1.0)
     times = span * np.arange(PHASES) / PHASES
     for name in load.channels:
-        here, there = (np.broadcast_to(getattr(x, name)(t), times.shape) for x, t in ((load, times + shift), (other, times)))
+        order = 2 if name.startswith("ground_") else 0  # of the ground only its acceleration matters
+        pairs = ((load, times + shift), (other, times))
+        here, there = (np.broadcast_to(x.channels[name].derivative(t, x.frequency, order), times.shape) for x, t in pairs)
         if not np.allclose(here, there, rtol=1e-12, atol=1e-12 * (1 + np.abs(there).max())):
             return False
     return True
 
 
-def _records(load: Load) -> list[Any]:
-    return [term for signal in load.channels.values() for term in getattr(signal, "terms", (signal,)) if isinstance(term, Record)]
+def _passing(load: Load) -> list[Any]:
+    """The records and pulses of a load."""
+    return [term for signal in load.channels.values() for term in getattr(signal, "terms", (signal,)) if term.once]
+
+
+def _end(signal: Any) -> float:
+    return float(signal.time[-1] if hasattr(signal, "time") else signal.start + signal.length)

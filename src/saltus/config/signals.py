@@ -1,4 +1,4 @@
-"""The [load] table: a base frequency, and for each channel a number, a harmonic, a record, or a list of them."""
+"""The [load] table: a base frequency, and for each channel a number, a harmonic, a record, a pulse, or a list of them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import numpy as np
 from saltus.checks import LIMITS, free_memory
 from saltus.config.readers import read, read_number, read_table, read_text, readers_of, show
 from saltus.config.source import Keys, Source
-from saltus.systems import Harmonic, Record
+from saltus.errors import ParameterError
+from saltus.systems import Record, signal_class
 
 RECORD_MEMORY = 20  # bytes that a character of a record takes while it is read, about: text, lines, pairs of numbers
 
@@ -36,7 +37,11 @@ def _signal(source: Source, keys: Keys, data: Any) -> Any:
         return read(source, keys, data, read_number)
     if "file" in data:
         return _record(source, keys, data)
-    return read_table(source, keys, data, readers_of(Record if {"time", "value"} & set(data) else Harmonic))
+    try:
+        cls = signal_class(data, ".".join(keys))
+    except ParameterError as error:
+        source.refuse((*keys, "type"), str(error))
+    return read_table(source, keys, data, readers_of(cls) | ({"type": read_text} if "type" in data else {}))
 
 
 def _record(source: Source, keys: Keys, data: Mapping[str, Any]) -> dict[str, Any]:

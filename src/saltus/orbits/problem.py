@@ -110,7 +110,9 @@ class Problem:
         self.system, self.signature, self.paths, self.tol = system, signature, paths, tol
         self._run = _ready(system, paths)
         if self._run.trace.records:
-            raise ParameterError("a load with a Record is not periodic, so it has no periodic orbits; use Harmonic signals")
+            raise ParameterError(
+                "a load with a Record or a pulse is not periodic, so it has no periodic orbits; use Harmonic signals"
+            )
         names = [path for path, _ in numbers(system)]
         self._values = np.array([value for _, value in numbers(system)])
         self._places = [names.index(path) for path in paths]

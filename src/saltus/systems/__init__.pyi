@@ -10,10 +10,12 @@ from .model import MarginKind, Model
 from .newton_impact import NewtonImpact, energy_gain
 from .parameter_tables import broadcast_arrays, check_parameters, finite_array, parameter_table
 from .parameters import children, is_number, numbers, substitute
+from .pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Pulse, Ramp, Ricker
 from .registry import IMPACTS, MODELS, register
 from .reversed import reversed_system
 from .rocking_block import RockingBlock
 from .scenarios import LayerState, NamedImpact, Scenario, TableRow, name_impact, other_impulse, table_1
+from .serial import signal_class
 from .si_units import PhysicalCell
 from .signals import Constant, Harmonic, Record, Signal, Sum
 from .system import System, check_system
@@ -28,10 +30,12 @@ __all__ = [
     "CellChain",
     "CellLayout",
     "Channel",
+    "Chirp",
     "Constant",
     "Contact",
     "EnergyRestitution",
     "FourCells",
+    "HalfSine",
     "Harmonic",
     "ImpactLaw",
     "ImpactPair",
@@ -39,12 +43,18 @@ __all__ = [
     "LayerState",
     "Load",
     "MarginKind",
+    "MavroeidisPapageorgiou",
     "Metainterface",
     "Model",
     "NamedImpact",
     "NewtonImpact",
+    "OneCosine",
+    "OneSine",
     "PhysicalCell",
+    "Pulse",
+    "Ramp",
     "Record",
+    "Ricker",
     "RockingBlock",
     "Scenario",
     "Signal",
@@ -74,6 +84,7 @@ __all__ = [
     "reactions",
     "register",
     "reversed_system",
+    "signal_class",
     "substitute",
     "table_1",
 ]

@@ -47,8 +47,8 @@ class Channel:
 class Load:
     """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H), vertical=-0.5)`.
 
-    Each channel is a number, a `Harmonic`, a `Record`, or a sum of them; a channel that is not named is 0. Channels that
-    begin with `ground_` are displacements of the ground (zeta, nu), all others forces. Frozen.
+    Each channel is a number, a `Harmonic`, a `Record`, a pulse such as `HalfSine`, or a sum of them; a channel that is not named
+    is 0. Channels that begin with `ground_` are displacements of the ground (zeta, nu), all others forces. Frozen.
 
     The paper's loads: (i) `loadpatha`, `Load(frequency=W, horizontal=Harmonic(amplitude=H), vertical=-0.5)`;
     (ii) `loadpathaa`, `Load(frequency=W, ground_horizontal=Harmonic(amplitude=z), vertical=-0.5)`; (iii) `loadpathb`,
@@ -58,7 +58,7 @@ class Load:
         frequency: the base angular frequency Omega > 0 of every harmonic, or None for a load without a period.
 
     Raises:
-        ParameterError: a harmonic without a frequency, a record of the wrong quantity.
+        ParameterError: a harmonic without a frequency, a record or a pulse of the wrong quantity.
     """
 
     frequency: float | None
@@ -74,7 +74,7 @@ class Load:
         for name, signal in signals.items():
             if signal.periodic and frequency is None:
                 raise ParameterError(f"load.{name} is harmonic, so load.frequency must be given", f"load.{name}")
-            _check_records(name, signal)
+            _check_quantity(name, signal)
         object.__setattr__(self, "frequency", frequency)
         object.__setattr__(self, "channels", signals)
 
@@ -99,8 +99,10 @@ class Load:
         return None if self.frequency is None else 2.0 * math.pi / self.frequency
 
 
-def _check_records(name: str, signal: Signal) -> None:
-    for term in getattr(signal, "terms", (signal,)):
-        if isinstance(term, Record) and (term.quantity == "force") == name.startswith("ground_"):
+def _check_quantity(name: str, signal: Signal) -> None:
+    terms: Any = getattr(signal, "terms", (signal,))
+    for term in terms:
+        if term.once and (term.quantity == "force") == name.startswith("ground_"):
             wanted = "displacement, velocity or acceleration" if name.startswith("ground_") else "force"
-            raise ParameterError(f"load.{name} takes a record of {wanted}, got quantity={term.quantity!r}", f"load.{name}")
+            kind = "record" if isinstance(term, Record) else type(term).__name__
+            raise ParameterError(f"load.{name} takes a {kind} of {wanted}, got quantity={term.quantity!r}", f"load.{name}")

@@ -1,4 +1,4 @@
-"""The types that a file may name: models, impact laws and signals. A new one is one new file and one line here."""
+"""The types that a file may name: models, impact laws and pulses. A new one is one new file and one line here."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from saltus.systems.impact_pair import ImpactPair
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model, check_sides
 from saltus.systems.newton_impact import NewtonImpact
+from saltus.systems.pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Pulse, Ramp, Ricker
 from saltus.systems.rocking_block import RockingBlock
 from saltus.systems.two_layer import TwoLayer
 from saltus.systems.two_stops import TwoStops
@@ -32,6 +33,9 @@ IMPACTS: dict[str, type[ImpactLaw]] = {
     "EnergyRestitution": EnergyRestitution,
     "InelasticImpact": InelasticImpact,
     "NewtonImpact": NewtonImpact,
+}
+PULSES: dict[str, type[Pulse]] = {
+    pulse.__name__: pulse for pulse in (HalfSine, OneSine, OneCosine, MavroeidisPapageorgiou, Ricker, Ramp, Chirp)
 }
 
 T = TypeVar("T", type[Model], type[ImpactLaw])

@@ -8,7 +8,8 @@ from typing import Any
 
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.load import Load
-from saltus.systems.registry import find
+from saltus.systems.pulses import Pulse
+from saltus.systems.registry import PULSES, find
 from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
 
 
@@ -26,7 +27,7 @@ def to_dict(part: Any) -> Any:
         return {**fields, "scale": part.scale, **({"source": part.source} if part.source else {})}
     fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(part)}
     fields = {name: value for name, value in fields.items() if value is not None}
-    return fields if isinstance(part, Signal) else {"type": type(part).__name__, **fields}
+    return fields if isinstance(part, Signal) and not isinstance(part, Pulse) else {"type": type(part).__name__, **fields}
 
 
 def from_dict(kind: str, data: Any) -> Any:
@@ -49,15 +50,30 @@ def from_dict(kind: str, data: Any) -> Any:
 
 
 def read_signal(data: Any, where: str) -> Signal | float:
-    """A number, a table of a `Harmonic` or a `Record`, or a list of them (their sum)."""
+    """A number, a table of a `Harmonic`, a `Record` or (with its `type`) a pulse, or a list of them (their sum)."""
     if isinstance(data, (list, tuple)):
         if not data:
             raise ParameterError(f"{where} is an empty list; give at least one number, harmonic or record", where)
         terms = [read_signal(item, f"{where}.{i}") for i, item in enumerate(data)]
         return Sum(tuple(t if isinstance(t, Signal) else Constant(t) for t in terms))
     if isinstance(data, Mapping):
-        return build(Record if "time" in data or "value" in data else Harmonic, dict(data), where)
+        return build(signal_class(data, where), {key: value for key, value in data.items() if key != "type"}, where)
     return data
+
+
+def signal_class(data: Mapping[str, Any], where: str) -> type[Signal]:
+    """What a table of a signal is: the pulse that its `type` names; without one a `Record`, if it has samples, or a `Harmonic`.
+
+    Raises:
+        ParameterError: a type that is no pulse.
+    """
+    if "type" not in data:
+        return Record if "time" in data or "value" in data else Harmonic
+    name = data["type"]
+    if not isinstance(name, str) or name not in PULSES:
+        hint = f"{near(str(name), PULSES)} (a harmonic and a record have no type)"
+        raise ParameterError(f"{where}.type {shown(name)} is no pulse; {hint}", f"{where}.type")
+    return PULSES[name]
 
 
 def build(cls: type, fields: dict[str, Any], where: str) -> Any:

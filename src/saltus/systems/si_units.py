@@ -13,6 +13,7 @@ from saltus.errors import ParameterError
 from saltus.public_functions import answering
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
+from saltus.systems.pulses import Pulse, in_other_units
 from saltus.systems.signals import Record, Signal, Sum, scaled
 from saltus.systems.two_layer import TwoLayer
 
@@ -122,6 +123,8 @@ class PhysicalCell:
             if isinstance(signal, Record):
                 scale = signal.scale * units[signal.quantity] ** power
                 return Record(by_time(signal.time, units["time"]), signal.value, signal.quantity, scale, signal.source)
+            if isinstance(signal, Pulse):
+                return in_other_units(signal, by_time, by_rate, units["time"], units[signal.quantity] ** power)
             return scaled(signal, units[quantity] ** power)
 
         channels = {

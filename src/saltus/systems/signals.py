@@ -1,11 +1,12 @@
-"""Signals: how one load channel varies with time. A constant, a harmonic, a sum of them, or a record of samples.
+"""Signals: how one load channel varies with time. A constant, a harmonic, a record of samples, a pulse (`pulses.py`), or a sum.
 
 A signal answers one question, its value or its first or second derivative at a time `t`, for numbers, for arrays,
-and for the symbolic time with which a model is traced (an object with the methods `phase` and `record`).
+and for the symbolic time with which a model is traced (an object with the methods `phase`, `record` and `pulse`).
 """
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
@@ -27,6 +28,7 @@ class Signal:
 
     __slots__ = ()
     periodic: ClassVar[bool] = False  # needs a base frequency
+    once: ClassVar[bool] = False  # happens once, so that nothing repeats itself under it
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
         """The `order`-th derivative with respect to tau at `t`."""
@@ -98,6 +100,11 @@ class Sum(Signal):
         """Whether any term needs the base frequency."""
         return any(term.periodic for term in self.terms)
 
+    @property
+    def once(self) -> bool:  # type: ignore[override]
+        """Whether any term happens once."""
+        return any(term.once for term in self.terms)
+
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
         """The sum of the terms' derivatives."""
         total = self.terms[0].derivative(t, frequency, order)
@@ -107,6 +114,7 @@ class Sum(Signal):
 
 
 QUANTITIES = ("force", "displacement", "velocity", "acceleration")
+QUANTITY_ORDER = {"force": 0, "displacement": 0, "velocity": 1, "acceleration": 2}  # which derivative of its channel it is
 
 
 @answering("__init__")
@@ -128,6 +136,7 @@ class Record(Signal):
     value: np.ndarray
     quantity: str = "force"
     scale: float = 1.0
+    once: ClassVar[bool] = True
     source: str = field(default="", compare=False)  # the file it came from
 
     def __post_init__(self) -> None:
@@ -232,6 +241,8 @@ def scaled(signal: Signal, factor: float) -> Signal:
         return Sum(tuple(scaled(term, factor) for term in signal.terms))
     if isinstance(signal, Record):
         return Record(signal.time, signal.value, signal.quantity, factor * signal.scale, signal.source)
+    if signal.once:
+        return dataclasses.replace(signal, amplitude=factor * signal.amplitude)  # type: ignore[type-var, attr-defined]
     raise ParameterError(f"a {type(signal).__name__} cannot be scaled")
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from saltus.errors import ParameterError, near, shown
+from saltus.notebook import html_table
 from saltus.public_functions import answering
 from saltus.systems.contact import check_contacts
 from saltus.systems.impact import ImpactLaw, VelocityReduction
@@ -50,6 +51,10 @@ class System:
             raise ParameterError(
                 f"this {type(self.model).__name__} has no impacts, so {self.impact!r} cannot act; leave it out", "impact"
             )
+
+    def _repr_html_(self) -> str:
+        parts = {name: type(getattr(self, name)).__name__ for name in ("model", "impact")}
+        return html_table("System", parts | self.parameters)
 
     def with_(self, changes: Mapping[str, Any] | None = None, **more: Any) -> System:
         """A copy with the parts at the given dotted paths replaced: `system.with_({"load.frequency": 1.1})`.

@@ -28,14 +28,15 @@ from .lane_vectors import (
     vector_lane,
     with_lane,
 )
+from .load_pieces import record_table, record_tables
 from .memory import Places
 from .private_numba import entry_point, inline_jit, jit, lean_jit, not_here, pointer, pointers
-from .records import anchor, expand_record
+from .records import anchor, expand_record, own_records
 from .rules import FUNCTIONS
 from .series import Rows
 from .system_structure import structure_key
 from .tapes import shared_constants, tape
-from .tracing import Trace, record_table, trace
+from .tracing import Trace, trace
 from .vectors import CACHE_LINE, WIDTH
 
 __all__ = [
@@ -86,11 +87,13 @@ __all__ = [
     "not_here",
     "number",
     "ordered",
+    "own_records",
     "partial_derivative",
     "pointer",
     "pointers",
     "put",
     "record_table",
+    "record_tables",
     "replace",
     "rough_exp2",
     "rough_inverse",

@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from saltus.errors import ParameterError, near
-from saltus.systems import Harmonic, System, numbers
+from saltus.systems import Harmonic, Pulse, System, numbers
 from saltus.taylor.graph import Expr, differentiate, number, ordered
 
 if TYPE_CHECKING:
@@ -35,7 +35,12 @@ def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
             system.get(str(path))  # refuses what leads nowhere
             below = [name for name in known if name.startswith(f"{path}.")]
             raise ParameterError(f"{path} is not a number, so there is no derivative to it; {near(str(path), below or known)}")
-        if path.endswith(".order") and isinstance(system.get(path.rpartition(".")[0]), Harmonic):
+        owner = system.get(path.rpartition(".")[0])
+        if isinstance(owner, Pulse) and path.rpartition(".")[2] in owner.moving:
+            raise ParameterError(
+                f"{path} moves the instants at which the load is not smooth, so there are no derivatives to it; take another"
+            )
+        if path.endswith(".order") and isinstance(owner, Harmonic):
             raise ParameterError(f"{path} is a whole number, so there is no derivative to it; choose another parameter")
     if len(set(paths)) < len(paths):
         raise ParameterError(f"each parameter may be named once, got {paths!r}")

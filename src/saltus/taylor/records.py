@@ -17,6 +17,14 @@ def anchor(breaks, piece):
 
 
 @jit
+def own_records(tables, trajectory):
+    """The breakpoints and the table of one trajectory; there is one of each for all where none of them moves."""
+    breaks, table = tables
+    i = min(trajectory, breaks.shape[0] - 1)
+    return breaks[i], table[i]
+
+
+@jit
 def expand_record(coefficients, start, t, row):
     """Taylor coefficients at `t` of a record's piece, given in powers of the time since `start`."""
     width = coefficients.size

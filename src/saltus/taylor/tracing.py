@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from saltus.errors import ParameterError, SaltusError, TraceError, near
-from saltus.systems import Record, System, constrained_acceleration, mass_and_force, reactions
+from saltus.systems import Pulse, Record, System, constrained_acceleration, mass_and_force, reactions
 from saltus.systems import substitute as substitute_numbers
 from saltus.taylor import derivatives as tangent
 from saltus.taylor.exact_algebra import constant_value, normal_form, provably_equal
 from saltus.taylor.graph import (
     FRICTION,
     POINTWISE,
-    RECORD_WIDTH,
     Expr,
     combine,
     differentiate,
@@ -24,6 +21,7 @@ from saltus.taylor.graph import (
     substitute,
     uses_velocity,
 )
+from saltus.taylor.load_pieces import AFTER, SINCE, WITHIN
 
 
 class LoadTime:
@@ -42,10 +40,17 @@ class LoadTime:
 
     def record(self, record: Record, order: int) -> Expr:
         """The `order`-th derivative of a record at t, times its scale."""
-        row = (record.path, order)  # type: ignore[attr-defined]
+        return combine("mul", record.scale, self._row(record, order))
+
+    def pulse(self, pulse: Pulse) -> tuple[Expr, Expr, Expr]:
+        """The time since the start of a pulse, at most its length; 1 within it, else 0; the time since its end."""
+        return self._row(pulse, SINCE), self._row(pulse, WITHIN), self._row(pulse, AFTER)
+
+    def _row(self, signal: Any, order: int) -> Expr:
+        row = (signal.path, order)
         if row not in self._trace.records:
             self._trace.records.append(row)
-        return combine("mul", record.scale, Expr("record", (), self._trace.records.index(row)))
+        return Expr("record", (), self._trace.records.index(row))
 
     def refuse(self, *_: Any) -> Any:
         """The answer to every other use."""
@@ -90,7 +95,7 @@ class Trace:
     dof: int = 1  # of the model
     columns: int = 0
     paths: tuple[str, ...] = ()  # of the parameters that the last columns are derivatives to
-    records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative
+    records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative (see `load_pieces.py`)
     sides: int = 0  # of the contact
     acceleration: list[Expr] = field(default_factory=list)
     gap: Expr | None = None
@@ -165,13 +170,12 @@ def ask(model: Any, method: str, *arguments: Any) -> Any:
 
 
 def _name_records(load: Any) -> None:
-    """Tell every record of a symbolic load its path: its samples are looked up when the numbers are known."""
+    """Tell every record and pulse of a symbolic load its path: its breakpoints are looked up when the numbers are known."""
     for name, signal in load.channels.items():
-        if isinstance(signal, Record):
-            object.__setattr__(signal, "path", f"load.{name}")
-        for i, term in enumerate(getattr(signal, "terms", ())):
-            if isinstance(term, Record):
-                object.__setattr__(term, "path", f"load.{name}.{i}")
+        terms = {f"load.{name}.{i}": term for i, term in enumerate(getattr(signal, "terms", ()))}
+        for path, term in (terms or {f"load.{name}": signal}).items():
+            if term.once:
+                object.__setattr__(term, "path", path)
 
 
 def _trace_contact(result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v: tuple[Expr, ...], side: Expr) -> None:
@@ -263,40 +267,3 @@ def _check_abs(result: Trace, expanded: list[Expr]) -> None:
     sized = {side * q for q in coordinates}
     if result.gap not in sized | {q * side for q in coordinates} and any(node in sized for node in ordered(expanded)):
         raise TraceError("abs of the coordinate can be traced only where the gap is side * coordinate; write it with the gap")
-
-
-def record_table(system: System, rows: list[tuple[str, int]]) -> tuple[np.ndarray, np.ndarray]:
-    """The records that a trace reads, given by path and order of the derivative, on their common breakpoints.
-
-    Returns:
-        breakpoints (m,) and coefficients (rows, m + 1, RECORD_WIDTH): piece i of a row holds between the breakpoints i - 1 and
-        i, in ascending powers of the time since breakpoint i - 1 (the first piece: since breakpoint 0). Scales are left out.
-    """
-    if not rows:
-        return np.empty(0), np.empty((0, 1, RECORD_WIDTH))
-    records = [(system.get(path), order) for path, order in rows]
-    breaks = np.unique(np.concatenate([record.time for record, _ in records]))
-    table = np.zeros((len(records), breaks.size + 1, RECORD_WIDTH))
-    for row, (record, order) in zip(table, records, strict=True):
-        _fill(row, breaks, record, order)
-    return breaks, table
-
-
-def _fill(row: np.ndarray, breaks: np.ndarray, record: Record, order: int) -> None:
-    from scipy.special import factorial
-
-    polynomial = record.polynomials[order] if order < 3 else record.polynomials[2].derivative(order - 2)
-    first, last = record.time[0], record.time[-1]
-    inside = (breaks >= first) & (breaks < last)
-    anchors = breaks[inside]
-    for power in range(polynomial.c.shape[0]):
-        row[1:][inside, power] = polynomial(anchors, nu=power) / factorial(power)
-    if record.quantity == "force" or order >= 2:
-        return
-    for after in (False, True):  # the ground goes on with the velocity it has
-        edge = last if after else first
-        where = np.append(False, breaks >= last) if after else np.append(True, breaks < first)
-        anchor = np.append(breaks[0], breaks)[where]
-        velocity = record.polynomials[1](edge)
-        row[where, 0] = velocity if order == 1 else record.polynomials[0](edge) + velocity * (anchor - edge)
-        row[where, 1] = 0.0 if order == 1 else velocity

@@ -94,7 +94,7 @@ def compile_driver_aside(several: bool) -> subprocess.Popen[bytes] | None:
 def load_helpers(several: bool = False) -> tuple[Any, ...]:
     """What the driver calls for one lane: `lane_root`, `turning_range`, `scalar_motion`, and impacts at several contacts."""
     names = ["lane_root", "turning_range", "scalar_motion"]
-    parts = [kernel_layout, lane_layout, roots, scalar_fallback, lane_state]
+    parts = [kernel_layout, lane_layout, records, roots, scalar_fallback, lane_state]
     if several:
         names.append("contacts_impact")
         parts += [contact_layout, complementarity, contact_impacts, contacts_of_lane, contacts_handoff]

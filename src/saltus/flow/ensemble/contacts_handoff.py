@@ -15,7 +15,7 @@ from saltus.flow.ensemble.lane_layout import Flag, LaneArray, LaneLabel, LaneSet
 from saltus.flow.ensemble.lane_state import BUFFER_LENGTH, put_state, record_extrema, scalar_state
 from saltus.flow.kernel_layout import Mode, Status, Where
 from saltus.flow.memory_layout import EventCode, LanePart, State
-from saltus.taylor import get, lean_jit, put
+from saltus.taylor import get, lean_jit, own_records, put
 from saltus.taylor import not_here as cached_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -55,7 +55,8 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
     if not flags[Flag.SCALAR] >> lane & 1:
         contacts_of(lane, sizes, at, m, contacts)
     trajectory, own = lanes[LaneArray.LABELS][lane, LaneLabel.TRAJECTORY], sizes[Size.OWN]
-    env = (parameters[trajectory], lanes[LaneArray.CONSTANTS][lane], tables[0], tables[1])
+    breaks, table = own_records(tables, trajectory)
+    env = (parameters[trajectory], lanes[LaneArray.CONSTANTS][lane], breaks, table)
     steps = (
         np.empty((BUFFER_LENGTH, 2), np.int64),
         np.empty((BUFFER_LENGTH, 2)),
@@ -87,7 +88,9 @@ def contacts_impact(lane, hit, scalar, sizes, at, m, settings, lanes, parameters
     """
     (_, _, where, state, contacts, solver), model = space, scalar[1]
     own, count, labels, rates = sizes[Size.OWN], sizes[Size.CONTACTS], lanes[LaneArray.LABELS], solver[Solver.RATES]
-    env = (parameters[labels[lane, LaneLabel.TRAJECTORY]], lanes[LaneArray.CONSTANTS][lane], tables[0], tables[1])
+    trajectory = labels[lane, LaneLabel.TRAJECTORY]
+    breaks, table = own_records(tables, trajectory)
+    env = (parameters[trajectory], lanes[LaneArray.CONSTANTS][lane], breaks, table)
     where[Where.DOF], where[Where.OWN], where[Where.PIECE] = own, own, labels[lane, LaneLabel.PIECE]
     for row in range(2 * own):  # positions, then velocities, lie one behind the other
         state[State.COORDINATES + row] = get(m, at[LanePart.NEW_POSITION] + row, lane)

@@ -50,6 +50,7 @@ from saltus.taylor import (
     lean_jit,
     load,
     mask,
+    own_records,
     put,
     replace,
 )
@@ -61,9 +62,10 @@ from saltus.taylor import not_here as cached_jit
 @lean_jit
 def expand_records(sizes, at, m, flags, lanes, tables, row):
     """The records' polynomials of every lane, expanded at its time."""
-    labels, (breaks, table) = lanes[LaneArray.LABELS], tables
+    labels = lanes[LaneArray.LABELS]
     for lane in range(WIDTH):
         if (flags[Flag.BUSY] >> lane) & 1:
+            breaks, table = own_records(tables, labels[lane, LaneLabel.TRAJECTORY])
             piece, t = labels[lane, LaneLabel.PIECE], get(m, Slot.NOW, lane) + get(m, Slot.ORIGIN, lane)
             for r in range(sizes[Size.RECORDS]):
                 expand_record(table[r, piece], anchor(breaks, piece), t, row)

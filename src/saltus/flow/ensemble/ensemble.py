@@ -21,6 +21,7 @@ from saltus.flow.structures import Program, check_contact, limits_of, program
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
 from saltus.systems import System, check_system, numbers
+from saltus.taylor import record_tables
 
 if TYPE_CHECKING:
     import xarray
@@ -169,7 +170,6 @@ def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> L
         slots=slots,
         functions=functions,
         parameters=run.env[0] if run.trace.signs else np.array([value for _, value in numbers(system)] or [0.0]),
-        records=(run.env[2], run.env[3]),
         tol=wanted.tol,
         kept=kept if wanted.sample else 1,
         sampled=[column for kind in Sample if kind in wanted.sample for column in kind.columns(own)],
@@ -194,8 +194,9 @@ def _jobs(system: System, run: Program, inputs: Inputs, periods: float | None, d
     numbers_of[:, JobNumber.START_TIME], numbers_of[:, JobNumber.PERIOD_LENGTH] = at.local, at.length
     numbers_of[:, JobNumber.END_TIME] = end
     labels[:, JobLabel.FIRST_PERIOD], labels[:, JobLabel.LAST_PERIOD], labels[:, JobLabel.LEAVE_BY] = at.first, last, side
-    labels[:, JobLabel.PIECE] = np.searchsorted(run.env[2], time, side="right")
-    return Jobs(states, numbers_of, labels, columns)
+    records = record_tables(system, run.trace.records, inputs.parameters)
+    labels[:, JobLabel.PIECE] = np.count_nonzero(records[0] <= np.reshape(time, (-1, 1)), axis=1)
+    return Jobs(states, numbers_of, labels, columns, records)
 
 
 def _from_the_start(at: Clock) -> tuple[Any, Any]:

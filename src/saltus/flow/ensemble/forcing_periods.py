@@ -26,7 +26,7 @@ from saltus.flow.ensemble.one_contact import begin_contact
 from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE, recurrence_period
 from saltus.flow.kernel_layout import Mode, Status
 from saltus.flow.memory_layout import LanePart
-from saltus.taylor import get, inline_jit, lean_jit, load, put, store
+from saltus.taylor import get, inline_jit, lean_jit, load, own_records, put, store
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -41,7 +41,8 @@ def fill(lane, i, code, sizes, at, m, flags, lanes, jobs, tables):
     label[lane, LaneLabel.HELD] = label[lane, LaneLabel.SKIP] = label[lane, LaneLabel.GRAZINGS] = 0
     number[lane, LaneNumber.END_TIME], number[lane, LaneNumber.CHATTER_SPEED] = numbers[i, JobNumber.END_TIME], 0.0
     agreements[lane, :] = 0
-    env = (parameters[i], constants[lane], tables[0], tables[1])
+    breaks, table = own_records(tables, i)
+    env = (parameters[i], constants[lane], breaks, table)
     code[Code.CONSTANTS](parameters[i], constants[lane])
     half = state.shape[1] // 2
     put_all(m, at[LanePart.POSITION], lane, state[i, :half])
@@ -129,7 +130,8 @@ def begin_period(lane, sizes, m, lanes, tables):
     That is one period later, so that a step may go past the end of the period, or the end of the motion if that comes earlier.
     The records' breakpoints end both.
     """
-    labels, breaks = lanes[LaneArray.LABELS], tables[0]
+    labels = lanes[LaneArray.LABELS]
+    breaks, _ = own_records(tables, labels[lane, LaneLabel.TRAJECTORY])
     period, last, length = int(get(m, Slot.PERIOD, lane)), labels[lane, LaneLabel.LAST_PERIOD], get(m, Slot.PERIOD_LENGTH, lane)
     origin, end = period * length, period_end(lane, m, lanes)
     limit = end + length if period + 1 < last else end

@@ -12,7 +12,7 @@ from saltus.flow.ensemble.lane_layout import LaneArray, LaneLabel, Slot
 from saltus.flow.ensemble.lane_state import BUFFER_LENGTH, put_state, record_extrema, scalar_state
 from saltus.flow.kernel_layout import Geometry, Mode, Status, Where
 from saltus.flow.memory_layout import EventCode, State
-from saltus.taylor import get, lean_jit, put
+from saltus.taylor import get, lean_jit, own_records, put
 from saltus.taylor import not_here as cached_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -55,7 +55,8 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
     geometry = lanes[LaneArray.GEOMETRY][lane]
     where, state, limits = scalar_state(lane, sizes, at, m, flags, settings, lanes)
     trajectory = lanes[LaneArray.LABELS][lane, LaneLabel.TRAJECTORY]
-    env = (parameters[trajectory], lanes[LaneArray.CONSTANTS][lane], tables[0], tables[1])
+    breaks, table = own_records(tables, trajectory)
+    env = (parameters[trajectory], lanes[LaneArray.CONSTANTS][lane], breaks, table)
     model = (functions[0], functions[1], functions[2], functions[3], geometry, functions[4])  # in the places of `ModelPart`
     steps = (
         np.empty((BUFFER_LENGTH, 2), np.int64),

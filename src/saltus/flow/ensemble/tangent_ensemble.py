@@ -15,6 +15,7 @@ from saltus.flow.ensemble.wanted import Wanted
 from saltus.flow.kernel_layout import Mode, Status
 from saltus.flow.structures import limits_of, program
 from saltus.systems import System
+from saltus.taylor import record_tables
 
 
 class Advanced(NamedTuple):
@@ -30,9 +31,11 @@ class TangentEnsemble:
     def __init__(self, system: System, parameters: Mapping[str, np.ndarray], lengths: np.ndarray, tol: float) -> None:
         limits, places = limits_of(system, ()), list(system.parameters)
         wanted = Wanted(tol=tol, periods=None, limits=limits, sample=(), until=(), paths=())
-        self._lanes = compiled_lanes(system, program(system, limits, ()), wanted, 1)
+        run = program(system, limits, ())
+        self._lanes = compiled_lanes(system, run, wanted, 1)
         self._columns = {places.index(path): values for path, values in parameters.items()}
         self._lengths = lengths
+        self._records = record_tables(system, run.trace.records, {})
         compile_everything()  # here, not in each thread that advances some of the motions
 
     def advance(self, rows: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Advanced:
@@ -43,6 +46,7 @@ class TangentEnsemble:
         numbers, labels = np.zeros((rows.size, len(JobNumber))), np.zeros((rows.size, len(JobLabel)), dtype=np.int64)
         numbers[:, JobNumber.START_TIME], numbers[:, JobNumber.END_TIME] = begin, end
         numbers[:, JobNumber.PERIOD_LENGTH] = self._lengths[rows]
-        ends = self._lanes.run(Jobs(states, numbers, labels, {c: values[rows] for c, values in self._columns.items()}), 1)
+        columns = {c: values[rows] for c, values in self._columns.items()}
+        ends = self._lanes.run(Jobs(states, numbers, labels, columns, self._records), 1)
         done = (ends.of(EndLabel.STATUS) == Status.DONE) & (ends.of(EndLabel.MODE) != Mode.CHATTER)
         return Advanced(ends.states, done & np.isfinite(ends.states).all(axis=1))

@@ -58,6 +58,7 @@ class Jobs:
     numbers: np.ndarray  # (n, len(JobNumber))
     labels: np.ndarray  # (n, len(JobLabel))
     columns: dict[int, np.ndarray]  # by the parameter's place, (n,)
+    records: tuple[np.ndarray, np.ndarray]  # breakpoints (n or 1, m) and pieces, see `record_tables`
 
     def __len__(self) -> int:
         return len(self.states)
@@ -91,7 +92,6 @@ class Lanes:
     slots: Slots
     functions: tuple[Any, ...]  # lane_series, lane_impact, lane_field
     parameters: np.ndarray  # of the system; `Jobs.columns` replaces some
-    records: tuple[np.ndarray, np.ndarray]
     tol: float
     kept: int  # how many of the last forcing periods are kept
     sampled: list[int]  # which columns of a sample are
@@ -161,7 +161,8 @@ class Lanes:
         samples = np.full((len(states), self.kept, 2 * self.own + 4), np.nan)
         results = (ends.states[rows], ends.numbers[rows], ends.labels[rows], samples)
         chunk = (states, jobs.numbers[rows], jobs.labels[rows], parameters)
-        load_driver(self.several)(*fixed, memory, chunk, self.records, results, control)
+        tables = tuple(table if len(table) == 1 else table[rows] for table in jobs.records)
+        load_driver(self.several)(*fixed, memory, chunk, tables, results, control)
         ends.samples[rows] = samples[:, :, self.sampled]
 
     def _arguments(self) -> tuple[Any, ...]:

@@ -1,0 +1,260 @@
+"""Pulses: loads that begin and end, each a closed form within its span (half sine, one sine, one cosine, Ricker, ramp, chirp,
+...).
+
+A pulse is not smooth where it begins and where it ends: these two instants are breakpoints of the motion, as a record's samples
+are, so no step of an integration crosses them. In an ensemble each trajectory has its own.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from saltus.checks import RADIANS, settle_numbers
+from saltus.errors import ParameterError
+from saltus.public_functions import answering
+from saltus.systems.signals import QUANTITY_ORDER, Signal
+
+TIME, RATE = {"converts": "time"}, {"converts": "rate"}  # the metadata of fields that units of time convert
+RICKER_REACH = 7.0  # of the argument u: beyond it (2 u^2 - 1) exp(-u^2) is below 1e-19, which no sum of the load notices
+SINUSOIDS: tuple[Callable[[Any], Any], ...] = (
+    np.sin,
+    np.cos,
+    lambda x: -np.sin(x),
+    lambda x: -np.cos(x),
+)  # each the last one's slope
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pulse(Signal):
+    """A load that begins at `start` and lasts for `length`; a pulse by itself is 0 before and after.
+
+    `quantity` says what it is: a `force`, or of the ground an `acceleration`. The ground then moves from rest, and goes on with
+    the velocity that the pulse leaves it.
+
+    Contract: a subclass gives `length` and `shape(since, n)`, the n-th derivative of the quantity at `since` after the start,
+    or for n = -1 and -2 its integrals from there; `moving` names the numbers that move the beginning or the end.
+    """
+
+    amplitude: float
+    start: float = field(default=0.0, metadata=TIME)
+    quantity: str = "force"
+    once: ClassVar[bool] = True
+    holds: ClassVar[bool] = False  # whether it keeps its last value after its end
+    moving: ClassVar[tuple[str, ...]] = ("start", "frequency")
+    quantities: ClassVar[tuple[str, ...]] = ("force", "acceleration")
+
+    def __post_init__(self) -> None:
+        if self.quantity not in self.quantities:
+            raise ParameterError(
+                f"quantity of a {type(self).__name__} must be one of {', '.join(self.quantities)}, got {self.quantity!r}",
+                "quantity",
+            )
+        settle_numbers(self, "amplitude", "start")
+        positive = [f.name for f in dataclasses.fields(self) if f.metadata in (TIME, RATE) and f.name != "start"]
+        settle_numbers(self, *positive, above=0.0)
+        if not (math.isfinite(self.length) and self.start + self.length > self.start):
+            raise ParameterError(
+                f"a {type(self).__name__} of the duration {self.length:g} does not end after its start", positive[0]
+            )
+
+    @property
+    def length(self) -> Any:
+        """How long it lasts."""
+        raise NotImplementedError
+
+    def shape(self, since: Any, n: int) -> Any:
+        """The n-th derivative of the quantity at `since` after the start; of n = -1 and -2 the integrals from the start."""
+        raise NotImplementedError
+
+    def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
+        """The quantity at `t`, or what follows from it by differentiation or integration from rest."""
+        n = order - QUANTITY_ORDER[self.quantity]
+        since, within, after = t.pulse(self) if hasattr(t, "pulse") else self._clocks(np.asarray(t, dtype=float))
+        if n > 0 or (n == 0 and not self.holds):
+            return within * self.shape(since, n)
+        value = self.shape(since, n)
+        if n == -2:
+            value = value + after * self.shape(self.length, -1)
+        if n < 0 and self.holds:
+            value = value + (after if n == -1 else 0.5 * after * after) * self.shape(self.length, 0)
+        return value
+
+    def _clocks(self, t: Any) -> tuple[Any, Any, Any]:
+        """The time since the start, at most `length`; 1 within the span, else 0; the time since the end."""
+        since, end = np.clip(t - self.start, 0.0, self.length), self.start + self.length
+        return since[()], np.where((t >= self.start) & (t < end), 1.0, 0.0)[()], np.maximum(t - end, 0.0)[()]
+
+
+def sinusoid(rate: Any, phase: Any, since: Any, n: int) -> Any:
+    """The n-th derivative of sin(rate since + phase), or for n = -1 and -2 its integrals from 0."""
+    if n >= 0:
+        return rate**n * SINUSOIDS[n % 4](rate * since + phase)
+    if n == -1:
+        return (np.cos(phase) - np.cos(rate * since + phase)) / rate
+    return (np.sin(phase) - np.sin(rate * since + phase)) / (rate * rate) + np.cos(phase) / rate * since
+
+
+@answering("__init__")
+@dataclass(frozen=True, kw_only=True)
+class HalfSine(Pulse):
+    """amplitude sin(frequency s) for 0 <= s <= pi / frequency, s the time since `start`."""
+
+    frequency: float = field(metadata=RATE)  # angular, of the sine
+
+    @property
+    def length(self) -> Any:
+        """pi / frequency."""
+        return math.pi / self.frequency
+
+    def shape(self, since: Any, n: int) -> Any:
+        """amplitude sin(frequency s), differentiated or integrated."""
+        return self.amplitude * sinusoid(self.frequency, 0.0, since, n)
+
+
+@answering("__init__")
+@dataclass(frozen=True, kw_only=True)
+class OneSine(HalfSine):
+    """amplitude sin(frequency s) for one period, 0 <= s <= 2 pi / frequency; of acceleration, a forward pulse of the velocity."""
+
+    @property
+    def length(self) -> Any:
+        """2 pi / frequency."""
+        return 2.0 * math.pi / self.frequency
+
+
+@answering("__init__")
+@dataclass(frozen=True, kw_only=True)
+class OneCosine(OneSine):
+    """amplitude cos(frequency s) for one period; it jumps where it begins and where it ends."""
+
+    def shape(self, since: Any, n: int) -> Any:
+        """amplitude cos(frequency s), differentiated or integrated."""
+        return self.amplitude * sinusoid(self.frequency, 0.5 * math.pi, since, n)
+
+
+@answering("__init__")
+@dataclass(frozen=True, kw_only=True)
+class MavroeidisPapageorgiou(Pulse):
+    """The near-fault pulse of Mavroeidis and Papageorgiou (2003), BSSA 93(3), their velocity pulse:
+
+        amplitude / 2 (1 + cos(frequency r / gamma)) cos(frequency r + phase),    r from -h to h, h = pi gamma / frequency
+
+    r is the time since its middle and `gamma` > 1 says how many oscillations it has. Of the ground it is a `velocity`, or, if
+    asked, an `acceleration`. It begins and ends with the value 0.
+    """
+
+    frequency: float = field(metadata=RATE)
+    gamma: float
+    phase: float = field(default=0.0, metadata=RADIANS)
+    moving: ClassVar[tuple[str, ...]] = ("start", "frequency", "gamma")
+    quantities: ClassVar[tuple[str, ...]] = ("force", "velocity", "acceleration")
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "phase")
+        settle_numbers(self, "gamma", above=1.0)
+        super().__post_init__()
+
+    @property
+    def length(self) -> Any:
+        """2 pi gamma / frequency."""
+        return 2.0 * math.pi * self.gamma / self.frequency
+
+    def shape(self, since: Any, n: int) -> Any:
+        """The sum of the three sinusoids that the product of cosines is, differentiated or integrated."""
+        begin = self.phase - math.pi * self.gamma + 0.5 * math.pi  # of the carrier as a sine, at the start
+        carrier = sinusoid(self.frequency, begin, since, n)
+        above = sinusoid(self.frequency * (1.0 + 1.0 / self.gamma), begin - math.pi, since, n)
+        below = sinusoid(self.frequency * (1.0 - 1.0 / self.gamma), begin + math.pi, since, n)
+        return 0.5 * self.amplitude * (carrier + 0.5 * (above + below))
+
+
+@answering("__init__")
+@dataclass(frozen=True, kw_only=True)
+class Ricker(Pulse):
+    """The symmetric Ricker wavelet amplitude (1 - 2 u^2) exp(-u^2), u = frequency (s - 7 (2 / frequency)) / 2.
+
+    Its peak is `7 (2 / frequency)` after `start`: before the start and after the end, abs(u) > 7, it is below 1e-19 of the
+    amplitude and taken as 0. As a ground acceleration it leaves the ground where it was, at rest.
+    """
+
+    frequency: float = field(metadata=RATE)
+
+    @property
+    def length(self) -> Any:
+        """28 / frequency."""
+        return 4.0 * RICKER_REACH / self.frequency
+
+    def shape(self, since: Any, n: int) -> Any:
+        """-(amplitude / 2) (2 / frequency)^2 times the derivative of order n + 2 of exp(-u^2) by s, in Hermite polynomials."""
+        u, below, hermite = 0.5 * self.frequency * since - RICKER_REACH, 0.0, 1.0
+        for m in range(n + 2):
+            below, hermite = hermite, 2.0 * u * hermite - 2.0 * m * below
+        factor = -0.5 * (-1.0) ** n * self.amplitude * (0.5 * self.frequency) ** n
+        return factor * hermite * np.exp(-(u * u))
+
+
+@answering("__init__")
+@dataclass(frozen=True, kw_only=True)
+class Ramp(Pulse):
+    """amplitude s / duration for 0 <= s <= duration, and `amplitude` for ever after."""
+
+    duration: float = field(metadata=TIME)
+    holds: ClassVar[bool] = True
+    moving: ClassVar[tuple[str, ...]] = ("start", "duration")
+
+    @property
+    def length(self) -> Any:
+        """`duration`."""
+        return self.duration
+
+    def shape(self, since: Any, n: int) -> Any:
+        """amplitude s^(1 - n) / (1 - n)! / duration."""
+        slope = self.amplitude / self.duration
+        powers = {-2: since * since * since / 6.0, -1: 0.5 * since * since, 0: since, 1: 1.0}
+        return slope * powers.get(n, 0.0)
+
+
+@answering("__init__")
+@dataclass(frozen=True, kw_only=True)
+class Chirp(Pulse):
+    """amplitude sin(frequency s + (end_frequency - frequency) s^2 / (2 duration)) for 0 <= s <= duration: a linear sweep.
+
+    Of the ground its velocity and its displacement are no elementary functions: a model or an impact law that reads them is
+    refused.
+    """
+
+    frequency: float = field(metadata=RATE)
+    end_frequency: float = field(metadata=RATE)
+    duration: float = field(metadata=TIME)
+    moving: ClassVar[tuple[str, ...]] = ("start", "duration")
+
+    @property
+    def length(self) -> Any:
+        """`duration`."""
+        return self.duration
+
+    def shape(self, since: Any, n: int) -> Any:
+        """The sine of the swept phase, or its first two derivatives."""
+        growth = (self.end_frequency - self.frequency) / self.duration
+        phase, rate = (self.frequency + 0.5 * growth * since) * since, self.frequency + growth * since
+        if n < 0:
+            raise ParameterError(
+                "the velocity of a ground with the acceleration of a Chirp is no elementary function; use a Record"
+            )
+        if n == 2:
+            return self.amplitude * (growth * np.cos(phase) - rate * rate * np.sin(phase))
+        return self.amplitude * (np.sin(phase) if n == 0 else rate * np.cos(phase))
+
+
+def in_other_units(pulse: Pulse, by_time: Callable[..., Any], by_rate: Callable[..., Any], unit: float, factor: float) -> Pulse:
+    """The pulse with its times and rates taken through the unit of time, and `factor` times as high."""
+    of = {"time": by_time, "rate": by_rate}
+    fields = {f.name: of[f.metadata["converts"]] for f in dataclasses.fields(pulse) if f.metadata.get("converts") in of}
+    changed = {name: convert(getattr(pulse, name), unit) for name, convert in fields.items()}
+    return dataclasses.replace(pulse, **changed, amplitude=factor * pulse.amplitude)

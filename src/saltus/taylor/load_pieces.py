@@ -1,0 +1,98 @@
+"""What a system's loads do piece by piece: the polynomials of records, and the clocks of pulses, between their breakpoints.
+
+A trace reads them by rows (dotted path, order). Of a record it is the order of the derivative. A pulse is a closed form of its
+own time, and its rows are polynomials of degree 1: SINCE, the time since its start, at most its length; its derivative WITHIN,
+1 within the pulse and else 0; AFTER, the time since its end, and one more, its derivative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from saltus.systems import Pulse, Record, System, substitute
+from saltus.taylor.graph import RECORD_WIDTH
+
+SINCE, WITHIN, AFTER = 0, 1, 10
+
+
+def record_table(system: System, rows: list[tuple[str, int]]) -> tuple[np.ndarray, np.ndarray]:
+    """The records and pulses that a trace reads, on their common breakpoints.
+
+    Returns:
+        breakpoints (m,) and coefficients (rows, m + 1, RECORD_WIDTH): piece i of a row holds between the breakpoints i - 1 and
+        i, in ascending powers of the time since breakpoint i - 1 (the first piece: since breakpoint 0). Scales are left out.
+    """
+    breaks, tables = record_tables(system, rows, {})
+    return np.unique(breaks[0]), tables[0]
+
+
+def record_tables(
+    system: System, rows: list[tuple[str, int]], columns: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same for many sets of numbers, given in flat columns by dotted path.
+
+    Returns:
+        breakpoints (n, m) and coefficients (n, rows, m + 1, RECORD_WIDTH); n is 1 where no column moves a breakpoint.
+    """
+    if not rows:
+        return np.empty((1, 0)), np.empty((1, 0, 1, RECORD_WIDTH))
+    signals = {path: system.get(path) for path, _ in rows}
+    moving = {f"{path}.{name}" for path, signal in signals.items() for name in getattr(signal, "moving", ())}
+    varied = {path: values[:, None] for path, values in columns.items() if path in moving and values.ndim}
+    pulses = {path: substitute(signal, lambda at, value: varied.get(at, value), path) for path, signal in signals.items()
+              if isinstance(signal, Pulse)}  # fmt: skip
+    count = max((values.shape[0] for values in varied.values()), default=1)
+    edges = [_edges(pulses.get(path, signal), count) for path, signal in signals.items()]
+    together = np.concatenate(edges, axis=1)
+    breaks = np.sort(together, axis=1) if varied else np.unique(together)[None]
+    tables = np.zeros((count, len(rows), breaks.shape[1] + 1, RECORD_WIDTH))
+    for i, (path, order) in enumerate(rows):
+        if path in pulses:
+            _fill_clock(tables[:, i], breaks, pulses[path], order)
+        else:
+            for table, own in zip(tables[:, i], breaks, strict=True):
+                _fill(table, own, signals[path], order)
+    return breaks, tables
+
+
+def _edges(signal: Any, count: int) -> np.ndarray:
+    """The breakpoints of a record or a pulse, (count, its breakpoints)."""
+    if isinstance(signal, Record):
+        return np.broadcast_to(signal.time, (count, signal.time.size))
+    return np.concatenate([np.broadcast_to(t, (count, 1)) for t in (signal.start, signal.start + signal.length)], axis=1)
+
+
+def _fill_clock(table: np.ndarray, breaks: np.ndarray, pulse: Any, order: int) -> None:
+    """One row of a pulse, (n, m + 1, RECORD_WIDTH); before the first breakpoint it has not begun."""
+    end = pulse.start + pulse.length
+    within, past, pieces = (breaks >= pulse.start) & (breaks < end), breaks >= end, table[:, 1:]
+    if order == SINCE:
+        pieces[..., 0] = np.where(past, end - pulse.start, np.where(within, breaks - pulse.start, 0.0))
+    if order == AFTER:
+        pieces[..., 0] = np.where(past, breaks - end, 0.0)
+    slope = {SINCE: within, WITHIN: within, AFTER: past, AFTER + 1: past}.get(order)
+    if slope is not None:
+        pieces[..., 1 if order in (SINCE, AFTER) else 0] = slope
+
+
+def _fill(row: np.ndarray, breaks: np.ndarray, record: Record, order: int) -> None:
+    from scipy.special import factorial
+
+    polynomial = record.polynomials[order] if order < 3 else record.polynomials[2].derivative(order - 2)
+    first, last = record.time[0], record.time[-1]
+    inside = (breaks >= first) & (breaks < last)
+    anchors = breaks[inside]
+    for power in range(polynomial.c.shape[0]):
+        row[1:][inside, power] = polynomial(anchors, nu=power) / factorial(power)
+    if record.quantity == "force" or order >= 2:
+        return
+    for after in (False, True):  # the ground goes on with the velocity it has
+        edge = last if after else first
+        where = np.append(False, breaks >= last) if after else np.append(True, breaks < first)
+        anchor = np.append(breaks[0], breaks)[where]
+        velocity = record.polynomials[1](edge)
+        row[where, 0] = velocity if order == 1 else record.polynomials[0](edge) + velocity * (anchor - edge)
+        row[where, 1] = 0.0 if order == 1 else velocity
