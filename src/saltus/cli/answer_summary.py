@@ -70,6 +70,15 @@ def _diagram(tree: Any) -> Iterator[str]:
         yield f"chaos: {path} {low:.6g} to {high:.6g}, largest exponent {rate:.3g}"
 
 
+def _sweep(data: Any) -> Iterator[str]:
+    path, reached = data.attrs["path"], int(data["amplitude"].notnull().all("direction").sum())
+    yield f"{reached} values of {path} up and down; they differ at {int(data['hysteresis'].sum())}."
+    for jump in range(data.sizes["jump"]):
+        way, *numbers = (data[f"jump_{name}"].values[jump] for name in ("direction", "before", "after"))
+        sizes = (float(data[f"jump_amplitude_{when}"][jump]) for when in ("before", "after"))
+        yield "{}: a jump between {:.8g} and {:.8g}, amplitude {:.4g} to {:.4g}".format(way, *numbers, *sizes)
+
+
 def _attractors(data: Any) -> Iterator[str]:
     share, of = ("cells", "cells") if "cells" in data else ("fraction", "starts")
     for i, label in enumerate(data["attractor"].values):
@@ -86,6 +95,7 @@ SUMMARIES: dict[str, Callable[[Any], Iterator[str]]] = {
     "phase_portrait": _portrait,
     "response_spectrum": _diagram,
     "bifurcation_diagram": _diagram,
+    "frequency_sweep": _sweep,
     "attractors": _attractors,
     "basins": _attractors,
     "stability_chart": _chart,

@@ -19,6 +19,7 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
     "phase_portrait": ("studies:phase_portrait",),
     "response_spectrum": ("studies:response_spectrum", "studies:bifurcation_diagram"),
     "bifurcation_diagram": ("studies:bifurcation_diagram",),
+    "frequency_sweep": ("studies:frequency_sweep",),
     "attractors": ("attractors:find_attractors",),
     "basins": ("attractors:basins_of_attraction",),
     "stability_chart": ("studies:stability_chart", "studies:bordered_chart"),

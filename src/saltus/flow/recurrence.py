@@ -214,6 +214,8 @@ def return_distances(states: np.ndarray, max_period: int) -> np.ndarray:
 def return_period(states: np.ndarray, max_period: int, within: float = RECURRENCE.near_return) -> np.ndarray:
     """The fewest periods after which the last of states (..., kept, d) has come back to within a distance; 0 if there is none."""
     near = return_distances(states, max_period) < within
+    if not near.shape[-1]:  # one state alone
+        return np.zeros(near.shape[:-1], dtype=int)
     return np.where(near.any(axis=-1), 1 + np.argmax(near, axis=-1), 0)
 
 

@@ -1,7 +1,9 @@
+from .averages_over_time import mean_dissipated_power, transmissibility
 from .branch import Branch
 from .branch_continuation import STEP, continue_orbit, follow_stable
 from .contact_problem import problem_of
 from .find import find_orbit, orbit_from
+from .free_orbits import FreeOrbit, FreeOutcome, backbone, free_orbit
 from .from_dataset import orbits_of
 from .near_returns import orbits_near_returns, solved_near
 from .newton import solve
@@ -23,6 +25,8 @@ __all__ = [
     "STEP",
     "Branch",
     "Cascade",
+    "FreeOrbit",
+    "FreeOutcome",
     "OrbitEnd",
     "PeriodicOrbit",
     "Problem",
@@ -33,6 +37,7 @@ __all__ = [
     "SpecialKind",
     "SpecialPoint",
     "as_bytes",
+    "backbone",
     "closing_distances",
     "closing_rows",
     "continue_orbit",
@@ -41,10 +46,12 @@ __all__ = [
     "doubling_cascade",
     "find_orbit",
     "follow_stable",
+    "free_orbit",
     "from_bytes",
     "initial_states",
     "is_symmetric",
     "keeps_symmetry",
+    "mean_dissipated_power",
     "orbit_from",
     "orbits_near_returns",
     "orbits_of",
@@ -54,5 +61,6 @@ __all__ = [
     "solve",
     "solved_near",
     "switch_branch",
+    "transmissibility",
     "within_window",
 ]

@@ -10,6 +10,7 @@ import numpy as np
 
 from saltus.checks import check_number
 from saltus.continuation import Course, End
+from saltus.notebook import html_table
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.special_point import OrbitEnd
 from saltus.public_functions import answering
@@ -61,6 +62,15 @@ class Branch(Course):
         from saltus.orbits.branch_dataset import branch_dataset
 
         return branch_dataset(self)
+
+    def _repr_html_(self) -> str:
+        facts = {
+            f"{i + 1}. {p.kind}": f"{self.path} = {p.parameter:.9g}, amplitude {p.orbit.amplitude:.6g}"
+            for i, p in enumerate(self.special)
+        }
+        ends = {"begins": str(self.ends[0]), "ends": str(self.ends[1])}
+        span = f"{self.parameters.min():.6g} to {self.parameters.max():.6g}" if len(self.points) else "none"
+        return html_table(f"Branch along {self.path}", {"points": len(self.points), "from": span, **facts, **ends})
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{p.kind} {p.parameter:.6g}" for p in self.special)

@@ -11,6 +11,7 @@ import numpy as np
 
 from saltus.flow import Motion, Validity, simulate
 from saltus.flow import segments as at
+from saltus.notebook import html_table
 from saltus.orbits.contact_problem import ContactProblem
 from saltus.orbits.newton import NEWTON_ITERATIONS, Solution, solve
 from saltus.orbits.problem import Problem
@@ -262,6 +263,12 @@ class PeriodicOrbit:
     def validity(self) -> Validity:
         """Which limits of the mechanism it passes, and the share of time with a wrong reaction (errata 20, 21)."""
         return self.motion().validity
+
+    def _repr_html_(self) -> str:
+        names = ("period", "duration", "frequency", "amplitude", "symmetric", "stable", "residual")
+        facts = {name: getattr(self, name) for name in names} | {"impacts": self.signature.impact_count}
+        multipliers = ", ".join(f"{value:.6g}" for value in self.multipliers)
+        return html_table(f"Orbit of {type(self.system.model).__name__}", facts | {"multipliers": multipliers})
 
     def __repr__(self) -> str:
         kind = "symmetric " if self.symmetric else ""

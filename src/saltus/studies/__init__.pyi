@@ -5,6 +5,7 @@ from .chart.wrong_cells import wrong_cells
 from .diagram.chaos_search import chaotic_bands
 from .diagram.diagram import bifurcation_diagram, response_spectrum
 from .portrait import phase_portrait
+from .swept_parameter import frequency_sweep
 
 __all__ = [
     "Borders",
@@ -12,6 +13,7 @@ __all__ = [
     "bordered_chart",
     "chaotic_bands",
     "disagreements",
+    "frequency_sweep",
     "phase_portrait",
     "response_spectrum",
     "stability_chart",

@@ -1,0 +1,223 @@
+"""Free periodic motions without loss: from one turning point to the next and back, and their period along the amplitude."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.checks import check_number
+from saltus.errors import MotionError, ParameterError
+from saltus.flow import Motion, Stop, simulate
+from saltus.progress import Progress, silent
+from saltus.provenance import provenance
+from saltus.public_functions import answered
+from saltus.systems import Constant, System, check_system
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class FreeOrbitSettings:
+    """The numbers by which a free motion is followed until it is back where it began."""
+
+    tol: float = 1e-15  # Of the steps: periods are then exact to some 1e-14.
+    first_duration: float = 8.0  # What is followed first; then twice as long, and so on.
+    most_duration: float = (
+        1e5  # Beside a saddle a period grows like the logarithm of the distance: one of 1e5 cannot be told from it.
+    )
+    returned: float = 1e-9  # The distance from the start, relative to the amplitude, at which a motion has come back.
+    parts: int = 16  # Of a step, between which the velocity's sign is compared: a step is at most a third of the motion's period.
+
+
+SETTINGS = FreeOrbitSettings()
+
+
+class FreeOutcome(Enum):
+    """What becomes of a free motion that begins at rest."""
+
+    PERIODIC = "it comes back to where it began"
+    EQUILIBRIUM = "it stays where it is"
+    LOST = "it does not come back to where it began: energy is lost or gained"
+    ENDED = "it is ended by a margin of the model, or cannot go on"
+    AWAY = "it does not turn round within a time of 1e5"
+
+    def __str__(self) -> str:
+        return str(self.value)
+
+
+@dataclass(frozen=True)
+class FreeOrbit:
+    """A free periodic motion of a system with one coordinate, which begins at rest at one of its two turning points.
+
+    Where a wall throws it back, the wall is the other turning point.
+    """
+
+    system: System
+    amplitude: float  # the coordinate of the turning point at which it begins
+    turning: float  # that of the other one
+    period: float
+    impact_speed: float  # of the gap, the largest; nan without impacts
+    defect: float  # its distance from itself after the period
+
+    @property
+    def frequency(self) -> float:
+        """2 pi / period."""
+        return 2.0 * math.pi / self.period
+
+    def motion(self) -> Motion:
+        """One period of it."""
+        return _followed(self.system, self.amplitude, self.period)
+
+
+@answered
+def free_orbit(system: System, amplitude: float) -> FreeOrbit:
+    """The free periodic motion that begins at rest at the coordinate `amplitude`, of a system without loss.
+
+    It is followed from one turning point, theta' = 0, to the other one and back; each is a root of its Taylor series, and every
+    impact on the way is exact. The load is constant. At a distance d beside a saddle, where the energy says little of the turning
+    point, the period is exact to about 1e-16 / d^2.
+
+    Raises:
+        ParameterError: several coordinates, a load that varies, an amplitude without meaning.
+        MotionError: the motion does not come back: `FreeOutcome` says why.
+    """
+    _check(system, "free_orbit")
+    check_number("amplitude", amplitude)
+    found = _found(system, float(amplitude))
+    if isinstance(found, FreeOutcome):
+        name = system.model.coordinates[0]
+        raise MotionError(f"no free orbit begins at rest at {name} = {amplitude:g}: {found}")
+    return found
+
+
+@answered
+def backbone(system: System, amplitudes: Iterable[float], *, progress: Progress = silent) -> xarray.Dataset:
+    """The free periodic motions of a system without loss along their amplitude: the backbone of its resonances.
+
+    Args:
+        system: what moves, with one coordinate, under a constant load.
+        amplitudes: the coordinates of the turning point at which the motions begin, at rest.
+        progress: called with the fraction done.
+
+    Returns:
+        A Dataset over (amplitude): `period`, `frequency` = 2 pi / period, `turning` (the other turning point), `impact_speed`
+        (the largest; nan without impacts), `defect`, and `outcome`, a word of `FreeOutcome`; nan where there is no free orbit.
+
+    Raises:
+        ParameterError: several coordinates, a load that varies, amplitudes that are no numbers.
+    """
+    import xarray
+
+    _check(system, "backbone")
+    grid = _numbers(amplitudes)
+    found = []
+    for i, amplitude in enumerate(grid.tolist()):
+        progress(i / grid.size, "free orbits")
+        found.append(_found(system, amplitude))
+    progress(1.0, "done")
+    name = system.model.coordinates[0]
+    unit = system.model.unit_of(name)
+    columns = {
+        "period": ("1", "period"),
+        "frequency": ("1", "2 pi / period"),
+        "turning": (unit, f"{name} at the other turning point"),
+        "impact_speed": (unit, "largest speed of an impact"),
+        "defect": (unit, "distance from itself after the period"),
+    }
+    data = xarray.Dataset(coords={"amplitude": ("amplitude", grid, {"units": unit, "long_name": f"{name} at a turning point"})})
+    for key, (units, text) in columns.items():
+        values = [getattr(orbit, key) if isinstance(orbit, FreeOrbit) else math.nan for orbit in found]
+        data[key] = ("amplitude", np.array(values), {"units": units, "long_name": text})
+    words = [(FreeOutcome.PERIODIC if isinstance(orbit, FreeOrbit) else orbit).name.lower() for orbit in found]
+    data["outcome"] = ("amplitude", np.array(words), {"long_name": "what becomes of the motion"})
+    data.attrs = {"title": "free orbits computed by saltus", "kind": "backbone"}
+    data.attrs |= provenance(system, tol=SETTINGS.tol, coordinate=name)
+    return data
+
+
+def _check(system: System, asking: str) -> None:
+    check_system(system, asking, coordinates=1)
+    for name, signal in system.load.channels.items():
+        if not isinstance(signal, Constant):
+            raise ParameterError(f"load.{name} varies, and free orbits are those under a constant load", f"load.{name}")
+
+
+def _numbers(amplitudes: Any) -> np.ndarray:
+    try:
+        grid = np.atleast_1d(np.asarray(list(amplitudes), dtype=float))
+    except (TypeError, ValueError):
+        grid = np.empty(0)
+    if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
+        raise ParameterError(f"amplitudes must be finite numbers, got {amplitudes!r}", "amplitudes")
+    return grid
+
+
+def _followed(system: System, amplitude: float, duration: float) -> Motion:
+    start: dict[str, Any] = {system.model.coordinates[0]: amplitude}
+    return simulate(system, **start, duration=duration, tol=SETTINGS.tol)
+
+
+def _found(system: System, amplitude: float) -> FreeOrbit | FreeOutcome:
+    """The free orbit that begins at rest at a place, or what becomes of the motion."""
+    duration = SETTINGS.first_duration
+    while duration <= SETTINGS.most_duration:
+        motion = _followed(system, amplitude, duration)
+        turns = _turning_times(motion)
+        if len(turns) >= 2:
+            return _closed(motion, amplitude, turns[0], turns[1])
+        if (motion.stop is Stop.REST and motion.rest_time == motion.start) or not _moves(motion):
+            return FreeOutcome.EQUILIBRIUM
+        if motion.stop is Stop.REST:
+            return FreeOutcome.LOST
+        if motion.stop is not Stop.HORIZON:
+            return FreeOutcome.ENDED
+        duration *= 2.0
+    return FreeOutcome.AWAY
+
+
+def _moves(motion: Motion) -> bool:
+    return motion.dense is not None and bool(np.any(motion.dense.series[:, :, 1:]))
+
+
+def _closed(motion: Motion, amplitude: float, half: float, period: float) -> FreeOrbit | FreeOutcome:
+    """The orbit that turns round at these instants, if it is back at its start at the second one."""
+    turning, back = (float(motion.at(time)[0]) for time in (half, period))
+    defect, size = abs(back - amplitude), max(abs(amplitude), abs(turning))
+    if defect > SETTINGS.returned * size:
+        return FreeOutcome.LOST
+    inside = motion.impacts.time <= period
+    speeds = np.abs(motion.impacts.velocity_before[inside])
+    return FreeOrbit(motion.system, amplitude, turning, period, float(speeds.max()) if speeds.size else math.nan, defect)
+
+
+def _turning_times(motion: Motion) -> list[float]:
+    """The instants at which the velocity changes its sign, at a root of its series or at an impact, after the start."""
+    dense = motion.dense
+    if dense is None:
+        return []
+    slopes = dense.series[:, 0, 1:] * np.arange(1, dense.series.shape[2])
+    shares = np.linspace(0.0, 1.0, SETTINGS.parts + 1)
+    turns, sign = [], 0.0
+    for start, length, slope in zip(dense.start.tolist(), dense.length.tolist(), slopes[:, ::-1], strict=True):
+        values = np.polyval(slope, shares * length)
+        values[np.abs(values) <= SETTINGS.tol * np.abs(values).max(initial=0.0)] = 0.0
+        known = None  # the last of these instants at which the velocity is not 0, in this step
+        for share, value in zip(shares.tolist(), np.sign(values).tolist(), strict=True):
+            if value * sign < 0.0:
+                turns.append(start if known is None else start + _root(slope, known, share * length))
+            if value:
+                sign, known = value, share * length
+    return turns
+
+
+def _root(slope: np.ndarray, low: float, high: float) -> float:
+    """The zero of a polynomial between two values of different signs."""
+    from scipy.optimize import brentq
+
+    return float(brentq(lambda time: np.polyval(slope, time), low, high, xtol=1e-300, rtol=1e-15))

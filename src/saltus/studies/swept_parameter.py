@@ -1,0 +1,300 @@
+"""What an experimenter does: a parameter of the load is swept up and down, and the motion is carried along."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.checks import check_along, check_axis, check_count, check_number, check_path
+from saltus.errors import ParameterError
+from saltus.flow import Outcome, Recurrence, find_recurrence, rate_name
+from saltus.progress import Progress, silent
+from saltus.provenance import provenance
+from saltus.public_functions import checked_by
+from saltus.systems import System, check_system
+
+if TYPE_CHECKING:
+    import xarray
+
+DIRECTIONS = ("up", "down")
+
+
+@dataclass(frozen=True)
+class SweepSettings:
+    """The numbers by which a step of the amplitude is a jump."""
+
+    step_factor: float = (
+        5.0  # A step is examined if it is so many times the median of those around it: a smooth response has few.
+    )
+    neighbours: int = 10  # Number of steps around it whose median that is.
+    least_step: float = 0.002  # Smaller steps, as a share of the largest amplitude, are below what a plot shows.
+    # A large step is swept again in so many parts, and where it is found then in parts of these: as transients shrink with the
+    # parts, what is left is the jump of a slow sweep.
+    parts: tuple[int, ...] = (32, 1024)
+    kept: float = (
+        0.1  # The share of the step that must be left then, so that it is a jump: of a root, as beside a fold, 0.03 is left.
+    )
+    hysteresis: float = 0.01  # Amplitudes up and down are two if they differ by this share of the largest one.
+
+
+SETTINGS = SweepSettings()
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepRequest:
+    """The arguments of `frequency_sweep`, checked and as arrays."""
+
+    system: System
+    path: str
+    values: Any
+    periods: int
+    settle: bool
+    max_period: int
+    tol: float
+    velocity: Any
+    coordinates: Any
+    grid: np.ndarray = field(init=False)
+    start: np.ndarray = field(init=False)  # (d,)
+
+    def __post_init__(self) -> None:
+        check_system(self.system, "frequency_sweep", several_contacts=True)
+        if self.system.load.frequency is None:
+            raise ParameterError("a sweep needs a load with a frequency; give the Load one", "load.frequency")
+        check_path(self.system, self.path)
+        grid = check_axis("values", self.values)
+        if grid.size < 2 or not (np.diff(grid) > 0).all():
+            raise ParameterError(f"values must be two or more that increase, got {self.values!r}", "values")
+        check_along(self.system, self.path, grid, "values")
+        check_count("periods", self.periods, 1)
+        check_count("max_period", self.max_period, 1)
+        check_number("tol", self.tol, at_least=1e-15, at_most=1e-6)
+        object.__setattr__(self, "grid", grid)
+        object.__setattr__(self, "start", self._start())
+
+    def _start(self) -> np.ndarray:
+        names = self.system.model.coordinates
+        for name in self.coordinates:
+            if name not in names:
+                raise ParameterError(f"{type(self.system.model).__name__} has no coordinate {name!r}", name)
+        speeds = np.atleast_1d(np.asarray(self.velocity, dtype=float))
+        if speeds.shape not in ((1,), (len(names),)) or (len(names) > 1 and speeds.any() and speeds.size == 1):
+            raise ParameterError(f"velocity must be {len(names)} numbers, got {self.velocity!r}", "velocity")
+        position = [self.coordinates.get(name, 0.0) for name in names]
+        for name, value in zip((*names, "velocity"), (*position, float(speeds[0])), strict=True):
+            check_number(name, value)
+        return np.concatenate([position, np.broadcast_to(speeds, len(names))])
+
+    def follow(self, value: float, state: np.ndarray) -> Recurrence:
+        """What becomes of a state at phase 0 at one value of the parameter."""
+        return find_recurrence(
+            self.system.with_({self.path: float(value)}),
+            state[None],
+            self.periods,
+            max_period=self.max_period,
+            kept=2 * self.max_period + 2 if self.settle else min(self.periods, self.max_period),
+            extrema=True,
+            impact_count=True,
+            stop_early=self.settle,
+            tol=self.tol,
+            threads=1,
+        )
+
+
+def _check(progress: object = None, **arguments: Any) -> None:
+    SweepRequest(coordinates=_taken_out(arguments), **arguments)
+
+
+def _taken_out(arguments: dict[str, Any]) -> dict[str, Any]:
+    """The coordinates among named arguments, which are taken out of them."""
+    known = set(SweepRequest.__dataclass_fields__)
+    return {name: arguments.pop(name) for name in list(arguments) if name not in known}
+
+
+@checked_by(_check)
+def frequency_sweep(
+    system: System,
+    values: Iterable[float],
+    *,
+    path: str = "load.frequency",
+    periods: int = 1000,
+    settle: bool = True,
+    max_period: int = 16,
+    velocity: float = 0.0,
+    tol: float = 1e-11,
+    progress: Progress = silent,
+    **coordinates: float,
+) -> xarray.Dataset:
+    """The response while a parameter goes up and down again, as in an experiment: each value begins with the state of the last
+    one.
+
+    Stepwise (`settle`), each value is kept until the motion repeats itself. Slowly and steadily (`settle=False`), it is kept for
+    exactly `periods` forcing periods: with 1 and many values the parameter changes in each period. Values change at phase 0 of
+    the load, so that the phase of a harmonic does not jump.
+
+    A step of the amplitude that is large beside its neighbours, or at which impacts or period change, is swept again in parts, to
+    a thousandth, and what is then left of it is a jump (without `settle` it is reported as it is). Where up and down differ there
+    is hysteresis.
+
+    Args:
+        system: what moves, under a load with a frequency.
+        values: of the parameter, increasing.
+        path: its dotted path.
+        periods: forcing periods at each value, at most or exactly.
+        settle: whether a value is left as soon as the motion repeats itself.
+        max_period: the longest period looked for.
+        velocity, coordinates: the state at the first value, at phase 0; 0 where it is not given.
+        tol: the error that one step of the integration may make.
+        progress: called with the fraction done and what is being done.
+
+    Returns:
+        A Dataset over (direction, value): of the first coordinate in the motion's period `amplitude` (its largest size),
+        `largest_...` and `smallest_...`; `impact_count`, `period` (0: it does not repeat itself), `outcome` and the state at
+        phase 0; over (value): `hysteresis`; over (jump): its direction, the values that enclose it and the amplitudes there.
+        Values that a motion did not reach, as a margin ended it, are nan.
+
+    Raises:
+        ParameterError: an argument without meaning; a load without a frequency.
+    """
+    asked = SweepRequest(
+        system=system, path=path, values=values, periods=periods, settle=settle, max_period=max_period, tol=tol,
+        velocity=velocity, coordinates=coordinates,
+    )  # fmt: skip
+    up = _swept(asked, asked.grid, asked.start, lambda done: progress(0.5 * done, f"{path} up"))
+    reached = len(up.rows)
+    state = up.rows[-1].last[0] if reached else asked.start
+    down = _swept(asked, asked.grid[:reached][::-1], state, lambda done: progress(0.5 + 0.5 * done, f"{path} down"))
+    jumps = [(name, *jump) for name, run in zip(DIRECTIONS, (up, down), strict=True) for jump in _jumps(asked, run)]
+    progress(1.0, "done")
+    return _dataset(asked, (up, down), jumps)
+
+
+@dataclass(frozen=True)
+class _OneWay:
+    """One direction: the values that were reached, in their order, and what became of the motion at each."""
+
+    values: np.ndarray
+    start: np.ndarray
+    rows: list[Recurrence]
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """At each value."""
+        return np.array([amplitude_of(row) for row in self.rows])
+
+
+def amplitude_of(row: Recurrence) -> float:
+    """The largest size of the first coordinate in a motion's period."""
+    return float(max(abs(row.highest[0]), abs(row.lowest[0])))
+
+
+def _swept(asked: SweepRequest, values: np.ndarray, state: np.ndarray, progress: Any) -> _OneWay:
+    """Follow the motion from value to value, until a margin ends it."""
+    run = _OneWay(values, state, [])
+    for i, value in enumerate(values):
+        progress(i / len(values))
+        row = asked.follow(value, state)
+        if row.ended[0]:
+            break
+        run.rows.append(row)
+        state = row.last[0]
+    return replace(run, values=values[: len(run.rows)])
+
+
+def _jumps(asked: SweepRequest, run: _OneWay) -> list[tuple[float, ...]]:
+    """Values before and after each jump of one direction, and the amplitudes there."""
+    sizes = run.amplitude
+    found: list[tuple[float, ...]] = []
+    for i in _candidates(run):
+        jump, step = _located(asked, run, i), abs(sizes[i + 1] - sizes[i])
+        if abs(jump[3] - jump[2]) >= max(SETTINGS.kept * step, SETTINGS.least_step * sizes.max()):
+            found.append(jump)
+    return found
+
+
+def _located(asked: SweepRequest, run: _OneWay, i: int) -> tuple[float, float, float, float]:
+    """The part of a step in which a slower sweep has what the step has, and the amplitudes at its ends."""
+    first, last = (float(value) for value in run.values[i : i + 2])
+    a, b = (amplitude_of(row) for row in run.rows[i : i + 2])
+    found, low, state = (first, last, a, b), first, run.rows[i].last[0]
+    for parts in SETTINGS.parts if asked.settle else ():
+        while low != last:
+            here = low + (last - first) / parts
+            here = last if abs(here - last) < 0.5 * abs(last - first) / parts else here
+            row = asked.follow(here, state)
+            if row.ended[0]:
+                return found
+            size = amplitude_of(row)
+            if abs(size - b) < abs(size - a):
+                found = (low, here, a, size)
+                break
+            low, a, state = here, size, row.last[0]
+    return found
+
+
+def _candidates(run: _OneWay) -> list[int]:
+    """The steps of the amplitude that are large beside those around them, or at which impacts or the period change."""
+    sizes, reach = run.amplitude, SETTINGS.neighbours // 2
+    steps, kinds = np.abs(np.diff(sizes)), [(row.impact_count[0], row.period[0]) for row in run.rows]
+    other = np.array([one != following for one, following in pairwise(kinds)], dtype=bool)
+    around = [np.delete(steps, i)[max(0, i - reach) : i + reach] for i in range(steps.size)]
+    usual = np.array([np.median(near) if near.size else 0.0 for near in around])
+    large = (steps > SETTINGS.step_factor * usual) | other
+    return np.flatnonzero(large & (steps > SETTINGS.least_step * sizes.max(initial=0.0))).tolist()
+
+
+def _state_of(i: int, row: Recurrence) -> float:
+    return float(row.last[0, i])
+
+
+def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tuple[Any, ...]]) -> xarray.Dataset:
+    import xarray
+
+    model, count = asked.system.model, asked.grid.size
+    name, names = model.coordinates[0], model.coordinates
+    unit = model.unit_of(name)
+    columns: dict[str, tuple[Callable[[Recurrence], Any], str, str]] = {
+        "amplitude": (amplitude_of, unit, f"max abs({name}) in a period"),
+        f"largest_{name}": (lambda row: row.highest[0], unit, f"largest {name} in a period"),
+        f"smallest_{name}": (lambda row: row.lowest[0], unit, f"smallest {name} in a period"),
+        "impact_count": (lambda row: row.impact_count[0], "1", "impacts in a period"),
+        "period": (lambda row: row.period[0], "1", "forcing periods after which it repeats itself; 0 where it does not"),
+        "periods": (lambda row: row.periods[0], "1", "forcing periods that it was followed"),
+    }
+    for i, state in enumerate([*names, *(rate_name(each, names) for each in names)]):
+        columns[state] = (partial(_state_of, i), model.unit_of(names[i % len(names)]), f"{state} at phase 0")
+    table = {key: np.full((2, count), np.nan) for key in columns}
+    outcome = np.full((2, count), "", dtype="<U8")
+    for run, values, words in zip(runs, zip(*table.values(), strict=True), outcome, strict=True):
+        places = np.searchsorted(asked.grid, run.values)
+        words[places] = [Outcome(int(row.outcome[0])).name.lower() for row in run.rows]
+        for column, (read, _, _) in zip(values, columns.values(), strict=True):
+            column[places] = [read(row) for row in run.rows]
+    over = ("direction", "value")
+    data = xarray.Dataset(
+        {key: (over, table[key], {"units": units, "long_name": text}) for key, (_, units, text) in columns.items()},
+        {"direction": list(DIRECTIONS), "value": ("value", asked.grid, {"units": "1", "long_name": asked.path})},
+    )
+    data["outcome"] = (over, outcome, {"long_name": "rest, periodic, or moving without repeating itself"})
+    up, down = table["amplitude"]
+    apart = np.abs(up - down) > SETTINGS.hysteresis * np.nanmax(table["amplitude"], initial=0.0)
+    data["hysteresis"] = ("value", apart.astype(np.int8), {"units": "1", "long_name": "whether up and down differ"})
+    labels = ("direction", "before", "after", "amplitude_before", "amplitude_after")
+    for i, label in enumerate(labels):
+        found = np.array([jump[i] for jump in jumps], dtype="<U4" if label == "direction" else float)
+        data[f"jump_{label}"] = ("jump", found, {"units": unit if label.startswith("amplitude") else "1"})
+    start = {f"start_{each}": float(x) for each, x in zip(names, asked.start, strict=False)}
+    numbers: dict[str, Any] = {
+        "path": asked.path,
+        "coordinate": name,
+        "periods": asked.periods,
+        "settle": str(asked.settle),
+        **start,
+    }
+    data.attrs = {"title": "sweep computed by saltus", "kind": "frequency_sweep"}
+    data.attrs |= provenance(asked.system, tol=asked.tol, **numbers)
+    return data

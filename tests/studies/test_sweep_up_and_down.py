@@ -1,0 +1,148 @@
+"""A parameter swept up and down: jumps where closed forms and branches have them, hysteresis between."""
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.cli.answer_summary import summarise
+from saltus.config import load_study
+from saltus.errors import ParameterError
+from saltus.orbits import SpecialKind
+from saltus.plots import draw_sweep, figure_of
+
+DAMPING, FORCE = 0.1, 0.2
+
+
+def oscillator(frequency=1.0, force=FORCE, wall=1.0):
+    return saltus.System(
+        model=saltus.WallOscillator(stiffness=1.0, damping=DAMPING, wall=wall),
+        load=saltus.Load(frequency=frequency, force=saltus.Harmonic(force)),
+        impact=saltus.VelocityReduction(0.8),
+    )
+
+
+def linear_gain(w):
+    """The amplitude of x'' + 0.1 x' + x = sin(w t)."""
+    return 1 / np.hypot(1 - w**2, DAMPING * w)
+
+
+def upper_grazing():
+    """The frequency above resonance at which the linear amplitude is that of the wall: (1 - u)^2 + c^2 u = F^2, u = w^2."""
+    return np.sqrt(max(np.roots([1.0, DAMPING**2 - 2, 1 - FORCE**2])))
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return saltus.frequency_sweep(oscillator(), np.linspace(1.02, 1.5, 49), x=0.1)
+
+
+def jumps(data, way):
+    """(before, after) of the jumps of one direction."""
+    chosen = data.jump_direction == way
+    return list(zip(data.jump_before[chosen].values, data.jump_after[chosen].values, strict=True))
+
+
+def test_on_the_way_down_the_jump_is_where_the_linear_motion_grazes_the_wall(swept):
+    ((before, after),) = jumps(swept, "down")
+    assert before - after < 1.1e-5  # a thousandth of the step
+    assert 0.5 * (before + after) == pytest.approx(upper_grazing(), abs=2e-5)  # beside it transients touch the wall as well
+
+
+def test_on_the_way_up_the_jump_is_the_fold_of_the_branch(swept):
+    ((before, after),) = jumps(swept, "up")
+    branch = saltus.continue_orbit(saltus.find_orbit(oscillator(1.1), x=1.0), "load.frequency", (1.05, 1.4))
+    folds = [s.parameter for s in branch.special if s.kind == SpecialKind.LP]
+    assert any(before <= fold <= after for fold in folds)
+
+
+def test_hysteresis_is_between_the_jumps_and_nowhere_else(swept):
+    ((low, _),), ((high, _),) = jumps(swept, "down"), jumps(swept, "up")
+    apart = swept.hysteresis.values.astype(bool)
+    inside = (swept.value > low) & (swept.value < high)
+    assert (apart == inside.values).all()
+    assert apart.any()
+
+
+def test_without_impacts_both_ways_are_the_linear_response(swept):
+    for way in ("up", "down"):
+        one = swept.sel(direction=way)
+        free = one.impact_count == 0
+        assert one.amplitude[free].values == pytest.approx(FORCE * linear_gain(one.value[free].values), rel=1e-8)
+        assert free.sum() > 15
+
+
+def test_any_parameter_of_the_load_is_swept():
+    frequency = 1.2
+    grid = np.linspace(0.05, 0.6, 56)
+    data = saltus.frequency_sweep(oscillator(frequency), grid, path="load.force.amplitude", x=0.0)
+    ((before, after),) = jumps(data, "up")
+    assert 0.5 * (before + after) == pytest.approx(1 / linear_gain(frequency), abs=3e-5)
+    assert data.hysteresis.any()
+
+
+def test_a_slow_sweep_follows_the_response_within_its_rate():
+    grid = np.linspace(1.3, 1.6, 601)
+    data = saltus.frequency_sweep(oscillator(1.3, wall=50.0), grid, periods=1, settle=False, x=0.0)
+    late = data.sel(direction="down")
+    assert (late.periods == 1).all()
+    assert late.amplitude.values == pytest.approx(FORCE * linear_gain(grid), rel=0.02)
+    assert not data.sizes["jump"]
+
+
+def test_a_sweep_ends_where_a_margin_ends_the_motion_and_goes_back_from_there():
+    block = saltus.System(
+        model=saltus.RockingBlock(alpha=0.3),
+        load=saltus.Load(frequency=2.0, ground_horizontal=saltus.Harmonic(0.01)),
+        impact=saltus.VelocityReduction(0.8),
+    )
+    data = saltus.frequency_sweep(
+        block, np.linspace(0.02, 2.0, 12), path="load.ground_horizontal.amplitude", theta=0.0, periods=200
+    )
+    reached = np.isfinite(data.amplitude.sel(direction="up").values)
+    assert 0 < reached.sum() < 12
+    assert (np.diff(reached.astype(int)) <= 0).all()
+    assert (np.isfinite(data.amplitude.sel(direction="down").values) == reached).all()
+    assert (data.outcome.values[:, ~reached] == "").all()
+
+
+def test_a_study_asks_for_a_sweep_and_its_picture_and_summary_show_it(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text("""
+[model]
+type = "WallOscillator"
+damping = 0.1
+[load]
+frequency = 1.0
+force = { amplitude = 0.2 }
+[impact]
+type = "VelocityReduction"
+e = 0.8
+[frequency_sweep]
+values = { from = 1.02, to = 1.5, count = 25 }
+x = 0.1
+""")
+    study = load_study(path)
+    (ask,) = study.asks
+    data = study.answer(ask, ask.function)
+    lines = list(summarise(ask.kind, data))
+    assert lines[0].startswith("25 values of load.frequency up and down; they differ at")
+    assert [line.partition(":")[0] for line in lines[1:]] == ["up", "down"]
+    (axes,) = figure_of(draw_sweep(data)).axes
+    assert len(axes.texts) == 2  # an arrow for each jump
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"values": [1.0]}, "values must be two or more"),
+        ({"values": [1.2, 1.0]}, "must be numbers that rise"),
+        ({"path": "load.force"}, "not a number"),
+        ({"periods": 0}, "periods"),
+        ({"y": 0.3}, "no coordinate 'y'"),
+        ({"velocity": np.nan}, "velocity"),
+        ({"values": [-1.0, 1.0]}, "values reach beyond what the system allows"),
+    ],
+)
+def test_a_sweep_without_meaning_is_refused(change, sentence):
+    with pytest.raises(ParameterError, match=sentence):
+        saltus.frequency_sweep(oscillator(), **({"values": [1.0, 1.1], "x": 0.0} | change))
