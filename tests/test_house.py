@@ -22,6 +22,7 @@ ROOMS = sorted(path.parent.name for path in SOURCE.glob("*/__init__.py"))
 
 SHARED = {
     "errors",
+    "notebook",
     "checks",
     "files",
     "progress",
@@ -44,7 +45,7 @@ MAY_IMPORT = {
     "sweep": set(),
     "studies": {"systems", "theory", "flow", "continuation", "orbits", "attractors", "sweep"},
     "plots": set(),
-    "config": {"systems", "flow", "attractors", "studies"},
+    "config": {"systems", "flow", "attractors", "sweep", "studies"},
     "paper": {"systems", "theory", "flow", "continuation", "orbits", "attractors", "sweep", "studies", "plots"},
     "cli": {"systems", "theory", "flow", "taylor", "orbits", "attractors", "sweep", "studies", "plots", "config", "paper"},
 }

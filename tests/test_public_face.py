@@ -34,7 +34,7 @@ CELL = saltus.UnitCell(alpha0=0.3, beta0=1.4)
 SI = saltus.PhysicalCell(length=0.1, upper_mass=1.0, upper_stiffness=2.0)
 ROOMS = ("attractors", "flow", "orbits", "studies", "sweep", "systems", "theory")
 # Formulas, which are called with numbers, arrays and the symbols of the tracer alike and check nothing; and how orbits are made.
-FORMULAS = (saltus.Model, saltus.Harmonic, saltus.Record, saltus.Contact, saltus.systems.ImpactLaw)
+FORMULAS = (saltus.Model, saltus.Harmonic, saltus.Record, saltus.systems.Pulse, saltus.Contact, saltus.systems.ImpactLaw)
 MADE_INSIDE = ("PeriodicOrbit.known", "PeriodicOrbit.near", "ParameterError.inside")
 
 VALUES = (
@@ -83,10 +83,17 @@ def good(made):
         "saltus.doubling_cascade": {"first": fold, "bounds": (0.8, 1.1)},
         "saltus.excludes_tori": {"system": SYSTEM},
         "saltus.find_attractors": {"system": SYSTEM},
+        "saltus.frequency_sweep": {"system": SYSTEM, "values": [1.0, 1.1], "theta": 0.3},
         "saltus.find_orbit": one,
+        "saltus.load": {"path": "/nowhere/result.nc"},
+        "saltus.to_mat": {"path": "motion", "result": made["motion"]},
+        "saltus.show_progress": {"fraction": 0.5, "what": "motions"},
         "saltus.load_study": {"path": "/nowhere/study.toml"},
         "saltus.lyapunov_many": one,
         "saltus.lyapunov_spectrum": one,
+        "saltus.mean_dissipated_power": {"of": made["motion"]},
+        "saltus.transmissibility": {"of": made["motion"], "channel": "horizontal"},
+        "saltus.plot": {"result": made["motion"]},
         "saltus.phase_portrait": {"system": UNFORCED},
         "saltus.register": {"cls": saltus.Metainterface},
         "saltus.response_spectrum": {"system": SYSTEM},
@@ -105,8 +112,10 @@ def good(made):
         "attractors.unstable_manifold": {"orbit": saddle},
         "attractors.wada": {"labels": labels},
         "flow.load_releases": {"system": SYSTEM},
-        "flow.stop_names": {"dataset": made["many"]},
+        "saltus.stop_names": {"dataset": made["many"]},
         "flow.stroboscopic": {"system": SYSTEM, "dataset": made["many"]},
+        "saltus.backbone": {"system": UNFORCED, "amplitudes": [0.1, 0.2]},
+        "saltus.free_orbit": {"system": UNFORCED, "amplitude": 0.1},
         "orbits.defects": {"orbits": [orbit]},
         "orbits.is_symmetric": {"system": SYSTEM},
         "orbits.orbits_of": {"dataset": branch.to_xarray()},
@@ -172,18 +181,25 @@ def good(made):
         "Branch.is_joined": (branch.is_joined, {"before": 0}),
         "Branch.solved_at": (branch.solved_at, {"value": 1.0}),
         "Branch.solved_between": (branch.solved_between, {"before": 0, "value": 0.81}),
+        "Chirp": (saltus.Chirp, {"amplitude": 0.1, "frequency": 1.0, "end_frequency": 2.0, "duration": 3.0}),
         "Contact": (saltus.Contact, contact),
         "EnergyRestitution": (saltus.EnergyRestitution, {"r": 0.9}),
+        "HalfSine": (saltus.HalfSine, {"amplitude": 0.1, "frequency": 1.0}),
         "Harmonic": (saltus.Harmonic, {"amplitude": 0.1}),
         "Load": (saltus.Load, {"frequency": 1.0, "horizontal": 0.1}),
         "ImpactPair": (saltus.ImpactPair, {}),
+        "MavroeidisPapageorgiou": (saltus.MavroeidisPapageorgiou, {"amplitude": 0.1, "frequency": 1.0, "gamma": 2.0}),
         "Metainterface": (model, {"beta0": 1.4}),
         "Metainterface.margin_kind": (SYSTEM.model.margin_kind, {"margin": "line_limit"}),
         "Metainterface.unit_of": (SYSTEM.model.unit_of, {"coordinate": "theta"}),
         "Motion.at": (made["motion"].at, {"times": 1.0}),
+        "Motion.samples": (made["motion"].samples, {"count": 10}),
+        "Motion.to_pandas": (made["motion"].to_pandas, {}),
         "Motion.to_xarray": (made["motion"].to_xarray, {}),
         "NewtonImpact": (saltus.NewtonImpact, {}),
         "Motion.closed_at": (made["motion"].closed_at, {"time": 1.0}),
+        "OneCosine": (saltus.OneCosine, {"amplitude": 0.1, "frequency": 1.0}),
+        "OneSine": (saltus.OneSine, {"amplitude": 0.1, "frequency": 1.0}),
         "PeriodicOrbit.defect_after": (orbit.defect_after, {"rounds": 1}),
         "PeriodicOrbit.motion": (orbit.motion, {}),
         "PhysicalCell": (saltus.PhysicalCell, cell_data),
@@ -192,6 +208,8 @@ def good(made):
         "PhysicalCell.load_in_si": (SI.load_in_si, {"load": SYSTEM.load}),
         "PhysicalCell.metainterface": (SI.metainterface, {"beta0": 1.4}),
         "PhysicalCell.two_layer": (SI.two_layer, {"beta0": 1.4}),
+        "Ramp": (saltus.Ramp, {"amplitude": 0.1, "duration": 1.0}),
+        "Ricker": (saltus.Ricker, {"amplitude": 0.1, "frequency": 1.0}),
         "Record": (saltus.Record, {"time": [0.0, 1.0], "value": [0.0, 1.0]}),
         "RockingBlock": (saltus.RockingBlock, {"alpha": 0.3}),
         "SpecialCurve.at": (curve.at, {"path": "load.vertical", "value": -0.5}),
@@ -273,7 +291,14 @@ def test_arguments_that_fit_are_taken(made, alone):
 
 # A study or a store that is nowhere, an empty tree, a fold where only a period doubling begins something: what is wrong with
 # another argument is told first.
-REFUSED = ("saltus.branch_of", "saltus.doubling_cascade", "saltus.switch_branch", "saltus.load_study", "sweep.open_store")
+REFUSED = (
+    "saltus.branch_of",
+    "saltus.doubling_cascade",
+    "saltus.switch_branch",
+    "saltus.load",
+    "saltus.load_study",
+    "sweep.open_store",
+)
 REFUSED += ("sweep.status",)
 
 

@@ -6,13 +6,24 @@ arguments have been checked and computing begins.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+
+from saltus.checks import check_number
 
 Progress = Callable[[float, str], object]
 
 
 def silent(fraction: float, what: str) -> None:
     """The progress of work that nobody watches."""
+
+
+def show_progress(fraction: float, what: str) -> None:
+    """The progress of work in one line on stderr, written over itself: for terminals and notebooks, `progress=show_progress`."""
+    check_number("fraction", fraction)
+    bar = "#" * round(20 * min(max(fraction, 0.0), 1.0))
+    done = fraction >= 1.0
+    print(f"\r[{bar:<20}] {100 * fraction:3.0f} % {what:<40.40}", end="\n" if done else "", file=sys.stderr, flush=True)
 
 
 def part_of(progress: Progress, begin: float, end: float, what: str | None = None) -> Progress:

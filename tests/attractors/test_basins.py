@@ -15,6 +15,7 @@ from saltus.attractors.basins.basin_cells import cell_arguments, cells
 from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.find import Attractors, find_attractors
 from saltus.errors import ParameterError
+from saltus.plots import figure_of
 from saltus.plots.basins import draw_basins
 
 SYSTEM = forced(W=0.88)
@@ -145,7 +146,7 @@ def test_attractors_of_another_system_are_refused(found: Attractors) -> None:
 
 
 def test_the_picture_shows_each_basin_in_its_own_lightness(picture: xarray.Dataset) -> None:
-    figure = draw_basins(picture, [np.array([[-2.0, 0.0], [2.0, 0.5]])])
+    figure = figure_of(draw_basins(picture, [np.array([[-2.0, 0.0], [2.0, 0.5]])]))
     (ax,) = figure.axes
     mesh = ax.collections[0]
     shown = np.unique(np.asarray(mesh.get_array()).ravel())

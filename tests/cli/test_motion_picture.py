@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import saltus
+from saltus.plots import figure_of
 from saltus.plots.motion import arcs, coordinates, draw_motion
 
 
@@ -32,7 +33,7 @@ def test_the_coordinates_are_told_from_their_velocities():
     layers = saltus.System(model=saltus.TwoLayer(beta0=1.4), load=saltus.Load(vertical=0.5))
     motion = saltus.simulate(layers, theta_1=0.1, theta_2=-0.1, velocity=(0.0, 0.0), duration=0.1)
     assert coordinates(motion.to_xarray()) == ["theta_1", "theta_2"]
-    figure = draw_motion(motion.to_xarray())
+    figure = figure_of(draw_motion(motion.to_xarray()))
     assert len(figure.legends[0].get_texts()) == 2
     portrait = figure.axes[1]
     assert portrait.get_ylabel().count("dot") == 2
@@ -44,7 +45,7 @@ def test_the_last_forcing_period_is_drawn_on_top():
         load=saltus.Load(frequency=2.0, horizontal=saltus.Harmonic(amplitude=0.5), vertical=-0.5),
     )
     motion = saltus.simulate(system, theta=0.3, periods=5)
-    portrait = draw_motion(motion.to_xarray()).axes[1]
+    portrait = figure_of(draw_motion(motion.to_xarray())).axes[1]
     lines = [line for line in portrait.lines if len(line.get_xdata()) > 100]
     whole, last = sorted(lines, key=lambda line: line.get_zorder())
     assert len(whole.get_xdata()) > 4.5 * len(last.get_xdata())
@@ -55,7 +56,7 @@ def test_the_last_forcing_period_is_drawn_on_top():
 def test_limits_are_drawn_where_they_are_reached():
     system = saltus.System(model=saltus.Metainterface(beta0=math.radians(80)), load=saltus.Load(horizontal=5.0))
     motion = saltus.simulate(system, theta=0.1, duration=6.0, stop_at=["kinematic_limit"])
-    history = draw_motion(motion.to_xarray()).axes[0]
+    history = figure_of(draw_motion(motion.to_xarray())).axes[0]
     levels = {round(line.get_ydata()[0], 12) for line in history.lines if len(line.get_ydata()) == 2}
     assert round(math.radians(100), 12) in levels
 
@@ -69,7 +70,7 @@ def test_every_coordinate_of_a_chain_is_drawn_with_a_line_of_its_own():
     model = saltus.FourCells(beta0=1.4, mass_ratio=0.2)
     system = saltus.System(model=model, load=saltus.Load(frequency=1.0, vertical=-0.5))
     start = dict.fromkeys(model.coordinates, 0.0) | {"lower_1": 0.2}
-    figure = draw_motion(saltus.simulate(system, **start, velocity=(0.0,) * 8, periods=2).to_xarray())
+    figure = figure_of(draw_motion(saltus.simulate(system, **start, velocity=(0.0,) * 8, periods=2).to_xarray()))
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [
         rf"$\mathrm{{{name.replace('_', chr(92) + '_')}}}$" for name in model.coordinates
     ]

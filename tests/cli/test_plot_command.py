@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray
 
-from saltus.cli.plot_command import open_result
+from saltus.config import open_result
 from saltus.sweep import Plan, Variable, run
 from saltus.sweep import store_files as files
 
@@ -136,6 +136,6 @@ def test_sweeps_that_have_no_picture_are_told(refused, tmp_path):
     files.chunk_file(tmp_path / "half.zarr", "c", (1,), 0).unlink()
     assert "half.zarr has 1 of 2 chunks; run the sweep again to complete it" in refused("plot", tmp_path / "half.zarr")
     run(plan("basin_cells"), tmp_path / "basins.zarr")
-    assert "plot basins.nc beside it" in refused("plot", tmp_path / "basins.zarr")
+    assert "read basins.nc beside it" in refused("plot", tmp_path / "basins.zarr")
     run(plan("squares"), tmp_path / "mine.zarr")
     assert "its kind is 'squares'" in refused("plot", tmp_path / "mine.zarr")

@@ -12,7 +12,7 @@ import xarray
 
 from saltus.attractors import basins_of_attraction
 from saltus.config import load_study
-from saltus.plots import draw_stability_chart
+from saltus.plots import draw_stability_chart, figure_of
 from saltus.studies import stability_chart
 from saltus.sweep import open_store, status
 from saltus.sweep.cluster import ClusterSettings
@@ -111,7 +111,7 @@ def test_a_chart_of_lengths_has_no_radians(saltus, study, tmp_path):
     )
     result = saltus("run", path, "-o", tmp_path / "out", "--no-plot")
     assert re.search(r"in 4 of 4 cells, the largest amplitude is [\d.]+\d\.\n", result.stdout)
-    bar = draw_stability_chart(open_store(tmp_path / "out" / "stability_chart.zarr")).axes[-1]
+    bar = figure_of(draw_stability_chart(open_store(tmp_path / "out" / "stability_chart.zarr"))).axes[-1]
     assert bar.get_ylabel() == r"largest amplitude $\max_\tau|x|$"
 
 

@@ -55,7 +55,7 @@ def test_motion_that_ends_at_an_impact_ends_after_it():
     assert len(motion.impacts) == 1
     assert kept.at(kept.time) == (kept.x, kept.velocity)
     assert kept.x == pytest.approx(1.0, abs=1e-14)
-    assert (motion.samples.velocity[0, -1], kept.velocity) == pytest.approx([impact.velocity_after[0]] * 2, abs=1e-13)
+    assert (motion.kept.velocity[0, -1], kept.velocity) == pytest.approx([impact.velocity_after[0]] * 2, abs=1e-13)
 
 
 def test_states_take_the_shape_of_the_times(motion):
@@ -88,7 +88,7 @@ def test_motion_that_was_not_kept_says_so():
     assert (thrown.theta, thrown.velocity) == (kept.theta, kept.velocity)
     assert np.array_equal(thrown.impacts.time, kept.impacts.time)
     for use in (lambda: thrown.at(1.0), lambda: thrown.to_xarray()):
-        with pytest.raises(ParameterError, match="only its end, its events and its `samples` are known"):
+        with pytest.raises(ParameterError, match="only its end, its events and what it `kept` are known"):
             use()
     with pytest.raises(ParameterError, match="a motion computed with dense=False has no validity"):
         _ = thrown.validity
@@ -96,7 +96,7 @@ def test_motion_that_was_not_kept_says_so():
 
 def test_samples_are_the_states_of_the_whole_motion(motion):
     times = np.concatenate([[0.0], motion.impacts.time[:2], np.linspace(3.0, motion.time, 50), [motion.time + 1.0]])
-    sampled = simulate(SYSTEM, theta=0.3, periods=3, samples=np.sort(times)).samples
+    sampled = simulate(SYSTEM, theta=0.3, periods=3, samples=np.sort(times)).kept
     inside = np.sort(times)[:-1]
     assert sampled.time == pytest.approx(inside, abs=0)
     assert np.stack([sampled.position[0], sampled.velocity[0]]) == pytest.approx(np.stack(motion.at(inside)), abs=1e-15)
@@ -107,8 +107,8 @@ def test_samples_are_the_states_of_the_whole_motion(motion):
 def test_samples_include_the_start_and_the_end(start, duration):
     end = start + duration
     motion = simulate(SYSTEM, theta=0.3, velocity=0.1, time=start, duration=duration, samples=[start, end])
-    assert motion.samples.position[0] == pytest.approx([0.3, motion.theta], abs=1e-14)
-    assert motion.samples.velocity[0] == pytest.approx([0.1, motion.velocity], abs=1e-14)
+    assert motion.kept.position[0] == pytest.approx([0.3, motion.theta], abs=1e-14)
+    assert motion.kept.velocity[0] == pytest.approx([0.1, motion.velocity], abs=1e-14)
 
 
 def test_motion_of_no_length_is_its_start():

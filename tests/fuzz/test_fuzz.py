@@ -120,7 +120,7 @@ def results(tmp_path_factory):
 @pytest.mark.parametrize("count", [100, pytest.param(THOROUGH // 4, marks=pytest.mark.thorough)])
 def test_damaged_results(results, tmp_path, count):
     """A file of a store or a netCDF file is damaged: `status` and `plot` say so, or what is read is as it was."""
-    from saltus.cli.plot_command import open_result
+    from saltus.config import open_result
     from saltus.sweep import status
 
     rng = random.Random(4)

@@ -15,6 +15,7 @@ from saltus.orbits import find_orbit, follow_stable, search_orbits
 from saltus.paper import FIGURES, ClaimVerdict
 from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.measures import chart_areas, chart_measures
+from saltus.plots import figure_of
 from saltus.plots.chart import draw_stability_chart
 from saltus.theory import high_frequency_onset, is_monostable, quasi_static_border, unloaded_fold
 
@@ -109,11 +110,11 @@ def test_statements_on_parameters_compare_charts_of_the_same_cells():
 
 def test_a_chart_on_its_own_is_drawn_whole():
     chart = data()["d/chart"].to_dataset()
-    assert clipped(draw_stability_chart(chart)) == []
+    assert clipped(figure_of(draw_stability_chart(chart))) == []
     single = chart.isel(vertical=[3])
-    assert clipped(draw_stability_chart(single)) == []
+    assert clipped(figure_of(draw_stability_chart(single))) == []
     empty = chart.where(chart["horizontal"] < -1).fillna(0).assign(amplitude=chart["amplitude"] * np.nan)
-    assert clipped(draw_stability_chart(empty)) == []
+    assert clipped(figure_of(draw_stability_chart(empty))) == []
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import xarray
 from matplotlib.colors import same_color
 
 from saltus.branch_tables import branch_tables
+from saltus.plots import figure_of
 from saltus.plots.attractors import draw_attractors
 from saltus.plots.conventions import LIMIT, STABLE, UNSTABLE
 from saltus.plots.diagram import draw_diagram
@@ -37,7 +38,7 @@ def marks(figure, face):
 
 
 def test_stable_equilibria_are_filled_and_unstable_ones_open():
-    data, figure = portrait(), draw_plane(portrait())
+    data, figure = portrait(), figure_of(draw_plane(portrait()))
     stable = data["stable"].values
     np.testing.assert_array_equal(marks(figure, STABLE), data["equilibrium"].values[stable])
     np.testing.assert_array_equal(marks(figure, "white"), data["equilibrium"].values[~stable])
@@ -51,7 +52,7 @@ def test_stable_equilibria_are_filled_and_unstable_ones_open():
 
 def test_motions_that_were_spread_stay_apart():
     """No two of them run on beside one another: few of their points are as near to another motion as lines are wide."""
-    figure = draw_plane(portrait())
+    figure = figure_of(draw_plane(portrait()))
     lines = [np.stack(line.get_data(), axis=1) / [5.0, 3.0] for line in drawn(figure, STABLE)]
     assert 8 < len(lines) <= portrait().sizes["motion"]
     near = 0
@@ -65,7 +66,7 @@ def test_motions_that_were_spread_stay_apart():
 
 def test_given_motions_are_drawn_whole():
     data = portrait(starts=((0.3, 0.0), (0.301, 0.0)))
-    lines = drawn(draw_plane(data), STABLE)
+    lines = drawn(figure_of(draw_plane(data)), STABLE)
     assert len(lines) == 2
     for line, theta in zip(lines, data["theta"].values, strict=True):
         np.testing.assert_array_equal(line.get_xdata(), theta)
@@ -73,7 +74,7 @@ def test_given_motions_are_drawn_whole():
 
 def test_a_closed_motion_is_drawn_closed():
     system = System(model=Metainterface(beta0=np.deg2rad(80)), load=Load(vertical=-1.5))
-    figure = draw_plane(phase_portrait(system, window=((-2.5, 2.5), (-1.5, 1.5)), duration=30.0))
+    figure = figure_of(draw_plane(phase_portrait(system, window=((-2.5, 2.5), (-1.5, 1.5)), duration=30.0)))
     closed = 0
     for line in drawn(figure, STABLE):
         points = np.stack(line.get_data(), axis=1) / [5.0, 3.0]
@@ -85,7 +86,7 @@ def test_a_closed_motion_is_drawn_closed():
 
 def test_arrows_point_along_the_motion():
     """To the right above the axis and to the left below it: velocity is the rate of the coordinate."""
-    figure = draw_plane(portrait())
+    figure = figure_of(draw_plane(portrait()))
     arrows = figure.axes[0].texts
     assert len(arrows) > 10
     for arrow in arrows:
@@ -133,19 +134,19 @@ def diagram(amplitudes=(0.5, 1.0), limits=(1.74, 3.48), parameters=(0.5, 1.0)):
 
 @pytest.mark.parametrize(("limits", "top", "number"), [((1.74, 3.48), 1.0, 0), ((0.74, 1.48), 1.0, 1), ((0.74, 1.48), 2.0, 2)])
 def test_the_limits_of_the_mechanism_are_drawn_where_they_are_reached(limits, top, number):
-    figure = draw_diagram(diagram((0.5, top), limits))
+    figure = figure_of(draw_diagram(diagram((0.5, top), limits)))
     places = sorted({float(line.get_ydata()[0]) for line in drawn(figure, LIMIT)})
     np.testing.assert_allclose(places, limits[:number])
 
 
 def test_no_limit_is_drawn_where_there_is_none_or_it_varies():
-    assert not drawn(draw_diagram(diagram((0.5, 3.0), ())), LIMIT)
+    assert not drawn(figure_of(draw_diagram(diagram((0.5, 3.0), ()))), LIMIT)
 
 
 def test_a_diagram_of_nothing_but_rest_is_drawn():
     tree = diagram(())
     tree["stroboscopic"]["peak"][:] = 0.0
-    figure = draw_diagram(tree)
+    figure = figure_of(draw_diagram(tree))
     low, high = figure.axes[0].get_ylim()
     assert low <= 0.0 < high
     assert not len(figure.axes[1].lines[0].get_xdata())
@@ -153,11 +154,11 @@ def test_a_diagram_of_nothing_but_rest_is_drawn():
 
 def test_branches_beyond_the_bounds_do_not_set_the_scale():
     tree = diagram((0.5, 1.0, 40.0, 50.0), parameters=(0.5, 1.0, 2.0, 3.0))
-    assert draw_diagram(tree).axes[0].get_ylim()[1] == pytest.approx(1.08)
+    assert figure_of(draw_diagram(tree)).axes[0].get_ylim()[1] == pytest.approx(1.08)
 
 
 def test_stroboscopic_points_of_motions_stand_at_their_values():
-    points = draw_diagram(diagram()).axes[1].lines[0]
+    points = figure_of(draw_diagram(diagram())).axes[1].lines[0]
     np.testing.assert_allclose(np.unique(points.get_xdata()), [0.6, 0.9])
     np.testing.assert_allclose(points.get_ydata(), 0.3)
 
@@ -182,20 +183,20 @@ def found(load="periodic", undecided=0.25):
 
 
 def test_attractors_are_named_with_their_shares_and_errors():
-    figure = draw_attractors(found())
+    figure = figure_of(draw_attractors(found()))
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert texts == ["0: rest, 25.0 ± 21.7 %", "1: period 2, 50.0 ± 25.0 %", "undecided, 25 %"]
     assert "phase 0" in figure.axes[0].get_xlabel()
 
 
 def test_under_a_constant_load_there_are_equilibria_and_no_phases():
-    figure = draw_attractors(found("constant"))
+    figure = figure_of(draw_attractors(found("constant")))
     assert figure.legends[0].get_texts()[1].get_text().startswith("1: equilibrium")
     assert "phase" not in figure.axes[0].get_xlabel()
 
 
 def test_starts_have_the_colour_of_the_attractor_that_they_lead_to():
-    lines = figure_lines = draw_attractors(found()).axes[0].lines
+    lines = figure_lines = figure_of(draw_attractors(found())).axes[0].lines
     cycle = next(line for line in lines if list(line.get_xdata()) == [0.5, -0.5])
     starts = next(line for line in figure_lines if list(line.get_xdata()) == [0.2, 0.3])
     assert same_color(cycle.get_markerfacecolor(), starts.get_markerfacecolor())

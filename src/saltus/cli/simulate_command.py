@@ -57,9 +57,9 @@ def write_motion(motion: Motion, study: Study, output: Path, plot: bool) -> list
     dataset.attrs["study"] = study.source.path.name
     files = [write_dataset(output / "motion.nc", dataset)]
     if plot:
-        from saltus.plots import draw_motion, style
+        from saltus.plots import draw_motion, figure_of, style
 
-        figure = draw_motion(dataset)
+        figure = figure_of(draw_motion(dataset))
         with style():
             files += write_figure(output / "motion", figure)
     return files
@@ -83,6 +83,6 @@ def sample_times(motion: Motion, samples: int | None) -> Any:
 
     period = motion.system.load.period
     short = period is None or SETTINGS.per_period * (motion.time - motion.start) / period <= SETTINGS.max_samples
-    if motion.samples is not None or (samples is None and short):
+    if motion.kept is not None or (samples is None and short):
         return None
     return np.linspace(motion.start, motion.time, SETTINGS.max_samples if samples is None else samples)

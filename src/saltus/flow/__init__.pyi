@@ -11,6 +11,7 @@ from .kernel_layout import STRUCTURE_SIZES, Where
 from .load_release import Release, contact_pull, load_releases, peak_near
 from .memory_layout import EventCode
 from .motion import DenseOutput, Event, EventKind, Impacts, Motion
+from .motion_dataset import rate_name
 from .recurrence import (
     RECURRENCE,
     Outcome,
@@ -74,6 +75,7 @@ __all__ = [
     "nearest_return",
     "peak_near",
     "program",
+    "rate_name",
     "read_inputs",
     "return_distances",
     "return_period",

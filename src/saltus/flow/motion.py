@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
 
-from saltus.checks import instants
+from saltus.checks import check_count, instants
 from saltus.errors import ParameterError
 from saltus.flow.dense_output import DenseOutput
 from saltus.flow.stops import Stop
 from saltus.flow.validity import Validity, ValidityCheck
+from saltus.notebook import html_table
 from saltus.public_functions import Numbers, answering
 from saltus.systems import System
 
 if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
     import xarray
 
 
@@ -115,7 +117,7 @@ class Samples:
     side: np.ndarray
 
 
-@answering("at", "closed_at", "to_xarray")
+@answering("at", "closed_at", "samples", "to_pandas", "to_xarray")
 @dataclass(frozen=True, eq=False)
 class Motion:
     """An exact motion of a system.
@@ -138,7 +140,7 @@ class Motion:
     events: MotionEvents
     impacts: Impacts
     dense: DenseOutput | None
-    samples: Samples | None
+    kept: Samples | None  # at the times that `simulate(samples=...)` was given
     sampled_validity: Validity | None
 
     def __getattr__(self, name: str) -> Any:
@@ -193,7 +195,7 @@ class Motion:
     def _states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if self.dense is None and self.time > self.start:
             raise ParameterError(
-                "this motion was not kept densely: only its end, its events and its `samples` are known", "times"
+                "this motion was not kept densely: only its end, its events and what it `kept` are known", "times"
             )
         slack = 1e-12 * max(1.0, abs(self.time))
         if times.size and not (times.min() >= self.start - slack and times.max() <= self.time + slack):
@@ -223,6 +225,27 @@ class Motion:
         if self.dense is not None:
             check.add(self.dense)
         return check.result(self.time - self.start)
+
+    def samples(self, count: int) -> Samples:
+        """So many states, evenly over the motion, its start and its end among them.
+
+        Raises:
+            ParameterError: fewer than 2; a motion computed with dense=False.
+        """
+        check_count("count", count, 2)
+        times = np.linspace(self.start, self.time, int(count))
+        return Samples(times, *self._states(times))
+
+    def to_pandas(self, times: Numbers | None = None) -> pandas.DataFrame:
+        """Coordinates, velocities and the side over the index `time`, at the times of `to_xarray`."""
+        data = self.to_xarray(times)
+        return data.drop_vars([name for name in data.data_vars if "time" not in data[name].dims]).to_dataframe()
+
+    def _repr_html_(self) -> str:
+        names = self.system.model.coordinates
+        state = dict(zip(names, np.atleast_1d(self.position).tolist(), strict=True))
+        facts = {"time": self.time, **state, "velocity": self.velocity, "impacts": len(self.impacts), "stop": self.stop.meaning}
+        return html_table(f"Motion of {type(self.system.model).__name__}", facts | ({"margin": self.limit} if self.limit else {}))
 
     def to_xarray(self, times: Numbers | None = None) -> xarray.Dataset:
         """The motion as a dataset with units and provenance; by default its samples, or 200 a forcing period, or 2000 in all."""

@@ -22,8 +22,8 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
     import xarray
 
     period = motion.system.load.period
-    if times is None and motion.samples is not None:
-        times, position, velocity, side = (getattr(motion.samples, n) for n in ("time", "position", "velocity", "side"))
+    if times is None and motion.kept is not None:
+        times, position, velocity, side = (getattr(motion.kept, n) for n in ("time", "position", "velocity", "side"))
     else:
         times = _default_times(motion, period) if times is None else instants(times)
         position, velocity, side = motion._states(times)

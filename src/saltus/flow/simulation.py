@@ -180,6 +180,6 @@ def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Re
         events=events,
         impacts=events.impacts(),
         dense=recorder.dense(),
-        samples=samples,
+        kept=samples,
         sampled_validity=None if samples is None else recorder.validity(time - start),
     )

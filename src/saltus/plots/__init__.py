@@ -1,6 +1,8 @@
 """How it looks: one module per kind of picture, drawn from datasets only, in the conventions of `style`.
 
-Nothing here computes a motion. Every function returns a matplotlib Figure or marks an Axes, and needs no display.
+Nothing here computes a motion, and nothing needs a display. A function for a whole result draws into `ax`, or, where it has
+several panels, into `figure`; without one it makes a figure of its own, and it returns the axes. A function for a part of a
+picture marks the axes that it is given first.
 """
 
 from saltus._front_door import front_door

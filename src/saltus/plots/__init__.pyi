@@ -1,4 +1,6 @@
+from .any_result import DRAWINGS, plot
 from .attractors import draw_attractors
+from .backbone import draw_backbone
 from .basins import draw_basins
 from .chart import chart_legend, data_is_tree, draw_chart, draw_closed_form, draw_lines, draw_stability_chart
 from .conventions import (
@@ -10,13 +12,16 @@ from .conventions import (
     STABLE_LINE,
     UNSTABLE,
     UNSTABLE_LINE,
+    figure_of,
     new_figure,
     panel_label,
     style,
     styled,
 )
+from .curves import draw_attractors_along, draw_branch, draw_special_curve
 from .diagram import POINTS, draw_diagram
 from .energy_space import draw_space
+from .ensembles import draw_ensemble
 from .impact_approach import draw_history, draw_phase
 from .loading_paths import draw_domain, draw_path
 from .motion import draw_motion
@@ -38,11 +43,13 @@ from .response import (
     response_legend,
 )
 from .rocking import draw_errors, draw_jump, draw_periods
+from .sweep import draw_sweep
 from .time_histories import draw_histories
 from .unit_cell import draw_cell, draw_frames, label_deformed, label_heights, label_undeformed
 
 __all__ = [
     "DOUBLE_COLUMN",
+    "DRAWINGS",
     "FAINT",
     "INK",
     "POINTS",
@@ -54,9 +61,12 @@ __all__ = [
     "chart_legend",
     "data_is_tree",
     "draw_attractors",
+    "draw_attractors_along",
+    "draw_backbone",
     "draw_bands",
     "draw_basins",
     "draw_beside",
+    "draw_branch",
     "draw_branches",
     "draw_cell",
     "draw_chart",
@@ -64,6 +74,7 @@ __all__ = [
     "draw_critical",
     "draw_diagram",
     "draw_domain",
+    "draw_ensemble",
     "draw_errors",
     "draw_family",
     "draw_frames",
@@ -81,8 +92,11 @@ __all__ = [
     "draw_response",
     "draw_space",
     "draw_special",
+    "draw_special_curve",
     "draw_stability_chart",
+    "draw_sweep",
     "draw_zoom",
+    "figure_of",
     "highest",
     "label_deformed",
     "label_heights",
@@ -91,6 +105,7 @@ __all__ = [
     "new_figure",
     "note_missed",
     "panel_label",
+    "plot",
     "response_legend",
     "style",
     "styled",

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from saltus.plots.conventions import INK, shades
+from saltus.plots.conventions import INK, legend_of, shades
 
 UNDECIDED_COLOUR = "#ffffff"
 AT_REST = "#dddddd"  # lighter than every colour of a moving attractor
@@ -37,7 +36,7 @@ def steady(dataset: Any) -> bool:
 
 
 def attractor_legend(
-    figure: Figure, dataset: Any, colours: dict[int, Any], share: Callable[[int], str], undecided: tuple[str, str] | None
+    ax: Any, own: bool, dataset: Any, colours: dict[int, Any], share: Callable[[int], str], undecided: tuple[str, str] | None
 ) -> None:
     """What each colour and mark stands for, with `share(i)` of attractor i, and the mark and share of what is undecided."""
     handles = []
@@ -46,7 +45,7 @@ def attractor_legend(
         handles.append(_handle(MARKERS[i % len(MARKERS)], colour, text))
     if undecided is not None:
         handles.append(_handle(undecided[0], UNDECIDED_COLOUR, f"undecided, {undecided[1]}"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.2, handletextpad=0.4)
+    legend_of(ax, own, handles, ncols=2, columnspacing=1.2, handletextpad=0.4)
 
 
 def _kind(dataset: Any, i: int) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 from matplotlib.patheffects import Normal, Stroke
 
 from saltus.plots.attractor_marks import UNDECIDED_COLOUR, attractor_colours, attractor_legend, draw_points, steady
@@ -24,12 +24,11 @@ HALO = [Stroke(linewidth=2.2, foreground="white"), Normal()]  # so that an attra
 
 
 @styled
-def draw_attractors(dataset: Any, width: float = 1.3 * SINGLE_COLUMN) -> Figure:
-    """A Figure from the dataset of attractors that were searched: a dot for each start, a mark for each point at phase 0."""
+def draw_attractors(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
+    """Draw the dataset of attractors that were searched: a dot for each start, a mark for each point at phase 0; returns `ax`."""
     name = next(str(v).removeprefix("section_") for v in dataset if str(v).startswith("section_") and v != "section_velocity")
     colours = attractor_colours([int(n) for n in dataset["attractor"].values])
-    figure = new_figure(width, 0.82 * width + 4.2 * (len(colours) + 1) // 2)
-    ax = figure.subplots()
+    own, ax = ax is None, new_figure(width, 0.82 * width + 4.2 * (len(colours) + 1) // 2).subplots() if ax is None else ax
     ends = dataset["end"].values
     for n, colour in {**colours, -1: UNDECIDED_COLOUR}.items():
         here = ends == n
@@ -40,8 +39,8 @@ def draw_attractors(dataset: Any, width: float = 1.3 * SINGLE_COLUMN) -> Figure:
     ax.set_xlabel(rf"${symbol(name)}${when}{unit_in_brackets(dataset[f'start_{name}'])}")
     ax.set_ylabel(rf"$\dot{{{symbol(name)}}}${when}")
     undecided = ("o", f"{100 * float(dataset.attrs['undecided']):.3g} %") if (ends == -1).any() else None
-    attractor_legend(figure, dataset, colours, lambda i: _share(dataset, i), undecided)
-    return figure
+    attractor_legend(ax, own, dataset, colours, lambda i: _share(dataset, i), undecided)
+    return ax
 
 
 def _share(dataset: Any, i: int) -> str:

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
-from matplotlib.figure import Figure
 from matplotlib.patheffects import Normal, Stroke
 
 from saltus.plots.attractor_marks import MOST_NAMED, UNDECIDED_COLOUR, attractor_colours, attractor_legend, draw_points, steady
@@ -20,8 +20,8 @@ HALO = [Stroke(linewidth=1.7, foreground="white", alpha=0.8), Normal()]  # so th
 
 
 @styled
-def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), width: float = SINGLE_COLUMN) -> Figure:
-    """A Figure from a dataset of basins, such as `saltus.attractors.basins_of_attraction` gives.
+def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+    """Draw a dataset of basins, such as `saltus.attractors.basins_of_attraction` gives.
 
     Rest is light grey, the other attractors go from dark to light by their labels, undecided cells are white; each attractor
     is marked at phase 0 of the load, one that does not repeat by some of its points.
@@ -30,16 +30,19 @@ def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), width: float = SING
         dataset: the labels of the cells, and the attractors.
         manifolds: arrays (n, 2) of coordinate and velocity, nan where they are interrupted, such as
             `stable_manifold(orbit).states`, to be drawn besides the dataset's own.
-        width: of the figure, mm.
+        ax: the axes to draw into; by default those of a figure of its own.
+        width: of that figure, mm.
+
+    Returns:
+        The axes.
     """
     name = next(str(dim) for dim in dataset["label"].dims if dim != "velocity")
     colours, left = attractor_colours([int(n) for n in dataset["attractor"].values]), float(dataset.attrs.get("undecided", 0.0))
     rows = -(-min(len(colours), MOST_NAMED) // 2)
-    figure = new_figure(width, 0.86 * width + 4.2 * (rows + bool(left)))
-    ax = figure.subplots()
+    own, ax = ax is None, new_figure(width, 0.86 * width + 4.2 * (rows + bool(left))).subplots() if ax is None else ax
     _paint(ax, dataset, name, colours)
-    own = [np.stack([dataset[f"boundary_{name}"], dataset["boundary_velocity"]], 1)] if "boundary_velocity" in dataset else []
-    for states in (*own, *manifolds):
+    curves = [np.stack([dataset[f"boundary_{name}"], dataset["boundary_velocity"]], 1)] if "boundary_velocity" in dataset else []
+    for states in (*curves, *manifolds):
         ax.plot(*np.asarray(states, dtype=float).T, path_effects=HALO, **BOUNDARY)
     for i in range(len(colours)):
         draw_points(ax, dataset, name, i)
@@ -47,8 +50,8 @@ def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), width: float = SING
     ax.set_xlabel(rf"${symbol(name)}${when}{unit_in_brackets(dataset[name])}")
     ax.set_ylabel(rf"$\dot{{{symbol(name)}}}${when}")
     share, undecided = dataset["cells"].values, ("s", _percent(left)) if left else None
-    attractor_legend(figure, dataset, colours, lambda i: f", {_percent(float(share[i]))}", undecided)
-    return figure
+    attractor_legend(ax, own, dataset, colours, lambda i: f", {_percent(float(share[i]))}", undecided)
+    return ax
 
 
 def _paint(ax: Any, dataset: Any, name: str, colours: dict[int, Any]) -> None:

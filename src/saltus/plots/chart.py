@@ -7,6 +7,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -14,7 +15,7 @@ from matplotlib.patheffects import Normal, Stroke
 
 from saltus.branch_lines import border_curves
 from saltus.plots.axis_names import parameter_name, symbol, unit_in_brackets
-from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, new_figure, styled
+from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, legend_of, new_figure, outside_legend, styled
 from saltus.plots.marks import cell_edges
 
 COLOURS = "viridis_r"  # large amplitudes dark, beside the white of rest small ones light
@@ -43,26 +44,25 @@ CLOSED_FORM: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "white
 
 
 @styled
-def draw_stability_chart(data: Any) -> Any:
-    """A chart as it is stored, or a tree of one with its borders, with its scale and what its marks mean."""
+def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
+    """Draw a chart as it is stored, or a tree of one with its borders, with its scale and what its marks mean; returns `ax`."""
     chart = data["chart"].to_dataset() if data_is_tree(data) else data
-    figure = new_figure(1.2 * SINGLE_COLUMN, 98.0)
-    ax = figure.subplots()
+    own, ax = ax is None, new_figure(1.2 * SINGLE_COLUMN, 98.0).subplots() if ax is None else ax
     cells = draw_chart(ax, chart)
     path = list(chart.attrs.get("path", ("horizontal", "vertical")))
     ax.set_xlabel(parameter_name(path[0]))
     ax.set_ylabel(parameter_name(path[1]))
     if cells is not None:
         peak = rf"$\max_\tau|{symbol(chart.attrs['coordinate'])}|${unit_in_brackets(chart['amplitude'])}"
-        figure.colorbar(cells, ax=ax, label=f"largest amplitude {peak}", ticks=cells.norm.boundaries, format="%g")
+        ax.figure.colorbar(cells, ax=ax, label=f"largest amplitude {peak}", ticks=cells.norm.boundaries, format="%g")
     handles = _cell_handles(chart)
     if chart is not data:
         dots = draw_lines(ax, data)
         handles += _line_handles(border_curves(data), "static" in data.children)
         handles += [Line2D([], [], **DOT, label="end of motions")] if dots else []
     if handles:
-        figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.4, handletextpad=0.6)
-    return figure
+        legend_of(ax, own, handles, ncols=2, columnspacing=1.4, handletextpad=0.6)
+    return ax
 
 
 def data_is_tree(data: Any) -> bool:
@@ -237,4 +237,4 @@ def chart_legend(figure: Any, charts: Sequence[Any], curves: Sequence[Any], clos
     handles += _fillings(charts)
     if closed_form:
         handles.append(Line2D([], [], ms=3, label="closed form, high frequency", **CLOSED_FORM))
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    outside_legend(figure, handles=handles, ncols=4)

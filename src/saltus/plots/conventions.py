@@ -7,16 +7,17 @@ assumption of the model fails, and thin and pale beyond a limit of the mechanism
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext
 from functools import wraps
-from typing import Any, ParamSpec
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
 P = ParamSpec("P")
+R = TypeVar("R")
 
 STABLE = "#0b4fa0"
 UNSTABLE = "#d1342f"
@@ -79,12 +80,13 @@ def style() -> Iterator[None]:
         yield
 
 
-def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Let a function draw its Figure in the conventions."""
+def styled(draw: Callable[P, R]) -> Callable[P, R]:
+    """Let a function draw a figure of its own in the conventions; axes or a figure that are given keep their style."""
 
     @wraps(draw)
-    def inside(*args: P.args, **kwargs: P.kwargs) -> Figure:
-        with style():
+    def inside(*args: P.args, **kwargs: P.kwargs) -> R:
+        given = kwargs.get("ax") is not None or kwargs.get("figure") is not None
+        with nullcontext() if given else style():
             return draw(*args, **kwargs)
 
     return inside
@@ -99,6 +101,25 @@ def new_figure(width: float = SINGLE_COLUMN, height: float = 65.0, **options: An
 def shades(n: int, first: float = 0.0, last: float = 0.78) -> list[Any]:
     """`n` colours of an ordered family, from dark to light: their order is also that of their greys."""
     return list(mpl.colormaps["viridis"](np.linspace(first, last, n))) if n > 1 else [mpl.colormaps["viridis"](first)]
+
+
+def figure_of(axes: Any) -> Figure:
+    """The figure of axes, one or several."""
+    figure = np.ravel(axes)[0].figure
+    return figure if isinstance(figure, Figure) else figure.figure
+
+
+def outside_legend(figure: Any, **options: Any) -> None:
+    """A legend below all panels of a figure; where nothing lays the figure out, at its lower edge."""
+    figure.legend(loc="outside lower center" if figure.get_layout_engine() is not None else "lower center", **options)
+
+
+def legend_of(ax: Any, own: bool, handles: Iterable[Any], **options: Any) -> None:
+    """A legend below a figure of one's own (`own`), or within axes that were given."""
+    if own:
+        outside_legend(ax.figure, handles=list(handles), **options)
+    else:
+        ax.legend(handles=list(handles), loc="best")
 
 
 DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (1, 1.2)))

@@ -28,12 +28,12 @@ DRAWN_STATES = StateSettings()
 
 
 @styled
-def draw_diagram(tree: Any) -> Figure:
-    """A Figure from the DataTree of `response_spectrum` or `bifurcation_diagram`."""
+def draw_diagram(tree: Any, *, figure: Figure | None = None) -> np.ndarray:
+    """Draw the DataTree of `response_spectrum` or `bifurcation_diagram` into a figure; returns its axes, (1 or 2,)."""
     low, high = (float(x) for x in tree.attrs["bounds"])
     name, unit = symbol(tree.attrs["coordinate"]), _unit(tree)
     simulated = "stroboscopic" in tree.children
-    figure = new_figure(DOUBLE_COLUMN, 150.0 if simulated else 95.0)
+    figure = new_figure(DOUBLE_COLUMN, 150.0 if simulated else 95.0) if figure is None else figure
     axes = figure.subplots(1 + simulated, 1, sharex=True, squeeze=False, height_ratios=[3, 2][: 1 + simulated])[:, 0]
     axes[0].set_xlim(low, high)
     top = _top(tree, low, high)
@@ -49,7 +49,7 @@ def draw_diagram(tree: Any) -> Figure:
         axes[1].set_title("stroboscopic points of direct simulation", loc="left", pad=3)
     axes[-1].set_xlabel(parameter_name(tree.attrs["path"]))
     response_legend(figure, [tree], limits=min(limits, default=np.inf) < 1.08 * top)
-    return figure
+    return np.asarray(axes)
 
 
 def _unit(tree: Any) -> str:

@@ -22,13 +22,13 @@ PAIRS = (STABLE, UNSTABLE, LIMIT, "#E69F00", INK, SEPARATRIX)  # of more than tw
 
 
 @styled
-def draw_motion(dataset: xarray.Dataset) -> Figure:
-    """The coordinates over time, and velocities over coordinates, of a motion as `Motion.to_xarray` gives it.
+def draw_motion(dataset: xarray.Dataset, *, figure: Figure | None = None) -> np.ndarray:
+    """The coordinates over time, and velocities over coordinates, of a motion as `Motion.to_xarray` gives it; returns both axes.
 
     The phase portrait shows all of the motion in grey and its last forcing period on top; without a forcing period, all of it.
     An open circle marks the start, a full one the end. Green lines mark the limits of the mechanism that are reached.
     """
-    figure = new_figure(DOUBLE_COLUMN, 68.0)
+    figure = new_figure(DOUBLE_COLUMN, 68.0) if figure is None else figure
     history, portrait = figure.subplots(1, 2, width_ratios=(1.75, 1))
     names = coordinates(dataset)
     period = _forcing_period(dataset)
@@ -44,7 +44,7 @@ def draw_motion(dataset: xarray.Dataset) -> Figure:
         for ax, axis in ((history, "y"), (portrait, "x")):
             for angle in (limit, 2 * limit):
                 limit_lines(ax, angle, axis=axis)
-    return figure
+    return np.array([history, portrait])
 
 
 def coordinates(dataset: xarray.Dataset) -> list[str]:
@@ -109,7 +109,8 @@ def _labels(history: Any, portrait: Any, dataset: xarray.Dataset, names: list[st
         ax.axhline(0.0, color=FAINT, lw=0.5, zorder=0)
     portrait.axvline(0.0, color=FAINT, lw=0.5, zorder=0)
     if len(names) > 1:
-        history.figure.legend(*history.get_legend_handles_labels(), loc="outside upper center", ncols=min(len(names), 4))
+        above = "outside upper center" if history.figure.get_layout_engine() is not None else "upper center"
+        history.figure.legend(*history.get_legend_handles_labels(), loc=above, ncols=min(len(names), 4))
 
 
 def _end(dataset: xarray.Dataset) -> float:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from saltus.plots.axis_names import symbol, unit_in_brackets
-from saltus.plots.conventions import FAINT, SEPARATRIX_LINE, SINGLE_COLUMN, STABLE, UNSTABLE, new_figure, styled
+from saltus.plots.conventions import FAINT, SEPARATRIX_LINE, SINGLE_COLUMN, STABLE, UNSTABLE, legend_of, new_figure, styled
 from saltus.plots.marks import fixed_points
 from saltus.plots.phase_lines import draw_arrows, lines_apart
 
@@ -17,16 +17,15 @@ ARROWS = 0.6  # window widths between arrows along a motion
 
 
 @styled
-def draw_plane(dataset: Any, width: float = 1.5 * SINGLE_COLUMN) -> Figure:
-    """A Figure from a dataset of `saltus.studies.phase_portrait`.
+def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * SINGLE_COLUMN) -> Axes:
+    """Draw a dataset of `saltus.phase_portrait`; returns the axes.
 
     Stable equilibria are filled, unstable ones open. Motions from given starts are drawn to their ends; those that were spread
     over the window end where they come near to one that is drawn, so that lines stay apart.
     """
     name = dataset.attrs["coordinate"]
     window = np.asarray(dataset.attrs["window"], dtype=float).reshape(2, 2)
-    figure = new_figure(width, 0.85 * width)
-    ax = figure.subplots()
+    own, ax = ax is None, new_figure(width, 0.85 * width).subplots() if ax is None else ax
     ax.set_xlim(*window[0])
     ax.set_ylim(*window[1])
     ax.axhline(0.0, color=FAINT, lw=0.4, zorder=0)
@@ -44,11 +43,11 @@ def draw_plane(dataset: Any, width: float = 1.5 * SINGLE_COLUMN) -> Figure:
         artist.set_in_layout(False)  # what is outside the window would take room beside it
     ax.set_xlabel(rf"${symbol(name)}${unit_in_brackets(dataset[name])}")
     ax.set_ylabel(rf"$\dot{{{symbol(name)}}}$")
-    _legend(figure, stable, bool(dataset.sizes["separatrix"]))
-    return figure
+    _legend(ax, own, stable, bool(dataset.sizes["separatrix"]))
+    return ax
 
 
-def _legend(figure: Figure, stable: np.ndarray, separatrices: bool) -> None:
+def _legend(ax: Axes, own: bool, stable: np.ndarray, separatrices: bool) -> None:
     """What is there of stable and unstable equilibria and separatrices."""
     dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.5}
     handles = [Line2D([], [], color=STABLE, lw=0.7, label="motion")]
@@ -58,4 +57,4 @@ def _legend(figure: Figure, stable: np.ndarray, separatrices: bool) -> None:
         handles.append(Line2D([], [], mfc="white", mec=UNSTABLE, label="unstable equilibrium", **dot))
     if separatrices:
         handles.append(Line2D([], [], label="separatrix", **SEPARATRIX_LINE))
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), columnspacing=1.4, handletextpad=0.5)
+    legend_of(ax, own, handles, ncols=len(handles), columnspacing=1.4, handletextpad=0.5)

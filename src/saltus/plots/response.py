@@ -13,7 +13,16 @@ import numpy as np
 
 from saltus.branch_lines import ModelValidity, margins_of, smooth_lines, validity_of
 from saltus.branch_tables import branches_of
-from saltus.plots.conventions import INK, LIMIT, LIMIT_LINE, PALE_STABLE, PALE_UNSTABLE, STABLE_LINE, UNSTABLE_LINE
+from saltus.plots.conventions import (
+    INK,
+    LIMIT,
+    LIMIT_LINE,
+    PALE_STABLE,
+    PALE_UNSTABLE,
+    STABLE_LINE,
+    UNSTABLE_LINE,
+    outside_legend,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,11 +259,11 @@ def response_legend(figure: Any, spectra: list[Any], *, limits: bool = True, cri
     found = {str(kind) for spectrum in spectra for kind in spectrum["bands"]["kind"].values}
     more += [Patch(color=BANDS[kind], label=BAND_NAMES[kind]) for kind in BANDS if kind in found]
     handlers: dict[Any, Any] = {tuple: HandlerTuple(ndivide=None, pad=0.3)}
-    figure.legend(
+    outside_legend(
+        figure,
         handles=[*handles, *more],
         labels=[*labels, *(handle.get_label() for handle in more)],
         handler_map=handlers,
-        loc="outside lower center",
         ncols=columns,
         columnspacing=1.2,
         handletextpad=0.5,

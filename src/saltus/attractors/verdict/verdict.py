@@ -14,6 +14,7 @@ from saltus.attractors.verdict.reason import Reason
 from saltus.attractors.verdict.zero_one_test import ZeroOne
 from saltus.errors import MotionError
 from saltus.flow import Recurrence, find_recurrence, simulate
+from saltus.notebook import html_table
 from saltus.orbits import PeriodicOrbit
 from saltus.progress import Progress, part_of
 from saltus.provenance import provenance
@@ -46,6 +47,10 @@ class Verdict:
         known = {"kind": str(self.kind), "reason": self.reason, "period": self.period or 0, "followed": self.periods}
         values = {name: ((), value, {"units": "1"}) for name, value in (known | self.evidence).items()}
         return xarray.Dataset(values, attrs={"title": "verdict by saltus"} | provenance(self.system))
+
+    def _repr_html_(self) -> str:
+        known = {"period": self.period or "none", "reason": self.reason, "forcing periods followed": self.periods}
+        return html_table(f"Verdict: {self.kind}", known | self.evidence)
 
     def __repr__(self) -> str:
         return f"Verdict({self.kind}{f' {self.period}' if self.period else ''}: {self.reason})"

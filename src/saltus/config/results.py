@@ -1,0 +1,137 @@
+"""Results and studies read back by what their files are, and written for MATLAB."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.errors import ParameterError, shown
+from saltus.public_functions import answered
+from saltus.systems import System
+
+if TYPE_CHECKING:
+    import xarray
+
+    from saltus.config.study import Study
+
+PARTIAL = {"basin_cells": "the cells of basins", "diagram": "the parts of a diagram"}  # what stores keep beside a netCDF file
+LONGEST_NAME = 63  # characters that MATLAB takes
+Result = Any  # a Dataset or a DataTree, or what has `to_xarray`
+
+
+@answered
+def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
+    """What is in a file or a folder that saltus has written, or that describes a study or a system.
+
+    A result in netCDF (.nc) becomes a Dataset or a DataTree, whose `kind` says of what; the complete store of a sweep (a folder)
+    a Dataset; a study (.toml) a `Study`; a system (.json, of `System.to_json`) a `System`. Orbits of a branch are given by
+    `saltus.orbits.orbits_of(load(...))`. Nothing in a result is run; a study may name Python files with models, and these are.
+
+    Raises:
+        ParameterError: there is no such file, it is of none of these kinds, or it is damaged, in one sentence.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise ParameterError(f"there is no file or folder {path}; give a .nc, .zarr, .toml or .json that saltus can read", "path")
+    if path.is_dir() or path.suffix not in (".toml", ".json"):
+        try:
+            return open_result(path)
+        except ParameterError as error:
+            raise ParameterError(str(error), error.parameter or "path") from None
+    if path.suffix == ".toml":
+        from saltus.config.study import load_study
+
+        return load_study(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ParameterError(f"{path} cannot be read as text ({error!s:.120})", "path") from None
+    return System.from_json(text)
+
+
+def open_result(path: Path) -> Any:
+    """The Dataset or DataTree at `path`; nothing in it is run, and its system is not made.
+
+    Raises:
+        ParameterError: no such file, or one that is not of saltus, or is damaged; a sweep that is not complete.
+    """
+    from saltus.files import read_dataset
+
+    if not path.exists():
+        raise ParameterError(f"there is no file or folder {path}; give the .nc or .zarr that `saltus run` has written", "path")
+    return _open_store(path) if path.is_dir() else read_dataset(path)
+
+
+def _open_store(path: Path) -> Any:
+    """The dataset of a complete sweep."""
+    from saltus.checks import check_memory
+    from saltus.sweep import open_store, read_plan
+
+    read_plan(path)
+    data = open_store(path)
+    check_memory(str(path), float(data.nbytes), "its arrays")
+    if kind_of(data) in PARTIAL:
+        raise ParameterError(f"{path} keeps {PARTIAL[kind_of(data)]} alone; read {path.with_suffix('.nc').name} beside it")
+    return data
+
+
+def kind_of(data: Any) -> str:
+    """What a result is, by its attributes; empty where they do not name it."""
+    return str(data.attrs.get("kind", ""))
+
+
+@answered
+def to_mat(path: str | Path, result: Result) -> Path:
+    """Write a result as a MATLAB file (version 5), which `load` of MATLAB and Octave reads; returns its path.
+
+    Each variable and coordinate is an array under its name, in which what MATLAB does not take becomes "_"; texts are cell
+    arrays; `attributes` is a struct, and so is each group of a tree.
+
+    Args:
+        path: of the file; ".mat" is appended where it has no suffix.
+        result: a Dataset, a DataTree, or what has `to_xarray`, such as a motion or a branch.
+
+    Raises:
+        ParameterError: what is no such result; two names that become one.
+    """
+    import io
+
+    from scipy.io import savemat
+
+    from saltus.files import write_bytes
+
+    data = result.to_xarray() if hasattr(result, "to_xarray") else result
+    if not (hasattr(data, "data_vars") and hasattr(data, "attrs")):
+        raise ParameterError(f"result must be a Dataset, a DataTree or what has to_xarray, got {shown(result)}", "result")
+    path = Path(path)
+    if not path.name:
+        raise ParameterError("path must name a file, such as motion.mat", "path")
+    buffer = io.BytesIO()
+    savemat(buffer, _struct(data), long_field_names=True, do_compression=True, oned_as="column")
+    return write_bytes(path if path.suffix else path.with_suffix(".mat"), buffer.getvalue())
+
+
+def _struct(node: Any) -> dict[str, Any]:
+    """A Dataset, or a node of a tree with its children, as arrays and structs by MATLAB's names."""
+    parts: dict[str, Any] = {str(name): _array(values.values) for name, values in {**node.coords, **node.data_vars}.items()}
+    parts["attributes"] = _named({str(name): _array(np.asarray(value)) for name, value in node.attrs.items()})
+    children = getattr(node, "children", {})
+    return _named(parts | {str(name): _struct(child) for name, child in children.items()})
+
+
+def _array(values: np.ndarray) -> Any:
+    if values.dtype.kind in "US":
+        return values.astype(object) if values.ndim else str(values)
+    return values.astype(np.uint8) if values.dtype == bool else values
+
+
+def _named(parts: dict[str, Any]) -> dict[str, Any]:
+    names = [re.sub(r"\W", "_", name)[:LONGEST_NAME] for name in parts]
+    names = [name if name[:1].isalpha() else f"x{name}"[:LONGEST_NAME] for name in names]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ParameterError(f"two names of the result become {twice} in MATLAB; rename one", "result")
+    return dict(zip(names, parts.values(), strict=True))

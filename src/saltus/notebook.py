@@ -1,0 +1,21 @@
+"""Results in a notebook: a title and a table of facts, as HTML in which every text is escaped."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping
+from typing import Any
+
+MOST_ROWS = 40  # of a table; what is more is counted
+CELL = "style='text-align:left;padding:1px 10px 1px 0;vertical-align:top'"
+
+
+def html_table(title: str, facts: Mapping[str, Any]) -> str:
+    """A table with a row for each fact; floats with 9 digits."""
+    rows = [f"<tr><th {CELL}>{_text(name)}</th><td {CELL}>{_text(value)}</td></tr>" for name, value in facts.items()]
+    more = f"<tr><td {CELL} colspan='2'>and {len(rows) - MOST_ROWS} more</td></tr>" if len(rows) > MOST_ROWS else ""
+    return f"<div><strong>{_text(title)}</strong><table>{''.join(rows[:MOST_ROWS])}{more}</table></div>"
+
+
+def _text(value: Any) -> str:
+    return html.escape(f"{value:.9g}" if isinstance(value, float) else str(value))
