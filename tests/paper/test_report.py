@@ -150,6 +150,27 @@ def test_a_damaged_part_is_left_out_and_an_empty_folder_refused(results, tmp_pat
         report_from_results(tmp_path / "nothing")
 
 
+@pytest.mark.parametrize(
+    "change", [{"seconds": "long"}, {"seconds": None}, {"versions": 5}, {"files": []}, {"claims": [1]}, {"claims": None}]
+)
+def test_a_forged_record_leaves_its_part_out(results, tmp_path, change):
+    folder = shutil.copytree(results, tmp_path / "results")
+    record = folder / ".saltus" / "table1.json"
+    record.write_text(json.dumps(json.loads(record.read_text()) | change))
+    assert report_from_results(folder) == ["fig02", "fig08"]
+
+
+def test_a_data_file_of_another_program_is_refused_in_a_sentence(results, tmp_path):
+    folder = shutil.copytree(results, tmp_path / "results")
+    (folder / "fig08.nc").write_bytes(b"none of ours")
+    record = folder / ".saltus" / "fig08.json"
+    kept = json.loads(record.read_text())
+    kept["files"]["fig08.nc"] = state.fingerprint(folder / "fig08.nc")
+    record.write_text(json.dumps(kept))
+    with pytest.raises(ParameterError, match=r"fig08\.nc is no result of saltus"):
+        report_from_results(folder)
+
+
 @pytest.mark.parametrize("words", ["<script>alert(1)</script>", '"><img src=x onerror=alert(1)>', "{{ 7 * 7 }}", "&copy;"])
 def test_foreign_words_are_shown_and_never_obeyed(results, tmp_path, monkeypatch, words):
     folder = shutil.copytree(results, tmp_path / "results")

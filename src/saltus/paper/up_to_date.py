@@ -6,6 +6,7 @@ import ast
 import hashlib
 import importlib.util
 import json
+import math
 from collections.abc import Iterable
 from dataclasses import asdict
 from functools import cache
@@ -95,10 +96,15 @@ def intact(figure: PaperFigure, folder: Path) -> bool:
     """Whether every output is there as its record has it, and the claims can be read, whatever sources made them."""
     record = read(figure, folder)
     prints = record.get("files") if record else None
-    if not isinstance(prints, dict) or any(fingerprint(folder / name) != prints.get(name, "") for name in figure.files()):
+    if (
+        record is None
+        or not isinstance(prints, dict)
+        or any(fingerprint(folder / name) != prints.get(name, "") for name in figure.files())
+    ):
         return False
     try:
-        return bool([claims(figure, folder)])
+        claims(figure, folder)
+        return math.isfinite(record["seconds"]) and isinstance(record["versions"], dict)
     except (KeyError, TypeError, ValueError, AttributeError):  # by another version of saltus, or by somebody else
         return False
 

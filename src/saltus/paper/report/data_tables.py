@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.errors import ParameterError
 from saltus.files import checked_content
 
 ANGLES = ("beta0", "alpha")  # numbers of the paper's models in rad, which a reader knows in degrees
@@ -54,28 +55,36 @@ def data_tables(path: Path) -> DataTables:
     """The tables of a netCDF file that saltus has written; its checksum is compared first.
 
     Raises:
-        ParameterError: the file is damaged or cannot be read.
+        ParameterError: the file is damaged, or another program wrote it.
     """
     import h5netcdf
 
+    content = checked_content(path)
+    try:
+        with h5netcdf.File(io.BytesIO(content), "r") as file:
+            return _tables_of(file)
+    except Exception as error:  # h5netcdf, HDF5 and forged attributes have many ways to say so
+        raise ParameterError(f"{path} is no result of saltus that can be read ({error!s:.80}); compute it again") from error
+
+
+def _tables_of(file: Any) -> DataTables:
     variables: dict[tuple[str, str, str], list[str]] = {}
     dims: dict[tuple[str, str, str], str] = {}
     parameters: dict[str, dict[str, str]] = {}
     settings: dict[str, dict[str, str]] = {}
-    with h5netcdf.File(io.BytesIO(checked_content(path)), "r") as file:
-        for panel, inner, group in _groups(file):
-            for name, variable in group.variables.items():
-                units, meaning = (str(variable.attrs.get(key, "")) for key in ("units", "long_name"))
-                row = (f"{inner}/{name}".strip("/"), units, meaning or _words("meanings", name))
-                variables.setdefault(row, []).append(panel)
-                if row not in dims:  # to look them up is slow, and panels have the same
-                    dims[row] = ", ".join(variable.dimensions)
-            for name, value in group.attrs.items():
-                if name == "system" and panel not in parameters.get("model.type", {}):
-                    for number, text in _flat(json.loads(str(value))):
-                        parameters.setdefault(number, {})[panel] = text
-                elif name in _tables()["settings"]:
-                    settings.setdefault(name, {}).setdefault(panel, _text(value))
+    for panel, inner, group in _groups(file):
+        for name, variable in group.variables.items():
+            units, meaning = (str(variable.attrs.get(key, "")) for key in ("units", "long_name"))
+            row = (f"{inner}/{name}".strip("/"), units, meaning or _words("meanings", name))
+            variables.setdefault(row, []).append(panel)
+            if row not in dims:  # to look them up is slow, and panels have the same
+                dims[row] = ", ".join(variable.dimensions)
+        for name, value in group.attrs.items():
+            if name == "system" and panel not in parameters.get("model.type", {}):
+                for number, text in _flat(json.loads(str(value))):
+                    parameters.setdefault(number, {})[panel] = text
+            elif name in _tables()["settings"]:
+                settings.setdefault(name, {}).setdefault(panel, _text(value))
     return DataTables(
         variables=[
             VariableRow(panels=_panels(panels), path=row[0], dims=dims[row], units=row[1], meaning=row[2])

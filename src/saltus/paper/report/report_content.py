@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -127,18 +126,20 @@ def report_content(all_figures: Iterable[PaperFigure], present: Mapping[PaperFig
 
 def _part(figure: PaperFigure, claims: list[Claim], folder: Path) -> ReportPart:
     record = state.read(figure, folder) or {}
-    checksums, versions = record.get("files", {}), record.get("versions", {})
+    checksums, versions = record["files"], record["versions"]
     links = [FileLink(name=n, size=_size(folder / n), checksum=str(checksums.get(n, ""))) for n in figure.files()]
     return ReportPart(
         figure=figure,
         claims=claims,
         files=links,
-        seconds=float(record.get("seconds", math.nan)),
+        seconds=float(record["seconds"]),
         versions=", ".join(f"{name} {number}" for name, number in versions.items()),
         stale=record.get("key") != state.key(figure),
         data=data_tables(folder / f"{figure.name}.nc"),
         picture=embedded(folder / f"{figure.name}.png") if figure.draw is not None else None,
-        table=_markdown_rows((folder / f"{figure.name}.md").read_text(encoding="utf-8")) if figure.table is not None else [],
+        table=_markdown_rows((folder / f"{figure.name}.md").read_text(encoding="utf-8", errors="replace"))
+        if figure.table is not None
+        else [],
     )
 
 
