@@ -117,6 +117,9 @@ def test_a_chart_on_its_own_is_drawn_whole():
     assert clipped(figure_of(draw_stability_chart(empty))) == []
 
 
+NAMED = {"frequency": 1.0, "beta0_degrees": 80.0, "damping": 0.1}  # by which evidence names a panel
+
+
 @pytest.mark.parametrize(
     ("total", "unknown", "inside", "agrees"), [(0, 0, 9, False), (50, 50, 9, False), (5000, 50, 10, True), (5000, 50, 5, False)]
 )
@@ -126,7 +129,7 @@ def test_agreement_is_never_one_on_nothing(total, unknown, inside, agrees):
     attrs = counts | {"on_curves": 0, "chaos_beside_rest": 0, "harmless": 0}
     differ = xr.Dataset({"beside_rest": ("change", np.zeros(unknown, dtype=bool))}, attrs=attrs)
     panel = xr.DataTree.from_dict({"chart": xr.Dataset(), "disagreements": differ})
-    panel.attrs["frequency"] = 1.0
+    panel.attrs |= NAMED
     one = chart_measures.agreement(xr.DataTree(children={"a": panel}))
     assert (verdicts({"fig14-agreement": one})["fig14-agreement"] is ClaimVerdict.HOLDS) is agrees
 
@@ -135,7 +138,7 @@ def test_agreement_is_never_one_on_nothing(total, unknown, inside, agrees):
 def test_few_cells_are_wrong_by_the_upper_end_of_the_interval(checked, wrong, holds):
     """None of none decides nothing good; 5 % of 120 may be 10 %; 2 % of 600 is 3.5 % at most."""
     counts = {"checked_cells": checked, "wrong_cells": wrong, "wrong_rest": 0, "wrong_motions": wrong, "wrong_chaos": 0}
-    panel = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"frequency": 1.0}), "chart": xr.Dataset(attrs=counts)})
+    panel = xr.DataTree.from_dict({"/": xr.Dataset(attrs=NAMED), "chart": xr.Dataset(attrs=counts)})
     found = claims_of({"fig14-cells": chart_measures.right_cells(xr.DataTree(children={"a": panel}))})["fig14-cells"]
     assert (found.verdict is ClaimVerdict.HOLDS) is holds
     assert f"{wrong} of {checked}" in found.evidence
