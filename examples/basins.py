@@ -8,6 +8,7 @@ import numpy as np
 
 import saltus
 from saltus.attractors import basin_entropy, basins_of_attraction, find_attractors, stable_manifold, uncertainty_exponent
+from saltus.plots import draw_basins
 
 system = saltus.System(
     model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
@@ -31,6 +32,8 @@ saddles = [orbit for orbit in branch.at(2.4) if not orbit.stable]
 curves = [stable_manifold(saddle, window=((-2.0, 2.0), (-2.0, 2.0))) for saddle in saddles]
 for curve in curves:
     print(curve)
+
+draw_basins(picture, [curve.states for curve in curves])
 
 labels = picture.label.values
 rows, columns = np.nonzero(labels[:, 1:] != labels[:, :-1])

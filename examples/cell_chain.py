@@ -4,6 +4,7 @@ A chain of four cells
 
 Four cells in a row, of which the first is let go: how its motion reaches the last one through the springs between them."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -19,6 +20,13 @@ for cell, theta in enumerate(opening, 1):
     first, widest = times[np.argmax(theta > 1e-9)], times[theta.argmax()]
     print(f"cell {cell}: opens first at {first:.2f}, widest by {theta.max():.3f} at {widest:.2f}")
 print(f"{len(motion.impacts)} impacts; {motion.stop} from {motion.rest_time:.3f}")
+
+figure, ax = plt.subplots()
+for cell in range(4):
+    theta = np.abs(motion.at(times)[0]).reshape(4, 2, -1)[cell].max(axis=0)
+    ax.plot(times, theta + 0.6 * cell, label=f"cell {cell + 1}")
+ax.set(xlabel="time", ylabel="opening of the cells, one above another")
+ax.legend()
 
 assert (np.diff(opening.argmax(axis=1)) > 0).all()  # each cell is widest open after the one before it
 assert len(motion.closed) == 8

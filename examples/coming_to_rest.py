@@ -7,6 +7,7 @@ Infinitely many impacts in a finite time: the free metainterface with impact los
 The paper's `finaltime` gives the same instant for small amplitudes: (1 + e)/(1 - e)/4 of the undamped period.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -24,5 +25,12 @@ expected = theory.final_time(period=period, e=e)
 
 print(f"{len(motion.impacts)} impacts followed one by one, at rest from tau = {motion.rest_time:.12f}")
 print(f"the paper's closed form for small amplitudes: {expected:.12f}")
+figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.4), layout="constrained")
+times = np.linspace(0.0, motion.rest_time, 4000)
+left.plot(times, motion.at(times)[0])
+left.set(xlabel=r"$\tau$", ylabel=r"$\theta$ (rad)")
+right.semilogy(motion.rest_time - motion.impacts.time, np.abs(motion.impacts.velocity_before), ".-")
+right.set(xlabel="time left to rest", ylabel="speed of the impact")
+
 assert motion.stop is saltus.Stop.REST
 assert abs(motion.rest_time / expected - 1) < 0.01

@@ -7,6 +7,9 @@ A model of one's own: the Duffing oscillator, x'' + c x' + x + b x^3 = F(tau). d
 from dataclasses import dataclass
 from typing import ClassVar
 
+import matplotlib.pyplot as plt
+import numpy as np
+
 import saltus
 
 
@@ -34,4 +37,7 @@ if __name__ == "__main__":
     motion = saltus.simulate(saltus.System(model=Duffing()), x=1.0, duration=100.0)
     energy = motion.velocity**2 / 2 + motion.x**2 / 2 + motion.x**4 / 4
     assert abs(energy - 0.75) < 1e-11, energy  # 1/2 + 1/4 at the start, and nothing is lost
+    figure, ax = plt.subplots()
+    ax.plot(*motion.at(np.linspace(0.0, 100.0, 5000)), linewidth=0.6)
+    ax.set(xlabel="$x$", ylabel="$x'$", title="the energy is kept")
     print(f"x = {motion.x:.12f} at time 100, energy {energy:.15f}")

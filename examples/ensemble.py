@@ -8,6 +8,7 @@ The theory knows the border: rest lasts while H sin(beta0) <= abs(V) cos(beta0),
 is only known by computing it; here, how many impacts a forcing period has at the end.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
@@ -37,6 +38,13 @@ for code, count in zip(*np.unique(chart.stop, return_counts=True), strict=True):
 periods = np.unique(chart.recurrence_period.values[chart.recurrence_period.values > 0])
 print(f"motions that repeat themselves do so every {', '.join(map(str, periods))} forcing periods")
 print(f"impacts in the last forcing period: at most {int(chart.period_impact_count.max())}")
+
+figure, ax = plt.subplots()
+mesh = ax.pcolormesh(H, V, chart.impact_count.T / chart.periods.T)
+figure.colorbar(mesh, label="impacts in a forcing period")
+ax.plot(theory.critical_horizontal(np.deg2rad(80), V.values), V, "w--", label=r"$\hat{H}_{cr}$")
+ax.set(xlabel=r"$\hat{H}$", ylabel="$V$", xlim=(0, 0.2))
+ax.legend()
 
 border = H.where(chart.impact_count > 0).min("H")  # the least force that lifts it off, for each V
 excess = border - theory.critical_horizontal(np.deg2rad(80), chart.V)

@@ -4,6 +4,7 @@ An impact damper
 
 An impact damper: a loose mass in a case on a spring takes the case's resonance down by its impacts."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -23,5 +24,12 @@ def steady(mass_ratio: float, clearance: float) -> float:
 alone = 0.05 / 0.02  # the amplitude at resonance without a mass that hits
 for clearance in (0.2, 0.5, 1.0):
     print(f"room of {clearance} on both sides: {steady(0.1, clearance):.3f} instead of {alone:.3f}")
+
+clearances = np.linspace(0.1, 2.0, 12)
+figure, ax = plt.subplots()
+ax.plot(clearances, [steady(0.1, float(room)) for room in clearances], "o-")
+ax.axhline(alone, color="k", linestyle=":", label="without the loose mass")
+ax.set(xlabel="room on both sides", ylabel="amplitude of the case", ylim=(0, None))
+ax.legend()
 
 assert steady(0.1, 1.0) < 0.5 * alone

@@ -4,6 +4,7 @@ A branch through folds and a grazing, and a cusp
 
 The metainterface at H = 0.5: an orbit, its branch along the frequency through folds and a grazing, and a fold's own curve."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -23,6 +24,13 @@ for point in branch.special:
     print(f"{point.kind:12} Omega = {point.parameter:.12f} to {point.evidence.bracket:.0e}, {impacts} impacts")
 for motion in branch.at(0.88):
     print(f"at Omega = 0.88: {motion}")
+
+figure, ax = plt.subplots()
+ax.plot(branch.parameters, np.where(branch.stable, branch.amplitudes, np.nan), "k")
+ax.plot(branch.parameters, np.where(branch.stable, np.nan, branch.amplitudes), "k:")
+for point in branch.special:
+    ax.annotate(point.kind, (point.parameter, point.orbit.amplitude), fontsize=7, color="tab:red")
+ax.set(xlabel=r"frequency $\Omega$", ylabel="amplitude (rad)", title="dotted: unstable")
 
 # Where the orbit touches the contact between its two impacts, four more appear: a pair and its mirror image.
 grazing = max((point for point in branch.special if point.kind == "GR"), key=lambda point: point.parameter)

@@ -7,6 +7,7 @@ A response spectrum at H = 1: the branch of period 1 and, found by search alone,
 import tempfile
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
@@ -27,6 +28,13 @@ for number in range(spectrum["branches"].sizes["branch"]):
         print(f"  {kind:16} {place:.9f}")
     stable, worst = int(branch.stable.sum()), float(branch.kept.max())
     print(f"  {stable} of {branch.sizes['point']} orbits are stable, and after 20 periods off by at most {worst:.0e}")
+figure, ax = plt.subplots()
+for number in range(spectrum["branches"].sizes["branch"]):
+    branch = saltus.branch_of(spectrum, number)
+    ax.plot(branch.parameter, branch.amplitude, label=f"period {int(branch.period[0])}")
+ax.set(xlabel=r"frequency $\Omega$", ylabel="amplitude (rad)")
+ax.legend()
+
 dots = spectrum["attractors"]
 print(
     f"simulation settled at Omega = {dots.parameter.values} on periods {dots.period.values}, amplitudes {dots.amplitude.values}"

@@ -6,6 +6,7 @@ Derivatives of motions with impacts: to the state at the start, to parameters, a
 
 import math
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -25,6 +26,10 @@ print(f"its determinant is {result.determinant:.15g}, the law says {expected:.15
 for path, (theta, velocity) in zip(result.parameter_paths, result.parameters.T, strict=True):
     print(f"d theta/d {path} = {theta:+.12f}, d theta'/d {path} = {velocity:+.12f}")
 assert abs(result.determinant / expected - 1) < 1e-10
+
+figure, ax = plt.subplots()
+ax.plot([event.time for event in result.motion.events], result.event_times[:, 2], "o-")
+ax.set(xlabel="time of the event", ylabel=r"its derivative to $\Omega$")
 
 # A ball dropped from a height of 1 is at rest at sqrt(2) (1 + e)/(1 - e), after infinitely many impacts.
 ball = saltus.System(

@@ -8,6 +8,7 @@ Under Omega = 1, V = -0.5, C = 0.1 the reduced motion is exact for small loads. 
 before each crossing, so that the impact law never acts, and the steady amplitude is 0.5694 in place of 0.5856.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -39,6 +40,14 @@ for amplitude in (0.1, 0.2, 0.5):
     motion = both(amplitude)
     opened = sum(event.kind == "release" for event in motion.events)
     print(f"H = {amplitude}: {steady(motion):.4f} with both layers, {reduced(amplitude):.4f} reduced, {opened} releases")
+
+figure, ax = plt.subplots()
+motion = both(0.5)
+times = np.linspace(motion.time - 4 * np.pi, motion.time, 3000)
+for angle, name in zip(motion.at(times)[0], (r"$\theta_1$, lower", r"$\theta_2$, upper"), strict=True):
+    ax.plot(times, angle, label=name)
+ax.set(xlabel=r"$\tau$", ylabel="angle (rad)", title="both layers at $H = 0.5$")
+ax.legend()
 
 assert abs(steady(both(0.2)) - 0.5694) < 1e-4
 assert abs(reduced(0.2) - 0.5856) < 1e-4

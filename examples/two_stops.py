@@ -10,6 +10,7 @@ to the other with the speed v after each impact: sin(phi) = -v (1 - e) / (2 e A)
 
 import math
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -28,6 +29,13 @@ system = saltus.System(
 motion = saltus.simulate(system, x=-1.0, velocity=speed, time=phase, duration=4.5 * math.pi, tol=1e-14)
 for event in motion.events:
     print(f"{event.kind} {event.contact:>5} at {event.time - phase:.12f}, speed after it {abs(event.velocity_after[0]):.12f}")
+
+times = np.linspace(phase, motion.time, 1000)
+figure, ax = plt.subplots()
+ax.plot(times, motion.at(times)[0])
+ax.plot([event.time for event in motion.events], [1.0, -1.0, 1.0, -1.0], "ko", label="impacts, half a period apart")
+ax.set(xlabel="time", ylabel="$x$")
+ax.legend()
 
 assert [event.contact for event in motion.events] == ["right", "left", "right", "left"]
 assert all(abs(event.time - phase - n * math.pi) < 1e-10 for n, event in enumerate(motion.events, 1))

@@ -230,7 +230,7 @@ def test_examples_are_short_and_end_in_an_assertion_that_holds(script: Path) -> 
     text = script.read_text()
     assert text.count("\n") <= 60
     assert "assert " in text
-    environment = os.environ | {"PYTHONWARNINGS": "error::RuntimeWarning"}
+    environment = os.environ | {"PYTHONWARNINGS": "error::RuntimeWarning", "MPLBACKEND": "agg"}
     result = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment, cwd=script.parent)
     assert result.returncode == 0, result.stderr
 
