@@ -16,6 +16,7 @@ ROOMS = {
     "attractors": "Attractors, verdicts, basins",
     "studies": "Spectra, diagrams, charts, portraits",
     "sweep": "Grids of computations that can be killed",
+    "plots": "Pictures",
     "theory": "Closed forms",
     "config": "Studies in files",
     "errors": "Errors",

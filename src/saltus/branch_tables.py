@@ -72,6 +72,11 @@ def branch_of(diagram: xarray.DataTree, number: int) -> xarray.Dataset:
 
     Raises:
         ParameterError: a tree without branches, or of fewer.
+
+    Examples:
+        >>> diagram = saltus.bifurcation_diagram(system, bounds=(0.45, 0.55), max_period=1, values=[0.5], starts=4, bands=False)
+        >>> saltus.branch_of(diagram, 0).parameter.values[[0, -1]]
+        array([0.45, 0.55])
     """
 
     missing = [name for name in ("branches", *TABLES.values(), "orbits") if name not in diagram.children]

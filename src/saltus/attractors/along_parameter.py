@@ -75,6 +75,12 @@ def attractors_along(
 
     Raises:
         ParameterError: a path to no number, values that are not monotonic, and as for `find_attractors`.
+
+    Examples:
+        >>> along = saltus.attractors_along(system, "load.frequency", [0.98, 1.0], starts=8)
+        >>> along.period.values
+        array([[1.],
+               [1.]])
     """
     check_number("threshold", threshold, above=0.0)
     grid, followed = _values(system, path, values), _Followed(threshold)

@@ -74,7 +74,13 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
-    """One attractor, with its evidence."""
+    """One attractor, with its evidence.
+
+    Examples:
+        >>> found = saltus.find_attractors(system, starts=16)
+        >>> found.of(1).orbit.stable
+        True
+    """
 
     target: Target
     highest: float  # of the coordinate
@@ -136,7 +142,13 @@ class Attractor:
 
 @dataclass(frozen=True, eq=False)
 class Attractors:
-    """The attractors that were found, by their labels, and what was searched."""
+    """The attractors that were found, by their labels, and what was searched.
+
+    Examples:
+        >>> found = saltus.find_attractors(system, starts=16)
+        >>> len(found), found.undecided
+        (1, 0)
+    """
 
     system: System
     members: tuple[Attractor, ...]

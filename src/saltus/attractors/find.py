@@ -83,6 +83,11 @@ def find_attractors(
 
     Raises:
         ParameterError: several coordinates, a load that never repeats, known orbits of another system, numbers without meaning.
+
+    Examples:
+        >>> found = saltus.find_attractors(system, starts=16)
+        >>> [attractor.period for attractor in found]
+        [1]
     """
     clock, further, area = with_clock(system), check_states("also", also), check_window(window, system)
     progress(0.0, "motions")

@@ -68,6 +68,11 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     Raises:
         ParameterError: what is no system; a path that is not a number of it; values that are none or that it refuses; shapes
             that do not fit.
+
+    Examples:
+        >>> quiet = system.with_({"load.horizontal.amplitude": 0.02})
+        >>> bool(saltus.capture_speed(quiet) > 0.02), float(saltus.capture_speed(system))  # beyond Hcr nothing is proved
+        (True, 0.0)
     """
     check_system(system, "capture_speed", several_contacts=True)
     arrays = {path: finite_array(path, given) for path, given in parameter_table(system, parameters).items()}

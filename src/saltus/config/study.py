@@ -20,9 +20,15 @@ PARTS = ("model", "load", "impact", "simulate", *QUESTIONS)
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A system, how to simulate it and what else is asked of it, as a TOML file gives them.
+    r"""A system, how to simulate it and what else is asked of it, as a TOML file gives them.
 
     `load_study("study.toml").run()` is `saltus.simulate` with the file's settings.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> _ = Path("study.toml").write_text("[model]\ntype = 'WallOscillator'\n[simulate]\nx = -0.5\nduration = 3\n")
+        >>> saltus.load_study("study.toml").system.model.wall
+        1.0
     """
 
     name: str
@@ -71,7 +77,7 @@ class Study:
 
 
 def load_study(path: Path | str, *, questions: bool = True) -> Study:
-    """The study in the TOML file at `path`, checked in full.
+    r"""The study in the TOML file at `path`, checked in full.
 
     Args:
         path: of the file.
@@ -79,6 +85,12 @@ def load_study(path: Path | str, *, questions: bool = True) -> Study:
 
     Raises:
         ParameterError: whatever is wrong, in one sentence with the file, the line and the dotted key.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> _ = Path("study.toml").write_text("[model]\ntype = 'WallOscillator'\n[simulate]\nx = -0.5\nduration = 3\n")
+        >>> str(saltus.load_study("study.toml").run().stop)
+        'horizon'
     """
     source, tables = read_source(Path(path))
     for name in tables:

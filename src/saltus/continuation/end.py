@@ -16,7 +16,12 @@ class EndReason(Enum):
 
 
 class CurveEnd(EndReason):
-    """The reasons that any curve may have."""
+    """The reasons that any curve may have.
+
+    Examples:
+        >>> [end.reason.name for end in branch.ends]
+        ['BOUND', 'BOUND']
+    """
 
     BOUND = "bound {detail}{parameter:g}"
     CLOSED = "closes"
@@ -27,7 +32,12 @@ class CurveEnd(EndReason):
 
 @dataclass(frozen=True)
 class End:
-    """An end of a curve: its reason, with the parameter there, the kind of a special point and what else the sentence names."""
+    """An end of a curve: its reason, with the parameter there, the kind of a special point and what else the sentence names.
+
+    Examples:
+        >>> branch.ends[0].parameter, str(branch.ends[0])
+        (0.8, 'bound 0.8')
+    """
 
     reason: EndReason
     parameter: float | None = None

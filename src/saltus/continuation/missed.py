@@ -26,7 +26,12 @@ class CurveMissed(MissedReason):
 
 @dataclass(frozen=True, eq=False)
 class Missed:
-    """Something special between two neighbouring points of a curve that was not located."""
+    """Something special between two neighbouring points of a curve that was not located.
+
+    Examples:
+        >>> branch.missed  # all that a test function told was located
+        ()
+    """
 
     reason: MissedReason
     kind: str  # of the test function that changes its sign, if it is one

@@ -8,7 +8,13 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Evidence:
-    """The numbers that show that a special point is there."""
+    """The numbers that show that a special point is there.
+
+    Examples:
+        >>> fold = next(point for point in branch.special if point.kind == "LP")
+        >>> fold.evidence.bracket < 1e-9, fold.evidence.before * fold.evidence.after < 0
+        (True, True)
+    """
 
     residual: float  # of the equations
     brackets: tuple[float, ...]  # the width in each parameter within which the test function changes its sign

@@ -25,7 +25,12 @@ if TYPE_CHECKING:
 
 
 class EventKind(StrEnum):
-    """What happens at an instant of a motion, in the order of the kernel's numbers."""
+    """What happens at an instant of a motion, in the order of the kernel's numbers.
+
+    Examples:
+        >>> [str(kind) for kind in saltus.EventKind][:2]
+        ['impact', 'grazing']
+    """
 
     IMPACT = "impact"  # an impact: the gap closes with a speed
     GRAZING = "grazing"  # the gap touches zero without a speed, to within the working precision
@@ -41,7 +46,13 @@ EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One event: its time, and the velocities before and after it (equal where nothing jumps)."""
+    """One event: its time, and the velocities before and after it (equal where nothing jumps).
+
+    Examples:
+        >>> event = saltus.simulate(system, theta=0.3, periods=1).events[0]
+        >>> str(event.kind), event.time > 0
+        ('impact', True)
+    """
 
     time: float
     kind: EventKind
@@ -52,7 +63,13 @@ class Event:
 
 @dataclass(frozen=True)
 class Impacts:
-    """The impacts of a motion, as arrays of one length."""
+    """The impacts of a motion, as arrays of one length.
+
+    Examples:
+        >>> impacts = saltus.simulate(system, theta=0.3, periods=2).impacts
+        >>> bool(np.all(np.diff(impacts.time) > 0)), len(impacts) == len(impacts.velocity_before)
+        (True, True)
+    """
 
     time: np.ndarray
     side: np.ndarray  # before the impact
@@ -124,6 +141,11 @@ class Motion:
 
     The coordinate at the end has the model's own name: `motion.theta`, or `motion.x` for a wall oscillator; all of them are in
     `motion.position`. With several degrees of freedom positions and velocities are tuples.
+
+    Examples:
+        >>> motion = saltus.simulate(system, theta=0.3, periods=5)
+        >>> len(motion.impacts), motion.at([0.0])[0]
+        (9, array([0.3]))
     """
 
     system: System

@@ -16,7 +16,12 @@ from saltus.taylor import Expr, Form, NoNormalForm, Trace, constant, constant_va
 
 
 class ContactRegularity(Enum):
-    """What passing the contact does to a motion."""
+    """What passing the contact does to a motion.
+
+    Examples:
+        >>> [kind.name for kind in saltus.flow.ContactRegularity]
+        ['IMPACT', 'JUMP', 'CONTINUOUS']
+    """
 
     IMPACT = "the velocity changes: a grazing is a square root in the map"
     JUMP = "the velocity stays, the acceleration at zero speed jumps: a grazing is a square root in the map"

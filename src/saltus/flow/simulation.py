@@ -57,6 +57,11 @@ def simulate(
     Raises:
         ParameterError: an argument without meaning.
         MotionError: the motion is not unique, an impact has no solution, or the numbers overflow; with the instant.
+
+    Examples:
+        >>> motion = saltus.simulate(system, theta=0.3, periods=20)
+        >>> f"{motion.theta:.12f} after {len(motion.impacts)} impacts"
+        '-0.235680595299 after 39 impacts'
     """
     request = MotionRequest(
         system=system,

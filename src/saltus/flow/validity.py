@@ -20,6 +20,11 @@ class Validity:
     """For each margin of the model: when it is first passed (or None), and the share of the motion's time spent beyond it.
 
     `gains` has the contacts at which the impact law may raise the kinetic energy, and by what share of it (see `energy_gain`).
+
+    Examples:
+        >>> validity = saltus.simulate(system, theta=0.3, periods=1).validity
+        >>> validity.first["kinematic_limit"] is None  # never passed
+        True
     """
 
     first: dict[str, float | None]

@@ -28,6 +28,10 @@ class Branch(Course):
 
     A family of resting orbits is a branch as well: `special` then holds grazings (GR), the zeros of margins and functions, and
     the ends RL and CH.
+
+    Examples:
+        >>> branch.ends[0].parameter, len(branch.at(0.88))
+        (0.8, 3)
     """
 
     path: str

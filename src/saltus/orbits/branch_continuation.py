@@ -52,6 +52,11 @@ def continue_orbit(
 
     Raises:
         ParameterError: what is no orbit, an unknown parameter, bounds that exclude the orbit, a step that leads nowhere.
+
+    Examples:
+        >>> branch = saltus.continue_orbit(orbit, "load.frequency", (0.8, 1.0))
+        >>> [(str(point.kind), round(point.parameter, 6)) for point in branch.special]
+        [('LP', 0.908811), ('LP', 0.848485), ('line_limit', 0.863778)]
     """
     check_step(step)
     for name, function in (functions or {}).items():

@@ -72,6 +72,10 @@ def find_orbit(
     Raises:
         ParameterError: an argument without meaning.
         MotionError: the motion comes to rest for good, does not settle, or Newton's method does not converge; with what to do.
+
+    Examples:
+        >>> saltus.find_orbit(system, theta=0.3).signature.impact_count
+        2
     """
     _check(system, parameters, coordinates, {"period": period, "max_period": max_period, "settle": settle})
     base = problem_of(system, Signature((), 1), tuple(parameters))  # refuses what has no orbits

@@ -36,6 +36,11 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     Raises:
         ParameterError: a dataset of something else, of other equations than the model has now, or of another version of saltus;
             unknowns that do not solve the equations; a model of one's own that is not registered (`saltus.register`).
+
+    Examples:
+        >>> again = saltus.orbits.orbits_of(branch.to_xarray())
+        >>> again[0].amplitude == branch.orbits[0].amplitude
+        True
     """
     check_dataset(dataset, "a branch or a curve of special points", NEEDED, ("system", "tol"))
     system, tol = System.from_json(dataset.attrs["system"]), float(dataset.attrs["tol"])

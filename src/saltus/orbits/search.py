@@ -50,7 +50,13 @@ class Settled:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What was found, and what was searched."""
+    """What was found, and what was searched.
+
+    Examples:
+        >>> found = saltus.search_orbits(system, "load.frequency", [1.0], max_period=1, starts=8)
+        >>> found.at_rest, found.unsettled
+        (array([0]), array([0]))
+    """
 
     path: str
     orbits: tuple[PeriodicOrbit, ...]
@@ -93,6 +99,11 @@ def search_orbits(
 
     Raises:
         ParameterError: an unknown parameter, no values, an effort without meaning.
+
+    Examples:
+        >>> found = saltus.search_orbits(system, "load.frequency", [1.0], max_period=1, starts=8)
+        >>> len(found.orbits)
+        1
     """
     check_system(system, "search_orbits", coordinates=1)
     check_count("max_period", max_period, 1)

@@ -93,7 +93,14 @@ class ConditionedCurve(OrbitCurve):
 @answering("at")
 @dataclass(frozen=True, eq=False)
 class SpecialCurve(Course):
-    """A curve of special points in two parameters: its points in order, its codimension-two points, and why it ends."""
+    """A curve of special points in two parameters: its points in order, its codimension-two points, and why it ends.
+
+    Examples:
+        >>> fold = next(point for point in branch.special if point.kind == "LP")
+        >>> curve = saltus.continue_special(fold, "load.vertical", (-0.51, -0.49), most_points=10)
+        >>> str(curve.kind)
+        'LP'
+    """
 
     kind: str  # LP, PD, BPC or GR
     paths: tuple[str, str]

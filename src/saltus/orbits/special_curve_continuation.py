@@ -90,6 +90,12 @@ def continue_special(
     Raises:
         ParameterError: another kind of point, an unknown parameter or the branch's own, bounds that exclude the point, a second
             parameter that takes away the symmetry which a BPC or a grazing on both sides rests on.
+
+    Examples:
+        >>> fold = next(point for point in branch.special if point.kind == "LP")
+        >>> curve = saltus.continue_special(fold, "load.horizontal.amplitude", (0.15, 0.6))
+        >>> next(str(point.kind) for point in curve.special)  # the two folds meet in a cusp
+        'CP'
     """
     check_step(step)
     check_count("most_points", most_points, 1)

@@ -15,6 +15,10 @@ class SpecialKind(StrEnum):
     """The kinds of special points; zeros of a model's margin or of a user's function have its name instead.
 
     Those of codimension 1 lie on branches, those of codimension 2 on curves of special points in two parameters.
+
+    Examples:
+        >>> saltus.orbits.SpecialKind.LP == "LP", saltus.orbits.SpecialKind.CP.codimension
+        (True, 2)
     """
 
     description: str
@@ -46,7 +50,12 @@ class SpecialKind(StrEnum):
 
 
 class OrbitEnd(EndReason):
-    """The reasons for which branches of orbits and curves of special points end, besides those of any curve."""
+    """The reasons for which branches of orbits and curves of special points end, besides those of any curve.
+
+    Examples:
+        >>> len(saltus.orbits.OrbitEnd) > 5
+        True
+    """
 
     START = "start"
     BORN = "{kind} at {parameter:.9g}"
@@ -94,7 +103,12 @@ class OrbitMissed(MissedReason):
 
 
 class SpecialPoint(Zero):
-    """A special point of a branch or of a curve, with its orbit and its evidence; its kind is one of `SpecialKind`, or a name."""
+    """A special point of a branch or of a curve, with its orbit and its evidence; its kind is one of `SpecialKind`, or a name.
+
+    Examples:
+        >>> sorted(round(point.parameter, 6) for point in branch.special if point.kind == "LP")
+        [0.848485, 0.908811]
+    """
 
     @property
     def orbit(self) -> PeriodicOrbit:

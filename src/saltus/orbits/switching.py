@@ -39,6 +39,14 @@ def switch_branch(
 
     Raises:
         ParameterError: a special point where no branch begins.
+
+    Examples:
+        >>> unsymmetric = system.with_({"load.horizontal.amplitude": 1.4})
+        >>> one = saltus.find_orbit(unsymmetric, theta=0.3)
+        >>> path = saltus.continue_orbit(one, "load.horizontal.amplitude", (1.35, 1.55))
+        >>> breaking = next(point for point in path.special if point.kind == "BPC")
+        >>> [new.orbits[-1].symmetric for new in saltus.switch_branch(breaking, (1.35, 1.55))]
+        [False, False]
     """
     check_step(step)
     bounds = check_bounds(bounds)
@@ -107,7 +115,12 @@ def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
 
 @dataclass(frozen=True)
 class Cascade:
-    """Period doublings one after the other, and how fast they follow: the ratios tend to Feigenbaum's 4.6692."""
+    """Period doublings one after the other, and how fast they follow: the ratios tend to Feigenbaum's 4.6692.
+
+    Examples:
+        >>> [field for field in ("parameters", "ratios") if hasattr(saltus.orbits.Cascade, field)]
+        ['parameters', 'ratios']
+    """
 
     points: tuple[SpecialPoint, ...]
 
@@ -135,6 +148,14 @@ def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_pe
 
     Raises:
         ParameterError: a special point that is no PD.
+
+    Examples:
+        >>> unsymmetric = system.with_({"load.horizontal.amplitude": 1.6})
+        >>> one = saltus.find_orbit(unsymmetric, theta=0.3)
+        >>> path = saltus.continue_orbit(one, "load.horizontal.amplitude", (1.55, 1.75))
+        >>> first = next(point for point in path.special if point.kind == "PD")
+        >>> saltus.doubling_cascade(first, (1.6, 1.8), max_period=4).parameters.round(6)
+        array([1.684394, 1.742241, 1.750439])
     """
     check_step(step)
     if first.kind != SpecialKind.PD:

@@ -36,6 +36,10 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
 
     Raises:
         ParameterError: what is no orbit.
+
+    Examples:
+        >>> bool(saltus.orbits.defects(branch.orbits[:3]).max() < 1e-10)
+        True
     """
     check_count("rounds", rounds, 1)
     if len(orbits) == 0:

@@ -79,6 +79,11 @@ def phase_portrait(
     Raises:
         ParameterError: a load that varies, several coordinates, numbers, a window or starts without meaning.
         MotionError: a motion that cannot be continued.
+
+    Examples:
+        >>> portrait = saltus.phase_portrait(tristable, duration=5.0)
+        >>> portrait.attrs["saltus_version"] == saltus.__version__
+        True
     """
     points = equilibria(system, window)
     states = _spread(system, window, points, seed) if starts is None else _states(system, starts)

@@ -22,7 +22,13 @@ Arrays = dict[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Failure:
-    """A chunk that failed: which, where in the grid, why, and how often it was tried."""
+    """A chunk that failed: which, where in the grid, why, and how often it was tried.
+
+    Examples:
+        >>> import dataclasses
+        >>> [field.name for field in dataclasses.fields(saltus.sweep.Failure)]
+        ['index', 'place', 'error', 'attempts']
+    """
 
     index: Index
     place: str

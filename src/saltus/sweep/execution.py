@@ -33,7 +33,12 @@ log = logging.getLogger("saltus.sweep")
 
 
 class SweepInterrupted(KeyboardInterrupt):
-    """Ctrl-C during a sweep; the message says what is kept and how to go on."""
+    """Ctrl-C during a sweep; the message says what is kept and how to go on.
+
+    Examples:
+        >>> issubclass(saltus.sweep.SweepInterrupted, KeyboardInterrupt)
+        True
+    """
 
 
 @answered
@@ -46,7 +51,7 @@ def run(
     progress: Progress = silent,
     retries: int = 1,
 ) -> xarray.Dataset:
-    """Compute what is missing of a sweep.
+    r"""Compute what is missing of a sweep.
 
     A chunk whose function raises is reported through `logging` and tried again after the others. Results are written by this
     process alone, wherever they are computed: a cluster's machines need not share its disk.
@@ -70,6 +75,14 @@ def run(
         ParameterError: bad arguments, the store of another plan, or a function that returns something else than planned.
         SweepError: chunks failed for good, the store cannot be written, another run writes to it, or the cluster does not answer.
         SweepInterrupted: Ctrl-C. In all these cases the chunks written before are kept.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> _ = Path("squares.py").write_text("def squares(arguments, block):\n    return {'y': block['x'] ** 2}\n")
+        >>> axes, variables = {"x": np.arange(4.0)}, {"y": saltus.sweep.Variable()}
+        >>> plan = saltus.sweep.Plan(function="squares:squares", axes=axes, variables=variables)
+        >>> saltus.sweep.run(plan)["y"].values
+        array([0., 1., 4., 9.])
     """
     if not isinstance(plan, Plan):
         raise ParameterError(f"plan must be a Plan, got {plan!r:.80}", "plan")

@@ -23,7 +23,12 @@ WRITER = "saltus_version"  # an attribute that says who wrote a store, not what 
 class Variable:
     """A variable of a sweep: its NumPy type (boolean, integer, real or complex), the (name, size) of its dimensions beside the
     grid's axes, its attributes, and the value that stands where nothing is computed yet (by default NaN; 0 or False where
-    there is none)."""
+    there is none).
+
+    Examples:
+        >>> saltus.sweep.Variable(attrs={"units": "rad"}).dtype
+        'float64'
+    """
 
     dtype: str = "f8"
     extra: tuple[tuple[str, int], ...] = ()
@@ -73,6 +78,13 @@ class Plan:
     Raises:
         ParameterError: an unknown function, a bad name, axis or chunk, or something that JSON does not have;
             a grid of more chunks than can be looked through.
+
+    Examples:
+        >>> plan = saltus.sweep.Plan(
+        ...     function="numpy:squeeze", axes={"x": np.arange(4.0)}, chunk={"x": 2}, variables={"y": saltus.sweep.Variable()}
+        ... )
+        >>> plan.axes["x"].size
+        4
     """
 
     function: str

@@ -159,6 +159,9 @@ def remove_store(path: Path | str) -> None:
     Raises:
         ParameterError: there is something else.
         SweepError: a run is writing to it, or it cannot be removed.
+
+    Examples:
+        >>> saltus.sweep.remove_store("nowhere.zarr")
     """
     path = Path(path)
     if not path.exists():
@@ -218,6 +221,12 @@ def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
     Raises:
         ParameterError: no store of a sweep.
         SweepError: it is incomplete or damaged.
+
+    Examples:
+        >>> saltus.sweep.open_store("nowhere.zarr")
+        Traceback (most recent call last):
+            ...
+        saltus.errors.ParameterError: there is no store at nowhere.zarr
     """
     found = status(path, verify=True)
     if found.damaged:

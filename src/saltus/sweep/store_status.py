@@ -28,6 +28,11 @@ class StoreStatus:
     the store's files. `started` is when the store was made, `updated` when the last chunk was written (None: none yet).
     `running` is whether a run on this machine is writing to it, None where the file system has no locks. `damaged` are the files
     that are not what was written, if that was looked at; a chunk with such a file is not done.
+
+    Examples:
+        >>> import dataclasses
+        >>> "done" in [field.name for field in dataclasses.fields(saltus.sweep.StoreStatus)]
+        True
     """
 
     path: Path
@@ -60,6 +65,12 @@ def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
 
     Raises:
         ParameterError: there is no store of a sweep at `path`, or its metadata are damaged.
+
+    Examples:
+        >>> saltus.sweep.status("nowhere.zarr")
+        Traceback (most recent call last):
+            ...
+        saltus.errors.ParameterError: there is no store at nowhere.zarr
     """
     path = Path(path)
     plan = read_plan(path)

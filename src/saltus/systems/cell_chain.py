@@ -134,7 +134,12 @@ class CellChain(Model):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoCells(CellChain):
-    """A `CellChain` of two cells."""
+    """A `CellChain` of two cells.
+
+    Examples:
+        >>> saltus.TwoCells(beta0=1.4, coupling=0.5).coordinates
+        ('lower_1', 'upper_1', 'lower_2', 'upper_2')
+    """
 
     cells: ClassVar[int] = 2
     coordinates: ClassVar[tuple[str, ...]] = _names(2)
@@ -143,7 +148,12 @@ class TwoCells(CellChain):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThreeCells(CellChain):
-    """A `CellChain` of three cells."""
+    """A `CellChain` of three cells.
+
+    Examples:
+        >>> saltus.ThreeCells(beta0=1.4, coupling=0.5).coordinates
+        ('lower_1', 'upper_1', 'lower_2', 'upper_2', 'lower_3', 'upper_3')
+    """
 
     cells: ClassVar[int] = 3
     coordinates: ClassVar[tuple[str, ...]] = _names(3)
@@ -152,7 +162,12 @@ class ThreeCells(CellChain):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FourCells(CellChain):
-    """A `CellChain` of four cells."""
+    """A `CellChain` of four cells.
+
+    Examples:
+        >>> len(saltus.FourCells(beta0=1.4).coordinates)
+        8
+    """
 
     cells: ClassVar[int] = 4
     coordinates: ClassVar[tuple[str, ...]] = _names(4)

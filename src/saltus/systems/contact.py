@@ -17,6 +17,11 @@ class Contact:
     """A contact that keeps a coordinate q on one side of a position p: its gap is sign (q - p) >= 0.
 
     While it is closed, q stays at p, and its reaction, an impulse or a force along q times the sign, is not negative.
+
+    Examples:
+        >>> right = saltus.Contact(name="right", coordinate="x", position=1.0, sign=-1)
+        >>> right.gap(0.25)
+        0.75
     """
 
     name: str  # such as "lower", in events and in the names of stops

@@ -16,6 +16,10 @@ class Channel:
     """One channel of a load at work: `channel(t)` is its value, `.velocity(t)` and `.acceleration(t)` its derivatives.
 
     `t` is the dimensionless time tau: a number, an array, or the symbolic time of a traced model.
+
+    Examples:
+        >>> [channel for channel in system.model.channels if channel in system.load.channels]
+        ['horizontal', 'vertical']
     """
 
     __slots__ = ("_frequency", "_signal")
@@ -59,6 +63,11 @@ class Load:
 
     Raises:
         ParameterError: a harmonic without a frequency, a record or a pulse of the wrong quantity.
+
+    Examples:
+        >>> load = saltus.Load(frequency=2.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5)
+        >>> load.period / np.pi, load.vertical(0.0)
+        (1.0, -0.5)
     """
 
     frequency: float | None

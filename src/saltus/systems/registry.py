@@ -46,6 +46,10 @@ def register(cls: T) -> T:
 
     Raises:
         ParameterError: what is neither; a model whose sides and reset do not go together.
+
+    Examples:
+        >>> saltus.register(saltus.WallOscillator) is saltus.WallOscillator
+        True
     """
     if not isinstance(cls, type):
         raise ParameterError(f"register takes a Model or an ImpactLaw, got {shown(cls)}", "cls")

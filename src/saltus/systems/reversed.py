@@ -51,6 +51,10 @@ def reversed_system(system: System) -> System:
     Raises:
         ParameterError: an impact law without an inverse (`VelocityReduction` with e > 0 has one), or a reset of the model that
             this law does not undo.
+
+    Examples:
+        >>> saltus.systems.reversed_system(system).model.damping
+        0.1
     """
     check_system(system, "reversed_system")
     impact = system.impact

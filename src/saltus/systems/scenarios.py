@@ -16,7 +16,12 @@ Two = tuple[float, float]
 
 
 class Scenario(Enum):
-    """What the impacting layer does (`impact_condition1` to `impact_condition3`)."""
+    """What the impacting layer does (`impact_condition1` to `impact_condition3`).
+
+    Examples:
+        >>> sorted({row.scenario.name for row in saltus.systems.table_1()})
+        ['BOUNCING', 'NO_BOUNCING', 'PARTIAL_BOUNCING']
+    """
 
     NO_BOUNCING = "no bouncing"  # it stops
     BOUNCING = "bouncing"  # it turns back, and is the only one to move, or the other one was open already
@@ -51,7 +56,12 @@ class TableRow:
 
 
 def table_1() -> tuple[TableRow, ...]:
-    """Table 1 as erratum 16 corrects it: s the impacting layer, j the other one; angles are those at the impact."""
+    """Table 1 as erratum 16 corrects it: s the impacting layer, j the other one; angles are those at the impact.
+
+    Examples:
+        >>> [(row.before, row.after) for row in saltus.systems.table_1()][0]
+        ("theta_s = 0, theta_j = 0, theta_j'(-) = 0", "theta_s'(+) = 0, theta_j'(+) != 0")
+    """
     one, two = "theta_s = 0, theta_j = 0, theta_j'(-) = 0", "theta_s = 0, theta_j != 0"
     stops, turns = "theta_s'(+) = 0", "theta_s'(-) theta_s'(+) < 0"
     balance = "M_sj [theta_s'] + M_jj [theta_j'] = 0"

@@ -61,6 +61,11 @@ class Harmonic(Signal):
     """mean + amplitude sin(order Omega tau + phase), with the base frequency Omega of the load and an integer order.
 
     `Harmonic(amplitude=H)` is load (i) of the paper (`loadpatha`); a phase of pi/2 makes it a cosine (`loadpathb`).
+
+    Examples:
+        >>> load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=2.0, mean=1.0))
+        >>> float(load.force(np.pi / 2))
+        3.0
     """
 
     amplitude: float
@@ -130,6 +135,11 @@ class Record(Signal):
 
     Raises:
         ParameterError: fewer than 2 samples (4 for a spline), lengths that differ, times that do not increase, NaN.
+
+    Examples:
+        >>> load = saltus.Load(force=saltus.Record(time=[0.0, 1.0, 2.0], value=[0.0, 4.0, 0.0]))
+        >>> float(load.force(0.25))
+        1.0
     """
 
     time: np.ndarray

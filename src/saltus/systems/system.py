@@ -29,6 +29,12 @@ class System:
 
     Raises:
         ParameterError: a load channel that the model does not read, or cannot as it is.
+
+    Examples:
+        >>> system.get("load.frequency"), system.with_({"load.frequency": 0.9}).get("load.frequency")
+        (1.0, 0.9)
+        >>> saltus.System.from_json(system.to_json()) == system
+        True
     """
 
     model: Model

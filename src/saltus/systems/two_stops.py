@@ -16,7 +16,12 @@ from saltus.systems.model import Model
 @answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoStops(Model):
-    """x'' + c x' + k x = F(tau) for d_1 <= x <= d_2: contacts `left` and `right`, with an impact law such as `NewtonImpact`."""
+    """x'' + c x' + k x = F(tau) for d_1 <= x <= d_2: contacts `left` and `right`, with an impact law such as `NewtonImpact`.
+
+    Examples:
+        >>> [contact.name for contact in saltus.TwoStops(left=-1.0, right=2.0).contacts]
+        ['left', 'right']
+    """
 
     stiffness: float = 1.0  # k, at least 0
     damping: float = 0.0  # c, at least 0

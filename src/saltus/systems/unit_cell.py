@@ -37,6 +37,11 @@ class UnitCell:
 
     Raises:
         ParameterError: angles outside alpha0 > 0, 0 < beta0 < pi, alpha0 + beta0 < pi (`restangle`).
+
+    Examples:
+        >>> cell = saltus.UnitCell(alpha0=0.3, beta0=1.4)
+        >>> float(cell.theta(cell.phi(0.1)))
+        0.10000000000000009
     """
 
     alpha0: float = field(metadata=RADIANS)

@@ -19,7 +19,13 @@ from saltus.theory.loaded_equilibria import zeros_of_slope
 
 @dataclass(frozen=True, slots=True)
 class Peaks:
-    """The two peaks of a periodic motion through theta = 0, and the velocities between which the impacts change it."""
+    """The two peaks of a periodic motion through theta = 0, and the velocities between which the impacts change it.
+
+    Examples:
+        >>> peaks = saltus.theory.peaks(tristable, 0.1)
+        >>> round(peaks.theta_min + peaks.theta_max, 12)  # equal layers: as far to both sides
+        0.0
+    """
 
     theta_min: float  # rad, below 0
     theta_max: float  # rad, above 0
@@ -47,6 +53,10 @@ def peaks(system: System, theta0: float) -> Peaks:
     Raises:
         ParameterError: damping; an impact law under which the motion does not repeat; theta0 = 0, or one from which theta = 0
             is not reached; a peak beyond the kinematic limit; a load that varies in time.
+
+    Examples:
+        >>> round(saltus.theory.peaks(tristable, 0.1).theta_max, 12)
+        0.1
     """
     check_number("theta0", theta0)
     lower, upper = layers(system)
@@ -111,6 +121,10 @@ def unloaded_peak_ratio(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0, *, 
         min(sqrt((1+m)/k), sqrt(k/(1+m)))        if it keeps the velocity (e = 1)
 
     It vanishes for k -> 0 and for k -> infinity; with e = 1 also for m -> infinity.
+
+    Examples:
+        >>> float(saltus.theory.unloaded_peak_ratio(4.0, energy_conserving=True))  # 1 / sqrt(k) or its inverse
+        0.5
     """
     _check_ratios(stiffness_ratio, mass_ratio)
     ratio = np.sqrt((1 if energy_conserving else 1 + np.asarray(mass_ratio)) / np.asarray(stiffness_ratio))
@@ -118,7 +132,13 @@ def unloaded_peak_ratio(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0, *, 
 
 
 def unloaded_half_periods(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -> tuple[Any, float]:
-    """Durations without loads on the lower and on the upper side (`period_case1`): pi sqrt((1+m)/k) and pi, any shape."""
+    """Durations without loads on the lower and on the upper side (`period_case1`): pi sqrt((1+m)/k) and pi, any shape.
+
+    Examples:
+        >>> lower, upper = saltus.theory.unloaded_half_periods(1.0)
+        >>> float(lower), upper
+        (3.141592653589793, 3.141592653589793)
+    """
     _check_ratios(stiffness_ratio, mass_ratio)
     return math.pi * np.sqrt((1 + np.asarray(mass_ratio)) / np.asarray(stiffness_ratio)), math.pi
 
@@ -127,6 +147,10 @@ def unloaded_period(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -> Any:
     """T0(k, m) = pi (1 + sqrt((1+m)/k)) (`period_case2`), any shape; pi for k -> infinity, unbounded for k -> 0 or m -> infinity.
 
     It holds for e = 1 and for r = 1, since without loads the durations do not depend on the amplitude.
+
+    Examples:
+        >>> round(float(saltus.theory.unloaded_period(4.0) / np.pi), 12)  # (1 + 1 / sqrt(k)) half periods
+        1.5
     """
     lower, upper = unloaded_half_periods(stiffness_ratio, mass_ratio)
     return lower + upper
@@ -141,6 +165,11 @@ def reciprocal(system: System, theta0: float) -> tuple[System, float]:
 
     Raises:
         ParameterError: m above 0, or forces on the lower mass, for which the exchange is not of this form.
+
+    Examples:
+        >>> other, theta = saltus.theory.reciprocal(tristable, 0.1)
+        >>> round(abs(theta), 12)  # equal layers: the same motion
+        0.1
     """
     lower, upper = layers(system)
     if lower.mass != upper.mass or lower.vertical != upper.vertical or lower.outward != -upper.outward:

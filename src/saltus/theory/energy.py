@@ -21,12 +21,22 @@ def potential_energy(system: System, theta: Numbers) -> Any:
 
     Raises:
         ParameterError: another model, a smoothed sign, or a load that varies in time.
+
+    Examples:
+        >>> float(saltus.theory.potential_energy(tristable, 0.0))
+        0.0
     """
     return _by_side(system, theta, Layer.potential, odd=False)
 
 
 def potential_slope(system: System, theta: Numbers) -> Any:
-    """dP/dtheta, minus the moment on the open layer; at theta = 0 the mean of its two one-sided values. Any shape."""
+    """dP/dtheta, minus the moment on the open layer; at theta = 0 the mean of its two one-sided values. Any shape.
+
+    Examples:
+        >>> state = saltus.theory.equilibria(tristable)[0]
+        >>> round(abs(float(saltus.theory.potential_slope(tristable, state.theta))), 12)
+        0.0
+    """
     return _by_side(system, theta, Layer.slope, odd=True)
 
 
@@ -39,6 +49,10 @@ def total_energy(system: System, theta: Numbers, velocity: Numbers, side: Number
 
     Raises:
         ParameterError: theta = 0 without `side` where the layers' masses differ: the moving mass is then not known.
+
+    Examples:
+        >>> round(float(saltus.theory.total_energy(tristable, 0.0, 0.2)), 12)  # 0.2^2 / 2, at the contact
+        0.02
     """
     theta, velocity = np.asarray(theta, dtype=float), np.asarray(velocity, dtype=float)
     lower, upper = layers(system)

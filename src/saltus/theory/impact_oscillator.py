@@ -34,6 +34,11 @@ class WallOrbits:
     before and after it: lambda^2 - trace lambda + e^2 D = 0, where a+ + e a- = (1 + e) (F - k wall) makes trace linear in 1 / v:
 
         trace = -e tr + alpha Delta {Omega^2 wall / v - [c (1 - beta) - (k - Omega^2) alpha]}
+
+    Examples:
+        >>> family = saltus.theory.wall_orbits(wall)
+        >>> round(float(family.amplitude(family.speeds(8.0)[-1])), 9)
+        8.0
     """
 
     stiffness: float  # k
@@ -145,7 +150,13 @@ class WallOrbits:
 
 @dataclass(frozen=True)
 class WallOrbit:
-    """One of `WallOrbits`, admissible or not: its impact, its load, its multipliers, and the motion between two impacts."""
+    """One of `WallOrbits`, admissible or not: its impact, its load, its multipliers, and the motion between two impacts.
+
+    Examples:
+        >>> family = saltus.theory.wall_orbits(wall)
+        >>> round(family.orbit(family.speeds(8.0)[-1]).amplitude, 9)
+        8.0
+    """
 
     family: WallOrbits = field(repr=False)
     speed: float  # v > 0 just before the impact
@@ -223,6 +234,10 @@ def wall_orbits(system: System, period: int = 1) -> WallOrbits:
     Raises:
         ParameterError: another model, a force that is not one harmonic of order 1, damping that is not below critical,
             a period below 1, an impact law that is not v+ = -e v-, a resonance without damping, at which no speed (or any) fits.
+
+    Examples:
+        >>> len(saltus.theory.wall_orbits(wall).speeds(8.0))
+        1
     """
     model, load = system.model, system.load
     if not isinstance(model, WallOscillator):

@@ -20,6 +20,10 @@ class Layer:
         mass x'' + damping x' + stiffness x = outward sin(beta0 + x) + vertical cos(beta0 + x)
 
     with the powers P taken: mass (1+m)^P, damping c^P C, stiffness k^P, outward s (1+h)^P H, vertical (1+v)^P V.
+
+    Examples:
+        >>> saltus.theory.open_layer(tristable, 1).mass
+        1.0
     """
 
     side: int
@@ -80,6 +84,10 @@ def open_layer(system: System, side: int) -> Layer:
 
     Raises:
         ParameterError: another model, a smoothed sign, or a load that varies in time.
+
+    Examples:
+        >>> saltus.theory.open_layer(tristable, 1).mass
+        1.0
     """
     model = metainterface(system)
     forces = constant_loads(system)
@@ -98,7 +106,13 @@ def open_layer(system: System, side: int) -> Layer:
 
 
 def layers(system: System) -> tuple[Layer, Layer]:
-    """The lower layer (theta > 0) and the upper one (theta < 0)."""
+    """The lower layer (theta > 0) and the upper one (theta < 0).
+
+    Examples:
+        >>> lower, upper = saltus.theory.layers(tristable)
+        >>> lower.mass, upper.mass
+        (1.0, 1.0)
+    """
     return open_layer(system, 1), open_layer(system, -1)
 
 

@@ -15,7 +15,12 @@ MOMENT_ROUNDING = 4e-15  # moments below this share of a layer's scale are zero
 
 
 class Stability(Enum):
-    """Whether a small disturbance of an equilibrium grows."""
+    """Whether a small disturbance of an equilibrium grows.
+
+    Examples:
+        >>> saltus.theory.undeformed_stability(tristable).name
+        'STABLE'
+    """
 
     STABLE = "stable"
     UNSTABLE = "unstable"
@@ -24,7 +29,12 @@ class Stability(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LoadedEquilibrium:
-    """A state of rest under constant loads."""
+    """A state of rest under constant loads.
+
+    Examples:
+        >>> [state.stable for state in saltus.theory.equilibria(tristable)]
+        [True, False, True, False, True]
+    """
 
     theta: float  # rad
     stability: Stability
@@ -47,6 +57,10 @@ def equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
 
     Raises:
         ParameterError: another model, a smoothed sign, or a load that varies in time.
+
+    Examples:
+        >>> [round(state.theta, 6) for state in saltus.theory.equilibria(tristable)]
+        [-1.422524, -0.549847, 0.0, 0.549847, 1.422524]
     """
     lower, upper = layers(system)
     found = [_deformed(lower, x) for x in zeros_of_slope(lower)] + [_deformed(upper, x) for x in zeros_of_slope(upper)]
@@ -62,6 +76,10 @@ def undeformed_stability(system: System) -> Stability | None:
     With H = 0 it is stable for V cos(beta0) < 0 and unstable for V cos(beta0) > 0; in general, stable if the loads close
     both layers. If they push one open and the other closed the system leaves, and theta = 0 is no equilibrium.
     At V cos(beta0) = 0 the curvature decides, k^P + V sin(beta0).
+
+    Examples:
+        >>> saltus.theory.undeformed_stability(tristable).name
+        'STABLE'
     """
     lower, upper = layers(system)
     closing = (slope_sign(lower), slope_sign(upper))

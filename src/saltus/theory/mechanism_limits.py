@@ -12,7 +12,12 @@ from saltus.systems import Metainterface, System
 
 @dataclass(frozen=True)
 class AmplitudeLimit:
-    """An amplitude that motions of the mechanism do not pass."""
+    """An amplitude that motions of the mechanism do not pass.
+
+    Examples:
+        >>> saltus.theory.amplitude_limits(system)[0].name
+        'line'
+    """
 
     name: str
     value: Any  # rad; an array where the limit varies with a parameter that is one
@@ -25,6 +30,10 @@ def amplitude_limits(system: System, parameters: Mapping[str, Any] | None = None
     Args:
         system: what moves.
         parameters: values, by dotted path, that take the place of those of the system; numbers or arrays.
+
+    Examples:
+        >>> [round(float(limit.value), 9) for limit in saltus.theory.amplitude_limits(system)]  # 100 and 200 degrees
+        [1.745329252, 3.490658504]
     """
     if not isinstance(system.model, Metainterface):
         return ()

@@ -23,6 +23,10 @@ def pendulum_acceleration(system: System, tau: Numbers, theta: Numbers, velocity
 
     Raises:
         ParameterError: beta0 other than pi/2, unequal layers, or forces on the lower mass.
+
+    Examples:
+        >>> float(saltus.theory.pendulum_acceleration(linear, 0.0, 0.0, 0.0))
+        0.0
     """
     model, load = metainterface(system), system.load
     if abs(model.beta0 - math.pi / 2) > 1e-15 or (model.stiffness_ratio, model.mass_ratio, model.dissipation_ratio) != (1, 0, 1):

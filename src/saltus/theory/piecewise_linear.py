@@ -64,7 +64,14 @@ class Arc:
 
 @dataclass(frozen=True, slots=True)
 class LinearMotion:
-    """A motion of the piecewise-linear equation; call it for theta(tau) and theta'(tau)."""
+    """A motion of the piecewise-linear equation; call it for theta(tau) and theta'(tau).
+
+    Examples:
+        >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
+        >>> motion = saltus.theory.linear_motion(constant, 0.1, 3)
+        >>> [round(float(number), 12) for number in motion(0.0)]
+        [0.1, 0.0]
+    """
 
     impact_times: np.ndarray  # (n,) tau_*^[i]
     velocity_before: np.ndarray  # (n,) theta' just before each impact
@@ -103,6 +110,12 @@ def linear_motion(system: System, theta0: float, impacts: int) -> LinearMotion:
     Raises:
         ParameterError: theta0 = 0, a layer that is not subcritical (mu < 1 and k^P + V sin(beta0) > 0), no impacts asked for,
             a load that varies in time.
+
+    Examples:
+        >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
+        >>> times = saltus.simulate(constant, theta=1e-5, duration=10.0).impacts.time
+        >>> bool(np.allclose(times[:2], saltus.theory.linear_motion(constant, 1e-5, 2).impact_times, rtol=1e-4))
+        True
     """
     check_number("theta0", theta0)
     check_count("impacts", impacts, 1, 100_000)  # whose arcs are kept, each an object

@@ -17,7 +17,13 @@ from saltus.theory.layer import metainterface
 
 @dataclass(frozen=True, slots=True)
 class InelasticContact:
-    """A frictionless, perfectly inelastic impact that ends one side."""
+    """A frictionless, perfectly inelastic impact that ends one side.
+
+    Examples:
+        >>> contact = saltus.theory.inelastic_contact(np.deg2rad(80), 0.0, 1)
+        >>> round(float(contact.factor + np.cos(np.deg2rad(160))), 12)
+        0.0
+    """
 
     factor: float  # theta'+ / theta'-, 0 where the motion stops
     restitution: float  # r = T+ / T- on a ground at rest
@@ -39,6 +45,10 @@ def inelastic_contact(beta0: float, mass_ratio: float, side: int) -> InelasticCo
 
     Raises:
         ParameterError: beta0 out of (0, pi), m below 0, a side other than +1 and -1.
+
+    Examples:
+        >>> round(saltus.theory.inelastic_contact(np.deg2rad(80), 0.0, 1).factor, 6)  # -cos(2 beta0)
+        0.939693
     """
     check_number("beta0", beta0, above=0.0, below=math.pi, unit="rad")
     check_number("mass_ratio", mass_ratio, at_least=0.0)
@@ -63,6 +73,10 @@ def energy_factor(system: System, velocity: float, side: int, e: float, tau: flo
 
     Raises:
         ParameterError: T- = 0; a model without kinetic energy.
+
+    Examples:
+        >>> float(saltus.theory.energy_factor(tristable, 0.3, 1, 0.9))  # e^2 on a ground at rest
+        0.81
     """
     before = float(system.model.kinetic_energy(tau, system.model.contact, velocity, side, system.load))
     if before == 0:
@@ -75,6 +89,10 @@ def velocity_factor(system: System, velocity: float, side: int, r: float, tau: f
 
     Raises:
         ParameterError: velocity = 0, or none solves it (errata 26), with the instant and the velocity.
+
+    Examples:
+        >>> round(float(saltus.theory.velocity_factor(tristable, 0.3, 1, 0.81)), 12)  # sqrt(r) on a ground at rest
+        0.9
     """
     if velocity == 0:
         raise ParameterError("e = theta'+ / theta'- has no meaning at velocity 0", "velocity")
@@ -96,6 +114,10 @@ def energy_jump(system: System, velocity: Numbers, side: int, e: Numbers, tau: N
 
     Raises:
         ParameterError: another model.
+
+    Examples:
+        >>> round(float(saltus.theory.energy_jump(tristable, 0.1, 1, 0.5)), 12)  # -(1 - e^2) / 2 theta'^2
+        -0.00375
     """
     model = metainterface(system)
     velocity, e = np.asarray(velocity, dtype=float), np.asarray(e, dtype=float)

@@ -23,6 +23,11 @@ def rocking_period(theta0: Numbers, *, alpha: float) -> Any:
 
     Raises:
         ParameterError: abs(theta0) >= alpha, from where the block overturns.
+
+    Examples:
+        >>> exact = saltus.theory.rocking_period(0.005, alpha=0.01)
+        >>> round(float(exact / (4 * np.arccosh(2.0))), 4)  # half-way to overturning, a slender block
+        1.0
     """
     from scipy.special import elliprf
 
@@ -37,6 +42,10 @@ def short_rocking_period(theta0: Numbers, *, alpha: float) -> Any:
 
     Raises:
         ParameterError: abs(theta0) >= alpha.
+
+    Examples:
+        >>> round(float(saltus.theory.short_rocking_period(1e-6, alpha=0.3) / saltus.theory.rocking_period(1e-6, alpha=0.3)), 4)
+        1.0
     """
     return 4 * np.sqrt(2 * _amplitude(theta0, alpha) / math.sin(alpha))
 
@@ -49,6 +58,10 @@ def slender_rocking_period(theta0: Numbers, *, alpha: float) -> Any:
 
     Raises:
         ParameterError: abs(theta0) >= alpha.
+
+    Examples:
+        >>> round(float(saltus.theory.slender_rocking_period(0.005, alpha=0.01) / (4 * np.arccosh(2.0))), 12)
+        1.0
     """
     return 4 * np.arccosh(1 / (1 - _amplitude(theta0, alpha) / alpha))
 
@@ -61,6 +74,10 @@ def rocking_energy_jump(velocity: Numbers, *, alpha: float, e: float, ground_vel
     Args:
         velocity: theta'- in the time p t, any shape.
         ground_velocity: zeta' in the same time, zeta = 3 U_h / (4 R); it broadcasts.
+
+    Examples:
+        >>> round(float(saltus.theory.rocking_energy_jump(0.1, alpha=0.3, e=0.5)), 12)  # -(1 - e^2) / 2 theta'^2
+        -0.00375
     """
     _check(alpha, e)
     velocity, ground_velocity = np.asarray(velocity, dtype=float), np.asarray(ground_velocity, dtype=float)
@@ -73,6 +90,10 @@ def rocking_energy_decreases(velocity: Numbers, *, alpha: float, e: float, groun
         theta' zeta' > 0,   or   abs(zeta') < (1 + e) / (2 cos(alpha)) abs(theta')
 
     Broadcasts; arrays of bool.
+
+    Examples:
+        >>> bool(saltus.theory.rocking_energy_decreases(0.1, alpha=0.3, e=0.9))
+        True
     """
     _check(alpha, e)
     velocity, ground_velocity = np.asarray(velocity, dtype=float), np.asarray(ground_velocity, dtype=float)
@@ -87,6 +108,10 @@ def housner_restitution(alpha: float) -> float:
 
     Raises:
         ParameterError: sin^2(alpha) >= 2/3, where the block would have to bounce back.
+
+    Examples:
+        >>> round(float(saltus.theory.housner_restitution(np.arcsin(0.5))), 12)  # (1 - 3/8)^2
+        0.390625
     """
     _check(alpha, 1.0)
     factor = 1 - 1.5 * math.sin(alpha) ** 2

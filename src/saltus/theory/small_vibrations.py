@@ -19,7 +19,14 @@ UPRIGHT = 1e-15  # moments V cos(beta0) below this are the rounding of cos(pi/2)
 
 @dataclass(frozen=True, slots=True)
 class Vibration:
-    """The small vibration of one open layer about its own (virtual) centre (`gov_beta_reduced`)."""
+    """The small vibration of one open layer about its own (virtual) centre (`gov_beta_reduced`).
+
+    Examples:
+        >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
+        >>> lower, upper = saltus.theory.vibrations(constant)
+        >>> lower.frequency == upper.frequency
+        True
+    """
 
     frequency: float  # apparent angular frequency Omega_0
     damping_ratio: float  # mu
@@ -35,6 +42,11 @@ def vibrations(system: System) -> tuple[Vibration, Vibration]:
 
     Raises:
         ParameterError: kappa <= 0, where the layer does not vibrate; another model, or a load that varies in time.
+
+    Examples:
+        >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
+        >>> [round(vibration.frequency, 7) for vibration in saltus.theory.vibrations(constant)]
+        [0.7124578, 0.7124578]
     """
     return vibration(layers(system)[0]), vibration(layers(system)[1])
 
@@ -62,6 +74,11 @@ def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
 
     Raises:
         ParameterError: V cos(beta0) > 0 (theta = 0 is then unstable, `stabeunstabletrivial`), or theta0 at or past the saddle.
+
+    Examples:
+        >>> motion = saltus.simulate(tristable, theta=1e-4, duration=1.0)
+        >>> round(float(motion.impacts.time[0] / (saltus.theory.linear_period(1e-4, beta0=np.deg2rad(80), vertical=-1.5) / 4)), 4)
+        1.0
     """
     kappa, closing = _linear(beta0, vertical)
     size = np.abs(np.asarray(theta0, dtype=float))
@@ -94,6 +111,11 @@ def short_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
 
     Raises:
         ParameterError: V cos(beta0) >= 0.
+
+    Examples:
+        >>> short = saltus.theory.short_period(1e-6, beta0=1.4, vertical=-0.5)
+        >>> round(float(short / saltus.theory.linear_period(1e-6, beta0=1.4, vertical=-0.5)), 4)
+        1.0
     """
     closing = _linear(beta0, vertical)[1]
     if closing <= UPRIGHT:
@@ -108,6 +130,11 @@ def upright_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
 
     Raises:
         ParameterError: V (pi/2 - beta0) >= 0, V = -1, or theta0 at or past the saddle V (pi/2 - beta0) / (1+V).
+
+    Examples:
+        >>> upright = saltus.theory.upright_period(1e-9, beta0=1.57, vertical=-0.5)
+        >>> round(float(upright / saltus.theory.short_period(1e-9, beta0=1.57, vertical=-0.5)), 3)
+        1.0
     """
     check_number("beta0", beta0, above=0.0, below=math.pi, unit="rad")
     check_number("vertical", vertical)
@@ -132,6 +159,10 @@ def decayed_amplitude(cycle: Numbers, *, theta0: float, e: float) -> Any:
 
     Raises:
         ParameterError: e out of (0, 1], or n below 1.
+
+    Examples:
+        >>> float(saltus.theory.decayed_amplitude(2, theta0=1.0, e=0.5))  # e^4
+        0.0625
     """
     return theta0 * _factor(cycle, e) ** 4
 
@@ -147,6 +178,10 @@ def decayed_period(cycle: Numbers, *, period: float, e: float) -> Any:
 
     Raises:
         ParameterError: e out of (0, 1], or n below 1.
+
+    Examples:
+        >>> float(saltus.theory.decayed_period(1, period=4.0, e=0.5))
+        2.25
     """
     return (1 + e) ** 2 / 4 * period * _factor(cycle, e) ** 2
 
@@ -156,6 +191,10 @@ def final_time(*, period: float, e: float) -> float:
 
     Raises:
         ParameterError: e out of [0, 1): without losses the vibration goes on for ever.
+
+    Examples:
+        >>> saltus.theory.final_time(period=4.0, e=0.5)  # (1 + e) / (1 - e) quarters of the period
+        3.0
     """
     check_number("e", e, at_least=0.0, below=1.0)
     return (1 + e) / (4 * (1 - e)) * period

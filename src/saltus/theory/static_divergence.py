@@ -12,7 +12,12 @@ from saltus.theory.loaded_equilibria import MOMENT_ROUNDING, LoadedEquilibrium, 
 
 @dataclass(frozen=True, slots=True)
 class Divergence:
-    """The theta(0), at rest, from which the linearised motion does not return to theta = 0 (bullets after `minmin`)."""
+    """The theta(0), at rest, from which the linearised motion does not return to theta = 0 (bullets after `minmin`).
+
+    Examples:
+        >>> saltus.theory.divergence(linear).from_rest
+        False
+    """
 
     from_rest: bool  # from every small theta(0) of at least one sign: theta = 0 is unstable
     above: float | None  # from theta(0) > above; None if never
@@ -30,6 +35,10 @@ def linear_equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
 
     Raises:
         ParameterError: another model, a smoothed sign, or a load that varies in time.
+
+    Examples:
+        >>> len(saltus.theory.linear_equilibria(linear))
+        1
     """
     found = [e for layer in layers(system) if (e := _linear_equilibrium(layer)) is not None]
     undeformed = undeformed_stability(system)
@@ -47,6 +56,10 @@ def divergence(system: System) -> Divergence:
 
     Raises:
         ParameterError: another model, a smoothed sign, or a load that varies in time.
+
+    Examples:
+        >>> saltus.theory.divergence(linear)
+        Divergence(from_rest=False, above=None, below=None)
     """
     lower, upper = layers(system)
     above, below = _threshold(lower), _threshold(upper)

@@ -34,7 +34,13 @@ FRACTAL = FractalSettings()
 
 @dataclass(frozen=True)
 class BasinEntropy:
-    """Basin entropy of a grid cut into boxes (Daza et al., Sci. Rep. 6 (2016) 31416)."""
+    """Basin entropy of a grid cut into boxes (Daza et al., Sci. Rep. 6 (2016) 31416).
+
+    Examples:
+        >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
+        >>> saltus.attractors.basin_entropy(halves).fractal
+        False
+    """
 
     entropy: float  # S_b: the mean over all boxes of sum_j p_j ln(1 / p_j), p_j the share of label j in the box
     boundary: float  # S_bb: the mean over the boxes with more than one label; nan where there are none
@@ -57,6 +63,11 @@ def basin_entropy(labels: Numbers, box: int = 5) -> BasinEntropy:
 
     Raises:
         ParameterError: a grid smaller than a box.
+
+    Examples:
+        >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
+        >>> bool(saltus.attractors.basin_entropy(halves).boundary < np.log(2))  # no sign of a fractal boundary
+        True
     """
     grid = _labels(labels)
     check_count("box", box, 2)
@@ -85,7 +96,13 @@ def _boxes(grid: np.ndarray, box: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class UncertaintyExponent:
-    """f(eps) ~ eps^alpha, the share of states with a different end within eps (Grebogi et al., Phys. Lett. A 99 (1983) 415)."""
+    """f(eps) ~ eps^alpha, the share of states with a different end within eps (Grebogi et al., Phys. Lett. A 99 (1983) 415).
+
+    Examples:
+        >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
+        >>> round(float(saltus.attractors.uncertainty_exponent(halves).dimension), 2)  # of a line
+        1.0
+    """
 
     alpha: float  # 1 for a smooth boundary, towards 0 the more fractal it is; nan without a boundary
     error: float  # standard error of the fit
@@ -110,6 +127,11 @@ def uncertainty_exponent(labels: Numbers, distances: Iterable[int] | None = None
 
     Raises:
         ParameterError: a grid too small for three distances; distances that are no whole numbers.
+
+    Examples:
+        >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
+        >>> round(float(saltus.attractors.uncertainty_exponent(halves).alpha), 2)  # of a smooth boundary
+        1.0
     """
     from scipy.ndimage import maximum_filter, minimum_filter
 
@@ -167,7 +189,13 @@ class WadaVerdict(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Wada:
-    """How near to the boundary all basins are (after Daza et al., Sci. Rep. 5 (2015) 16579)."""
+    """How near to the boundary all basins are (after Daza et al., Sci. Rep. 5 (2015) 16579).
+
+    Examples:
+        >>> thirds = np.repeat([np.arange(63) // 21], 63, axis=0)
+        >>> saltus.attractors.wada(thirds).labels
+        (0, 1, 2)
+    """
 
     labels: tuple[int, ...]
     radii: np.ndarray  # in cells
@@ -201,6 +229,11 @@ def wada(labels: Numbers, radius: int = FRACTAL.radius) -> Wada:
 
     Raises:
         ParameterError: labels that are no grid, a radius below 1.
+
+    Examples:
+        >>> thirds = np.repeat([np.arange(63) // 21], 63, axis=0)
+        >>> float(saltus.attractors.wada(thirds).shares[0])  # no cell of the boundary sees all three stripes
+        0.0
     """
     from scipy.ndimage import distance_transform_cdt, maximum_filter, minimum_filter
 

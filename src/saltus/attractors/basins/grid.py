@@ -130,6 +130,12 @@ def basins_of_attraction(
 
     Raises:
         ParameterError: as for `find_attractors`; a grid that does not increase; attractors of another system.
+
+    Examples:
+        >>> grid = np.linspace(-1.0, 1.0, 5)
+        >>> basins = saltus.basins_of_attraction(system, theta=grid, velocity=grid)
+        >>> np.unique(basins.label)
+        array([1], dtype=int16)
     """
     clock = with_clock(system)
     grid = _grid(clock, velocity, coordinates, found)

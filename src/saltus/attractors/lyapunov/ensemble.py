@@ -58,6 +58,11 @@ def lyapunov_many(
 
     Raises:
         ParameterError: an argument without meaning; several coordinates; a load by records.
+
+    Examples:
+        >>> many = saltus.lyapunov_many(system, theta=[0.3, 0.4], periods=200)
+        >>> sorted(many.data_vars)
+        ['at_half', 'end_theta', 'end_velocity', 'ending', 'error', 'exponent', 'later_half', 'period', 'positive', 'resolution']
     """
     check_run("lyapunov_many", system, periods, transient, tol)
     if len(system.model.coordinates) > 1:

@@ -27,6 +27,11 @@ class Exponents:
 
     They are -inf where the motion comes to rest with a loss at impacts: states beside it are at the same rest after a finite
     time. They are NaN where the motion has no derivative or ends; `note` then says why.
+
+    Examples:
+        >>> exponents = saltus.lyapunov_spectrum(system, theta=0.3, periods=200)
+        >>> round(float(exponents.values.sum()), 9)  # the sum is -C
+        -0.1
     """
 
     values: np.ndarray  # (2 n,) for n coordinates
@@ -110,6 +115,11 @@ def lyapunov_spectrum(
     Raises:
         ParameterError: an argument without meaning; a load by records, which has no period.
         MotionError: as for `simulate`.
+
+    Examples:
+        >>> exponents = saltus.lyapunov_spectrum(system, theta=0.3, periods=200)
+        >>> exponents.values.round(3)  # half of -C each, as the multipliers are complex
+        array([-0.05, -0.05])
     """
     check_run("lyapunov_spectrum", system, periods, transient, tol, several_contacts=not two_trajectories)
     run, start = _Run(system, periods), dict[str, Any](coordinates, velocity=velocity)

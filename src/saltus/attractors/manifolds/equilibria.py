@@ -35,7 +35,13 @@ SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # (step, weight) of the
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """An equilibrium under a constant load."""
+    """An equilibrium under a constant load.
+
+    Examples:
+        >>> places = saltus.attractors.equilibria(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))
+        >>> bool(np.allclose([rest.place for rest in places], [rest.theta for rest in saltus.theory.equilibria(tristable)]))
+        True
+    """
 
     place: float  # the coordinate
     side: int  # 0 at the contact
@@ -56,6 +62,11 @@ def equilibria(system: System, window: Rectangle = PLANE) -> tuple[Equilibrium, 
 
     Raises:
         ParameterError: a load that is not constant, several coordinates, a window without meaning.
+
+    Examples:
+        >>> rests = saltus.attractors.equilibria(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))
+        >>> [rest.stable for rest in rests]
+        [True, False, True, False, True]
     """
     area = check_window(window, system)
     check_constant(system)

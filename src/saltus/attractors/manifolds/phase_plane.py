@@ -42,7 +42,14 @@ class SeparatrixEnd(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Separatrix:
-    """A branch of the stable manifold of a saddle, followed back in time from it; nan where an impact makes the velocity jump."""
+    """A branch of the stable manifold of a saddle, followed back in time from it; nan where an impact makes the velocity jump.
+
+    Examples:
+        >>> curve = saltus.separatrices(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))[0]
+        >>> energy = saltus.theory.total_energy(tristable, curve.theta[1:], curve.velocity[1:])
+        >>> bool(np.ptp(energy) < 1e-6)  # all of it has the energy of its saddle
+        True
+    """
 
     saddle: float
     time: np.ndarray  # (n,), from 0 to negative times
@@ -69,6 +76,10 @@ def separatrices(system: System, window: Rectangle = PLANE, *, span: float = 60.
 
     Raises:
         ParameterError: a load that is not constant, an impact law without an inverse, numbers without meaning.
+
+    Examples:
+        >>> len(saltus.separatrices(tristable, window=((-2.0, 2.0), (-2.0, 2.0))))  # of two saddles
+        4
     """
     area = check_window(window, system)
     check_number("span", span, above=0.0)

@@ -54,7 +54,13 @@ class ManifoldBranch:
 
 @dataclass(frozen=True, eq=False)
 class Manifold:
-    """The stable or unstable manifold of a saddle orbit."""
+    """The stable or unstable manifold of a saddle orbit.
+
+    Examples:
+        >>> saddle = next(o for o in branch.at(0.88) if not o.stable)
+        >>> saltus.stable_manifold(saddle, window=((-1.0, 1.0), (-1.0, 1.0))).stable
+        True
+    """
 
     orbit: PeriodicOrbit
     stable: bool
@@ -102,6 +108,12 @@ def stable_manifold(
     Raises:
         ParameterError: an orbit that is no saddle, or whose system cannot be run backward (v+ = e v- with e > 0 can).
         MotionError: the orbit is at the contact at phase 0, where the map has no derivative.
+
+    Examples:
+        >>> saddle = next(o for o in branch.at(0.88) if not o.stable)
+        >>> curve = saltus.stable_manifold(saddle, window=((-1.0, 1.0), (-1.0, 1.0)))
+        >>> curve.states.shape[1]
+        2
     """
     return _manifold(orbit, True, window, periods, step, points)
 
@@ -115,7 +127,14 @@ def unstable_manifold(
     step: float = 0.01,
     points: int = 100_000,
 ) -> Manifold:
-    """The states that the flow takes away from a saddle orbit: as `stable_manifold`, forward in time."""
+    """The states that the flow takes away from a saddle orbit: as `stable_manifold`, forward in time.
+
+    Examples:
+        >>> saddle = next(o for o in branch.at(0.88) if not o.stable)
+        >>> curve = saltus.attractors.unstable_manifold(saddle, window=((-1.0, 1.0), (-1.0, 1.0)))
+        >>> curve.states.shape[1]
+        2
+    """
     return _manifold(orbit, False, window, periods, step, points)
 
 

@@ -56,6 +56,10 @@ def classify(
 
     Raises:
         ParameterError: an argument without meaning.
+
+    Examples:
+        >>> str(saltus.classify(system, theta=0.3).kind)
+        'periodic'
     """
     clock, start = with_clock(system, "classify", any_model=True), _start(system, velocity, coordinates)
     check_count("periods", periods, SETTINGS.thirds * 2 * LYAPUNOV.batches)

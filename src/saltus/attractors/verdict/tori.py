@@ -31,6 +31,10 @@ def excludes_tori(system: System) -> str | None:
 
     Raises:
         ParameterError: what is no system; a load by records.
+
+    Examples:
+        >>> saltus.excludes_tori(system) is not None  # the damping shrinks areas
+        True
     """
     check_system(system, "excludes_tori", several_contacts=True)
     check_periodic(system)

@@ -26,7 +26,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """Where a motion ends."""
+    """Where a motion ends.
+
+    Examples:
+        >>> verdict = saltus.classify(system, theta=0.3)
+        >>> str(verdict.kind), verdict.period
+        ('periodic', 1)
+    """
 
     system: System
     kind: AttractorKind

@@ -16,7 +16,12 @@ CONSTANT = 1e-9  # relative: a series that varies less does not vary
 
 @dataclass(frozen=True, slots=True)
 class ZeroOne:
-    """The outcome: near 0 for regular motion, near 1 for chaos."""
+    """The outcome: near 0 for regular motion, near 1 for chaos.
+
+    Examples:
+        >>> bool(saltus.zero_one_test(np.sin(np.arange(2000.0))).K < 0.1)  # regular
+        True
+    """
 
     K: float  # the median over the frequencies
     spread: float  # half the distance between their quartiles
@@ -41,6 +46,13 @@ def zero_one_test(series: Numbers, *, seed: int = 0, count: int = 100) -> ZeroOn
 
     Raises:
         ParameterError: a series of other shape, too short, or not finite; a count below 1.
+
+    Examples:
+        >>> logistic = [0.3]
+        >>> for _ in range(2000):
+        ...     logistic.append(4 * logistic[-1] * (1 - logistic[-1]))
+        >>> saltus.zero_one_test(np.sin(np.arange(2000.0))).K < 0.1, saltus.zero_one_test(logistic).K > 0.9
+        (True, True)
     """
     try:
         values = np.asarray(series, dtype=float)

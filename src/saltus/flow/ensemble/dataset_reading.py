@@ -18,7 +18,13 @@ if TYPE_CHECKING:
 
 @answered
 def stop_names(dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
-    """Why each motion ended, in the dimensions of the ensemble; the words are those of `Stop`."""
+    """Why each motion ended, in the dimensions of the ensemble; the words are those of `Stop`.
+
+    Examples:
+        >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2], periods=2)
+        >>> saltus.flow.stop_names(ends)
+        array(['horizon', 'horizon'], dtype='<U10')
+    """
     check_dataset(dataset, "simulate_many", ("stop",))
     stop = dataset["stop"]
     return np.array(stop.attrs["flag_meanings"].split())[stop.values]
@@ -29,6 +35,11 @@ def stroboscopic(system: System, dataset: xarray.Dataset) -> np.ndarray[Any, Any
     """The states (coordinates, then velocities) at the ends of the forcing periods that were kept, in the order of time.
 
     The shape is that of the ensemble, then (periods, d); states are nan where a motion had fewer periods than were kept.
+
+    Examples:
+        >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2], periods=4, last=3)
+        >>> saltus.flow.stroboscopic(system, ends).shape
+        (2, 3, 2)
     """
     names = system.model.coordinates
     states = [*names, *(rate_name(name, names) for name in names)]

@@ -73,6 +73,11 @@ def simulate_many(
 
     Raises:
         ParameterError: an argument without meaning. A trajectory that cannot go on raises nothing: `stop` says so.
+
+    Examples:
+        >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2, 0.3], periods=20)
+        >>> ends.impact_count.values, float(ends.theta[2])
+        (array([39, 39, 39]), -0.23568059529931645)
     """
     check_system(system, "simulate_many", several_contacts=sensitivities is None)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)

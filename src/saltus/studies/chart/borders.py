@@ -44,7 +44,12 @@ KEY = ("row", "column", "amplitude_nrad", "to_row", "to_column")
 
 @dataclass
 class Borders:
-    """Curves through the plane of a chart, each a Dataset along `point`, and what becomes of its changes."""
+    """Curves through the plane of a chart, each a Dataset along `point`, and what becomes of its changes.
+
+    Examples:
+        >>> len(saltus.studies.Borders().curves)
+        0
+    """
 
     curves: list[xarray.Dataset] = field(default_factory=list)
     endings: dict[tuple[int, ...], np.ndarray] = field(default_factory=dict)  # of dtype ENDING, by the key of the change
@@ -107,6 +112,12 @@ def with_borders(
 
     Returns:
         The chart, whose attribute `added_by_continuation` is the number of motions added, and its borders.
+
+    Examples:
+        >>> chart = saltus.stability_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4)
+        >>> _, borders = saltus.studies.with_borders(system, chart)
+        >>> len(borders.curves)  # no border passes between these cells
+        0
     """
     check_count("curves", curves, 0)
     request = ChartRequest.of_chart(system, chart)

@@ -76,6 +76,11 @@ def stability_chart(
 
     Raises:
         ParameterError: an argument without meaning, or one that the system refuses.
+
+    Examples:
+        >>> chart = saltus.stability_chart(system, horizontal=[0.0, 0.2], vertical=[-0.5], starts=4)
+        >>> chart["count"].values  # without a horizontal load there is rest alone
+        array([[0, 1]], dtype=int16)
     """
     from saltus.sweep import run
 
@@ -113,6 +118,11 @@ def bordered_chart(system: System, *, curves: int = 12, progress: Progress = sil
 
     Raises:
         ParameterError, SweepError: as `stability_chart`.
+
+    Examples:
+        >>> made = saltus.studies.bordered_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4, curves=0)
+        >>> sorted(made.children)
+        ['borders', 'chart', 'disagreements', 'static']
     """
     import xarray as xr
 

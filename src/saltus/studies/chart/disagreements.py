@@ -34,6 +34,12 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
         `harmless` those where the same motion goes on, with another amplitude than expected or too small to count;
         `chaos_beside_rest` counts pairs of neighbouring cells, one with rest alone and one with chaos alone, between which no
         motion ends but chaos.
+
+    Examples:
+        >>> chart = saltus.stability_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4)
+        >>> chart, borders = saltus.studies.with_borders(system, chart)
+        >>> saltus.studies.disagreements(chart, borders).attrs["located"]
+        0
     """
     import xarray as xr
 

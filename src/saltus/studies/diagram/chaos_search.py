@@ -78,6 +78,11 @@ def chaotic_bands(
 
     Raises:
         ParameterError: an argument without meaning.
+
+    Examples:
+        >>> bands = saltus.chaotic_bands(system, "load.frequency", (0.98, 1.0), count=3)
+        >>> len(bands.bands)
+        0
     """
     values, area = np.linspace(*bounds, count), check_window(window, system)
     states = starts_at(system, values, starts, area, seed).reshape(-1, 2)

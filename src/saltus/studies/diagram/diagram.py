@@ -116,6 +116,11 @@ def bifurcation_diagram(
 
     Raises:
         ParameterError: an argument without meaning; SweepError: as `saltus.sweep.run`.
+
+    Examples:
+        >>> diagram = saltus.bifurcation_diagram(system, bounds=(0.45, 0.55), max_period=1, values=[0.5], starts=4, bands=False)
+        >>> sorted(diagram.children)
+        ['attractors', 'bands', 'branches', 'orbits', 'points', 'search', 'special', 'unplaced']
     """
     low, high = check_bounds(bounds)
     tried = EFFORTS[read_effort(effort)]
@@ -151,7 +156,14 @@ def _search(search: DiagramSearch, repelling: int, bands: bool, follow: bool, pr
 def response_spectrum(
     system: System, path: str = "load.frequency", bounds: tuple[float, float] = (0.1, 3.0), **options: Any
 ) -> xarray.DataTree:
-    """`bifurcation_diagram` along the forcing frequency, with the same options (the paper's Figs. 9 and 10)."""
+    """`bifurcation_diagram` along the forcing frequency, with the same options (the paper's Figs. 9 and 10).
+
+    Examples:
+        >>> spectrum = saltus.response_spectrum(system, bounds=(0.8, 1.0), max_period=1, values=[0.9], starts=4, bands=False)
+        >>> first = saltus.branch_of(spectrum, 0)
+        >>> first.special_parameter.values[first.kind.values == "LP"].round(6)
+        array([0.908811, 0.848485])
+    """
     return bifurcation_diagram(system, path, bounds, **options)
 
 
