@@ -3,8 +3,29 @@
 import matplotlib.pyplot as plt
 
 ORDER = (
-    *("quickstart", "potential_wells", "coming_to_rest", "rocking_block", "housner", "overturning", "bilinear", "duffing", "two_stops"),
-    *("wall_orbits", "up_and_down", "grazing", "orbits", "period_doubling", "resting_orbit", "response_spectrum", "chaos", "basins", "capture"),
+    *(
+        "quickstart",
+        "potential_wells",
+        "coming_to_rest",
+        "rocking_block",
+        "housner",
+        "overturning",
+        "bilinear",
+        "duffing",
+        "two_stops",
+    ),
+    *(
+        "wall_orbits",
+        "up_and_down",
+        "grazing",
+        "orbits",
+        "period_doubling",
+        "resting_orbit",
+        "response_spectrum",
+        "chaos",
+        "basins",
+        "capture",
+    ),
     *("ensemble", "stability_chart", "sensitivities", "smoothing", "two_layers", "cell_chain", "impact_pair", "record"),
     "physical_units",
 )

@@ -25,6 +25,7 @@ def found(name):
 def names():
     """What the examples of the reference use: the first block of its page."""
     page = (ROOT / "docs" / "reference" / "index.md").read_text(encoding="utf-8")
+    pytest.importorskip("matplotlib").use("agg")
     made = {}
     exec(next(code for kind, code, *_ in blocks(page) if kind == "python"), made)
     return made

@@ -32,6 +32,12 @@ def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
 
     Raises:
         ParameterError: there is no such file, it is of none of these kinds, or it is damaged, in one sentence.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> _ = Path("system.json").write_text(system.to_json())
+        >>> saltus.load("system.json") == system
+        True
     """
     path = Path(path)
     if not path.exists():
@@ -96,6 +102,11 @@ def to_mat(path: str | Path, result: Result) -> Path:
 
     Raises:
         ParameterError: what is no such result; two names that become one.
+
+    Examples:
+        >>> path = saltus.to_mat("branch.mat", branch)
+        >>> path.name
+        'branch.mat'
     """
     import io
 

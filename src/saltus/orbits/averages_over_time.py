@@ -70,6 +70,14 @@ def transmissibility(of: Followed, channel: str, response: Response | None = Non
 
     Raises:
         ParameterError: a channel that does not vary, a motion that was not kept or is shorter, a response that is no numbers.
+
+    Examples:
+        >>> spring = saltus.System(
+        ...     model=saltus.WallOscillator(damping=0.1, wall=9.0), load=saltus.Load(frequency=2.0, force=saltus.Harmonic(1.0))
+        ... )
+        >>> orbit = saltus.find_orbit(spring, x=0.0)
+        >>> round(saltus.transmissibility(orbit, "force") * np.hypot(1 - 2.0**2, 0.1 * 2.0), 9)  # x over force
+        np.float64(1.0)
     """
     course = _course(of, periods)
     model, load = course.system.model, course.system.load
@@ -108,6 +116,15 @@ def mean_dissipated_power(of: Followed, *, periods: int | None = None) -> float:
     Raises:
         ParameterError: a motion that was not kept or is shorter; a model that gives neither its kinetic energy nor its mass
         matrix.
+
+    Examples:
+        >>> spring = saltus.System(
+        ...     model=saltus.WallOscillator(damping=0.1, wall=9.0), load=saltus.Load(frequency=2.0, force=saltus.Harmonic(1.0))
+        ... )
+        >>> orbit = saltus.find_orbit(spring, x=0.0)
+        >>> expected = 0.1 * (2.0 * orbit.amplitude) ** 2 / 2  # c v^2 over a period
+        >>> round(float(saltus.mean_dissipated_power(orbit) / expected), 6)
+        1.0
     """
     course = _course(of, periods)
     return course.mean(-_damping_power(course)) + _impact_losses(course) / course.length

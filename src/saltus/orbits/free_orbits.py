@@ -56,6 +56,12 @@ class FreeOrbit:
     """A free periodic motion of a system with one coordinate, which begins at rest at one of its two turning points.
 
     Where a wall throws it back, the wall is the other turning point.
+
+    Examples:
+        >>> free = saltus.System(model=saltus.RockingBlock(alpha=0.25))
+        >>> orbit = saltus.free_orbit(free, 0.1)
+        >>> bool(abs(orbit.period - saltus.theory.rocking_period(0.1, alpha=0.25)) < 1e-10)
+        True
     """
 
     system: System
@@ -86,6 +92,11 @@ def free_orbit(system: System, amplitude: float) -> FreeOrbit:
     Raises:
         ParameterError: several coordinates, a load that varies, an amplitude without meaning.
         MotionError: the motion does not come back: `FreeOutcome` says why.
+
+    Examples:
+        >>> spring = saltus.System(model=saltus.WallOscillator(stiffness=4.0))
+        >>> round(saltus.free_orbit(spring, -0.5).frequency, 12)  # sqrt(k)
+        2.0
     """
     _check(system, "free_orbit")
     check_number("amplitude", amplitude)
@@ -111,6 +122,11 @@ def backbone(system: System, amplitudes: Iterable[float], *, progress: Progress 
 
     Raises:
         ParameterError: several coordinates, a load that varies, amplitudes that are no numbers.
+
+    Examples:
+        >>> line = saltus.backbone(saltus.System(model=saltus.RockingBlock(alpha=0.25)), [0.05, 0.1, 0.2])
+        >>> bool(np.allclose(line.period, saltus.theory.rocking_period([0.05, 0.1, 0.2], alpha=0.25)))
+        True
     """
     import xarray
 

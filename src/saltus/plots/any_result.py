@@ -40,6 +40,11 @@ def plot(result: Any, **options: Any) -> Any:
 
     Raises:
         ParameterError: what has no picture.
+
+    Examples:
+        >>> axes = saltus.plot(branch)
+        >>> type(axes).__name__
+        'Axes'
     """
     data = result.to_xarray() if hasattr(result, "to_xarray") else result
     if not hasattr(data, "attrs") or not hasattr(data, "data_vars"):

@@ -159,6 +159,11 @@ def frequency_sweep(
 
     Raises:
         ParameterError: an argument without meaning; a load without a frequency.
+
+    Examples:
+        >>> sweep = saltus.frequency_sweep(system, [0.98, 0.99, 1.0], theta=0.3)
+        >>> int(sweep.hysteresis.sum()), sweep.sizes["jump"]
+        (0, 0)
     """
     asked = SweepRequest(
         system=system, path=path, values=values, periods=periods, settle=settle, max_period=max_period, tol=tol,
