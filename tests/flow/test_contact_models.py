@@ -186,3 +186,28 @@ def test_chains_are_read_from_files_and_survive_them():
     system = chain(FourCells)
     assert System.from_toml(system.to_toml()) == system
     assert system.parameters["model.coupling"] == 0.3
+
+
+@pytest.mark.parametrize(
+    ("kind", "impact"),
+    [(TwoCells, NewtonImpact(e=0.4)), (TwoCells, VelocityReduction(0.9)), (FourCells, NewtonImpact(e=0.0, transfer=0.3))],
+)
+def test_chains_in_lanes_are_the_scalar_motions(kind, impact):
+    """Impacts of one contact while others are closed or open, in lanes and one by one: to 1e-9 over two forcing periods."""
+    system, starts = chain(kind, impact=impact), [state(len(kind.coordinates) // 2, seed=seed) for seed in range(20)]
+    columns = dict(zip(kind.coordinates, np.transpose(starts), strict=True))
+    many = saltus.simulate_many(system, **columns, velocity=(0.0,) * len(columns), duration=6.0, tol=1e-14)
+    for i, theta in enumerate(starts):
+        motion = follow(system, theta, duration=6.0)
+        there = [float(many[name][i]) for name in kind.coordinates]
+        np.testing.assert_allclose(there, motion.position, rtol=0, atol=1e-9)
+
+
+def test_an_impact_pair_in_lanes_moves_like_each_by_itself():
+    system = System(model=ImpactPair(), load=Load(frequency=1.0, force=Harmonic(amplitude=0.5)), impact=NewtonImpact(e=0.6))
+    speeds = np.linspace(-1.0, 1.0, 21)
+    many = saltus.simulate_many(system, z=0.1, x=0.2, velocity=(speeds, 0.5), duration=15.0, tol=1e-13)
+    for i, speed in enumerate(speeds):
+        motion = saltus.simulate(system, z=0.1, x=0.2, velocity=(speed, 0.5), duration=15.0, tol=1e-13)
+        assert int(many.impact_count[i]) == len(motion.impacts) > 0
+        np.testing.assert_allclose([float(many.z[i]), float(many.x[i])], motion.position, rtol=0, atol=1e-9)

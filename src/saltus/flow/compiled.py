@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -31,6 +32,7 @@ from saltus.flow.contacts import (
     contact_tangent,
     contacts_kernel,
 )
+from saltus.flow.contacts.one_free import OneFree, equations_of_one_free
 from saltus.flow.memory_layout import State
 from saltus.taylor import (
     Case,
@@ -188,6 +190,8 @@ def constants(trace: Trace) -> dict[Expr, int]:
     for _, _, changes in event_derivatives.changes(trace) if trace.columns else []:
         roots += changes.values()
     roots += event_derivatives.number_slopes(trace)
+    equations = one_free(trace)
+    roots += equations.roots if equations else []
     return shared_constants(roots)
 
 
@@ -198,6 +202,16 @@ def motion_roots(trace: Trace) -> list[Expr]:
         *([] if trace.gap is None else [trace.gap]),
         *(substitute(root, accelerations) for root in (*trace.reactions, *trace.margins.values())),
     ]
+
+
+def one_free(trace: Trace) -> OneFree | None:
+    """The equations of a trace with several contacts where one coordinate is free, if it has such."""
+    if trace not in _one_free:
+        _one_free[trace] = equations_of_one_free(trace, motion_roots(trace)[len(trace.reactions) :])
+    return _one_free[trace]
+
+
+_one_free: WeakKeyDictionary[Trace, OneFree | None] = WeakKeyDictionary()
 
 
 def _geometry(trace: Trace) -> list[Expr]:

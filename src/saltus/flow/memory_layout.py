@@ -57,6 +57,8 @@ class LaneSlot(IntEnum):
     SIDE = 2
     NEW_TIME = 3  # of what a step proposes
     NEW_SIDE = 4  # after an impact
+    FREE_POSITION = 32  # of the one coordinate that is free, in a model with several contacts
+    FREE_VELOCITY = 33
 
 
 class LanePart(IntEnum):
@@ -73,16 +75,20 @@ class LanePart(IntEnum):
     PARAMETERS = 8
     FREE = 9  # 1 for each coordinate that no contact holds, else 0, of a model with several
     CONTACTS = 10  # their positions
-    CONSTANTS = 11
-    RECORDS = 12
-    POSITIONS = 13  # from here on Taylor series, each of SERIES_LENGTH slots
-    VELOCITIES = 14
-    ACCELERATIONS = 15
-    MARGINS = 16  # with the reactions of several contacts before them
+    MASS = 11  # matrix at the new state, by rows
+    RESTITUTION = 12  # E by rows
+    IMPULSES = 13  # room for the impulses of an impact
+    CONSTANT_GUARDS = 14  # margins that do not change while one coordinate is free
+    CONSTANTS = 15
+    RECORDS = 16
+    POSITIONS = 17  # from here on Taylor series, each of SERIES_LENGTH slots
+    VELOCITIES = 18
+    ACCELERATIONS = 19
+    MARGINS = 20  # with the reactions of several contacts before them
 
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-FIRST_PART = 32  # slot: those before it do not depend on the structure
+FIRST_PART = 34  # slot: those before it do not depend on the structure
 LOWEST_ORDER, HIGHEST_ORDER = 14, 22  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
 SERIES_LENGTH = HIGHEST_ORDER + 1

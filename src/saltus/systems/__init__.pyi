@@ -7,7 +7,7 @@ from .impact_pair import ImpactPair
 from .load import Channel, Load
 from .metainterface import Metainterface
 from .model import MarginKind, Model
-from .newton_impact import NewtonImpact, energy_gain
+from .newton_impact import NewtonImpact, energy_gain, energy_gains
 from .parameter_tables import broadcast_arrays, check_parameters, finite_array, parameter_table
 from .parameters import children, is_number, numbers, substitute
 from .pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Pulse, Ramp, Ricker
@@ -74,6 +74,7 @@ __all__ = [
     "children",
     "constrained_acceleration",
     "energy_gain",
+    "energy_gains",
     "finite_array",
     "is_number",
     "mass_and_force",

@@ -67,17 +67,28 @@ def energy_gain(model: Model, impact: ImpactLaw) -> dict[str, float]:
         >>> saltus.energy_gain(heavy, saltus.NewtonImpact(transfer=1.0))["upper"]  # the lower mass is heavier by that share
         0.7
     """
+    return {name: float(share) for name, share in energy_gains(model, impact).items()}
+
+
+def energy_gains(model: Any, impact: Any, shape: tuple[int, ...] = ()) -> dict[str, np.ndarray]:
+    """`energy_gain` of a model and a law, or of twins of them (see `substitute`) whose numbers may be arrays of that shape."""
     contacts, names = model.contacts, model.coordinates
     places = [names.index(contact.coordinate) for contact in contacts]
-    matrix, gain = np.array(impact.restitution_matrix(model), dtype=float), {}
+    matrix, gain = impact.restitution_matrix(model), {}
+    size, free = len(names), [k for k in range(len(names)) if k not in places]
     for s, contact in enumerate(contacts):
-        before, after, q = np.zeros(len(names)), np.zeros(len(names)), [0.0] * len(names)
+        before, after, q = np.zeros(size), [0.0] * size, [np.zeros(shape)] * size
         for j, other in enumerate(contacts):
             if j == s or other.coordinate != contact.coordinate:
-                q[places[j]], after[places[j]] = float(other.position), other.sign * matrix[j, s]
+                q[places[j]], after[places[j]] = q[places[j]] + other.position, other.sign * matrix[j][s]
         before[places[s]] = -contact.sign
-        mass = np.atleast_2d(np.array(model.mass_matrix(q[0] if len(q) == 1 else tuple(q)), dtype=float))
-        free = [k for k in range(len(names)) if k not in places]
-        after[free] = -np.linalg.solve(mass[np.ix_(free, free)], mass[free] @ (after - before))
-        gain[contact.name] = float(after @ mass @ after / (before @ mass @ before)) - 1.0
+        given = model.mass_matrix(q[0] if size == 1 else tuple(q))
+        entries = np.broadcast_arrays(*after, *([given] if size == 1 else [entry for row in given for entry in row]))
+        table = np.stack([entry.astype(float) for entry in entries], axis=-1)
+        left, mass = table[..., :size].copy(), table[..., size:].reshape(*table.shape[:-1], size, size)
+        if free:
+            pushed = (mass @ (left - before)[..., None])[..., free, :]
+            left[..., free] = -np.linalg.solve(mass[..., free, :][..., free], pushed)[..., 0]
+        energy = [(v * (mass @ v[..., None])[..., 0]).sum(axis=-1) for v in (left, before)]
+        gain[contact.name] = energy[0] / energy[1] - 1.0
     return gain

@@ -1,4 +1,5 @@
 from .cache import cache_directory, compiled_part, digest, is_compiled, load_module, module_name
+from .common_form import CommonForm
 from .derivatives import FREQUENCY, derivative_along, partial_derivative, tangent_leaves, time_derivative
 from .equations import equations_of
 from .exact_algebra import Form, NoNormalForm, constant, constant_value, normal_form
@@ -47,6 +48,7 @@ __all__ = [
     "RECORD_WIDTH",
     "WIDTH",
     "Case",
+    "CommonForm",
     "Expr",
     "Form",
     "NoNormalForm",

@@ -38,6 +38,7 @@ class Rows:
     roots: Sequence[Place | None]  # None: not kept
     capacity: int  # the most coefficients of a series
     any_order: bool
+    numbers: Sequence[Place] = ()  # of further roots that do not change
 
 
 class Series:
@@ -88,10 +89,14 @@ class Series:
                     self._put(row.place, LONG(0), row.first[0])
         pulls = [self.rows[root] for root in roots[: len(self.positions)]]
         kept = [
-            (self.memory.pointer(place), self.rows[root]) for place, root in zip(self.layout.roots, roots, strict=True) if place
+            (self.memory.pointer(place), self.rows[root]) for place, root in zip(self.layout.roots, roots, strict=False) if place
         ]
+        numbers = zip(self.layout.numbers, roots[len(self.layout.roots) :], strict=True)
         for _ in self._each_order():
             self._advance()
+            if self.starts:
+                for place, root in numbers:
+                    self.memory.store(place, self.now(self.rows[root]))
             for position, velocity, pull in zip(self.positions, self.velocities, pulls, strict=True):
                 self._integrate(position, self.now(velocity))
                 self._integrate(velocity, self.now(pull))

@@ -16,11 +16,13 @@ from saltus.flow.compiled import contacts_module, kernel_module
 from saltus.flow.contacts import complementarity, contact_impacts, contact_layout
 from saltus.flow.ensemble import (
     contact_function_types,
+    contact_steps,
     contacts_handoff,
     contacts_of_lane,
     driver,
     forcing_periods,
     function_types,
+    lane_impacts,
     lane_layout,
     lane_state,
     lane_steps,
@@ -63,7 +65,16 @@ def load_driver(several: bool = False) -> Callable[..., None]:
 
 
 def _driver_text(several: bool) -> str:
-    step = (contact_layout, complementarity, contact_impacts, contacts_of_lane, several_contacts) if several else (one_contact,)
+    of_several = (
+        contact_layout,
+        complementarity,
+        contact_impacts,
+        contacts_of_lane,
+        contact_steps,
+        lane_impacts,
+        several_contacts,
+    )
+    step = of_several if several else (one_contact,)
     common = (memory_layout, kernel_layout, lane_layout, contact_side, records, lane_steps, meeting, sampling)
     return _text(several, *common, *step, forcing_periods, driver)
 
@@ -107,7 +118,8 @@ def load_helpers(several: bool = False) -> tuple[Any, ...]:
 def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
     """A structure's memory and its functions for lanes."""
     module = load_module("lane", generated_header(_SIGNATURES) + lane_functions_text(trace))
-    return slots_of(trace), tuple(pointer(getattr(module, f"lane_{name}")) for name in ("series", "impact", "field"))
+    names = ("series", "impact", "field", "one_free")[: 4 if trace.signs else 3]
+    return slots_of(trace), tuple(pointer(getattr(module, f"lane_{name}")) for name in names)
 
 
 @cache

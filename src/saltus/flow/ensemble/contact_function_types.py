@@ -8,6 +8,7 @@ from saltus.flow.ensemble.function_types import (
     JOBS,
     LANE_FIELD,
     LANE_IMPACT,
+    LANE_ONE_FREE,
     LANE_ROOT,
     LANE_SERIES,
     RESULTS,
@@ -25,7 +26,8 @@ LANES = types.Tuple((_i2, _f2, _f2, _f2, _f3, _i2, _i3))
 _SOLVER = types.Tuple((_f1, *4 * (_f2,), *12 * (_f1,), _f2))
 SPACE = types.Tuple((_f1, _f1, _i1, _f1, _i2, _SOLVER))
 with pointers():
-    CODE = types.Tuple([types.FunctionType(s) for s in (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS, MATRICES)])
+    _functions = (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS, MATRICES, LANE_ONE_FREE)
+    CODE = types.Tuple([types.FunctionType(s) for s in _functions])
     SCALAR = types.Tuple((types.FunctionType(ADVANCE_CONTACTS), CONTACT_MODEL))
     SCALAR_MOTION = types.UniTuple(_i, 2)(_i, SCALAR, _i1, _i1, _f1, _i1, _f1, LANES, _f2, TABLES, _f1, _i1)
     CONTACTS_IMPACT = _i(_i, _i, SCALAR, _i1, _i1, _f1, _f1, LANES, _f2, TABLES, SPACE)

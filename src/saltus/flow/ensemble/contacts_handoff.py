@@ -62,7 +62,10 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
         np.empty((BUFFER_LENGTH, 2)),
         np.empty((BUFFER_LENGTH, own, where[Where.ORDER] + 2)),
     )
-    events = (np.empty((BUFFER_LENGTH, 4), np.int64), np.empty((BUFFER_LENGTH, 1 + 2 * own + contacts.shape[0])))
+    events = (
+        np.empty((BUFFER_LENGTH, 4), np.int64),
+        np.empty((BUFFER_LENGTH, 1 + 2 * own + contacts.shape[0] + sizes[Size.COLUMNS])),
+    )
     while True:
         status = advance(where, state, limits, env, model, contacts, steps, events)
         detail = record_impacts(lane, where, m, contacts, events)
@@ -71,6 +74,7 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
             break
     put_state(lane, at, m, flags, lanes, where, state)
     put(m, Slot.SIDE, lane, 1.0 + tell_closed(lane, at, m, contacts))
+    lanes[LaneArray.LABELS][lane, LaneLabel.LEAVE_BY] = where[Where.LEAVE_BY]
     if not is_smooth(where, contacts):
         flags[Flag.SCALAR] |= 1 << lane
     if status in (Status.DONE, Status.SMOOTH, Status.FULL, Status.PAUSED):

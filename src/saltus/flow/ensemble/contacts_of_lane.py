@@ -17,7 +17,7 @@ from saltus.taylor import get, lean_jit, put
 def tell_closed(lane, at, m, contacts):
     """Tell the model's functions which coordinates of a lane are free; returns its closed contacts as bits."""
     closed = 0
-    for d in range(at[LanePart.VELOCITY] - at[LanePart.POSITION]):
+    for d in range(at[LanePart.CONTACTS] - at[LanePart.FREE]):
         put(m, at[LanePart.FREE] + d, lane, 1.0)
     for i in range(contacts.shape[0]):
         if contacts[i, ContactColumn.CLOSED] == 1:

@@ -11,7 +11,9 @@ from saltus.flow.ensemble.wanted import Sample, Until, Wanted
 from saltus.flow.kernel_layout import Mode, Status
 from saltus.flow.motion_dataset import rate_name
 from saltus.flow.stops import Stop
+from saltus.flow.validity import ROUNDING
 from saltus.provenance import provenance
+from saltus.systems import energy_gains, substitute
 from saltus.taylor import FREQUENCY
 
 if TYPE_CHECKING:
@@ -40,6 +42,7 @@ FIXED = (
         "time",
         "side",
         "closed_contacts",
+        "gaining_contacts",
         "stop",
         "limit",
         "recurrence_period",
@@ -80,6 +83,8 @@ def to_dataset(system: System, inputs: Inputs, wanted: Wanted, jobs: Jobs, ends:
     writer = _Writer(system.model, inputs)
     _add_ends(writer, jobs, ends, system.model.contacts)
     _add_stops(writer, ends, wanted, bool(system.model.singularity))
+    if system.model.contacts:
+        _add_gains(writer, system, inputs)
     _add_samples(writer, ends, wanted.sample)
     if wanted.paths is not None:
         _add_derivatives(writer, jobs, ends, wanted.paths, wanted.periods)
@@ -119,8 +124,7 @@ def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends, contacts: tuple[Contact, 
     held = np.isin(ends.of(EndLabel.MODE), (Mode.REST, Mode.CHATTER))
     side, names = ends.of(EndLabel.SIDE), [contact.name for contact in contacts]
     if names:
-        flags = {"flag_masks": np.array([1 << i for i in range(len(names))], dtype=np.int16), "flag_meanings": " ".join(names)}
-        writer.add("closed_contacts", (side - 1).astype(np.int16), "1", "contacts that are closed at the end", **flags)
+        writer.add("closed_contacts", (side - 1).astype(np.int16), "1", "contacts that are closed at the end", **_masks(names))
         side = np.ones_like(side)
     writer.add("side", np.where(held, 0, side).astype(np.int8), "1", "side at the end, 0 at rest")
     writer.add("impact_count", ends.of(EndLabel.IMPACTS), "1", "impacts")
@@ -130,6 +134,21 @@ def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends, contacts: tuple[Contact, 
         writer.add("periods", _periods(jobs, ends) + part, "1", "forcing periods from the start to the end")
     text = "speed of the gap after impacts too small to be followed, else 0"
     writer.add("chatter_speed", ends.numbers[:, EndNumber.CHATTER_SPEED], "1", text)
+
+
+def _masks(names: list[str]) -> dict[str, Any]:
+    """What the bits of a number stand for, as the CF conventions write it."""
+    return {"flag_masks": np.array([1 << i for i in range(len(names))], dtype=np.int16), "flag_meanings": " ".join(names)}
+
+
+def _add_gains(writer: _Writer, system: System, inputs: Inputs) -> None:
+    """The contacts at which the impact law may gain energy, as in `Validity.gains`."""
+    twin = substitute(system, lambda path, value: inputs.parameters.get(path, value))
+    which = np.zeros(inputs.size, dtype=np.int16)
+    gains = energy_gains(twin.model, twin.impact, which.shape)
+    for i, gain in enumerate(gains.values()):
+        which |= np.where(gain > ROUNDING, 1 << i, 0).astype(np.int16)
+    writer.add("gaining_contacts", which, "1", "contacts at which impacts may gain energy", **_masks(list(gains)))
 
 
 def _periods(jobs: Jobs, ends: Ends) -> np.ndarray:

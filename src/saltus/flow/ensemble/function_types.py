@@ -11,7 +11,7 @@ _f, _i = types.float64, types.int64
 _f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
 _i1, _i2 = (types.Array(_i, n, "C") for n in (1, 2))
 
-LANE_SERIES = types.void(_f1, _i)  # memory of the lanes, order
+LANE_SERIES = LANE_ONE_FREE = types.void(_f1, _i)  # memory of the lanes, order
 LANE_IMPACT = LANE_FIELD = types.void(_f1)
 LANE_ROOT = _f(_f1, _i, _i, _i, _f, _f, _f, _i, _f1, _f1)
 TURNING_RANGE = types.UniTuple(_f, 2)(_f1, _i, _f, _f, _f1)

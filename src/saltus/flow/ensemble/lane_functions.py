@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from saltus.flow.compiled import constants, motion_roots
+from saltus.flow.compiled import constants, motion_roots, one_free
 from saltus.flow.event_derivatives import saltation
 from saltus.flow.memory_layout import FIRST_PART, SERIES_LENGTH, LanePart, LaneSlot
 from saltus.taylor import RECORD_WIDTH, Case, Expr, Places, Rows, Trace, function_text, tape
@@ -22,12 +22,15 @@ class Slots:
     constants: int
     records: int
     stops: int
+    guards: int | None = None  # where one coordinate is free; None without such equations
+    constant_guards: int = 0
 
     @cached_property
     def places(self) -> dict[LanePart, int]:
         """The first slot of each part."""
-        sizes = [self.rows] * 8 + [self.parameters, self.own if self.contacts else 0, self.contacts, self.constants]
-        sizes += [self.records * RECORD_WIDTH]
+        several, contacts = self.own if self.contacts else 0, self.contacts
+        sizes = [self.rows] * 8 + [self.parameters, several, contacts, several**2, contacts**2]
+        sizes += [several * (several + 2) + contacts, self.constant_guards, self.constants, self.records * RECORD_WIDTH]
         sizes += [rows * SERIES_LENGTH for rows in (self.rows, self.rows, self.own, self.stops)]
         return {part: FIRST_PART + sum(sizes[:part]) for part in LanePart}
 
@@ -39,6 +42,7 @@ class Slots:
 
 def slots_of(trace: Trace) -> Slots:
     """The memory that a structure needs."""
+    equations = one_free(trace)
     return Slots(
         rows=len(trace.acceleration),
         own=trace.dof,
@@ -47,13 +51,16 @@ def slots_of(trace: Trace) -> Slots:
         constants=max(1, len(constants(trace))),
         records=len(trace.records),
         stops=len(trace.reactions) + len(trace.margins),
+        guards=len(equations.guards) if equations else None,
+        constant_guards=len(equations.constant_guards) if equations else 0,
     )
 
 
 def lane_functions_text(trace: Trace) -> str:
-    """The source of `lane_series`, `lane_impact` and `lane_field`."""
+    """The source of `lane_series`, `lane_impact` and `lane_field`, and of a model with several contacts `lane_one_free`."""
     slots, known = slots_of(trace), constants(trace)
-    return _series(trace, slots, known) + _impact(trace, slots, known) + _field(trace, slots, known)
+    functions = [_series(trace, slots, known), _impact(trace, slots, known), _field(trace, slots, known)]
+    return "".join([*functions, _one_free(trace, slots, known)] if trace.signs else functions)
 
 
 def _leaves(slots: Slots, time: LaneSlot, position: LanePart, velocity: LanePart) -> dict[str, tuple[str, int]]:
@@ -83,8 +90,35 @@ def _series(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
     return function_text("lane_series", places, "LANES", [*content, tape([*trace.acceleration, *margins], known, series=True)])
 
 
+def _one_free(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
+    """`lane_one_free(m, order)`: the same of the one coordinate that is free, as row 0.
+
+    `OneFree.curved` are put where the other coordinates would be, the guards in the rows of margins.
+    """
+    leaves = _leaves(slots, LaneSlot.NOW, LanePart.POSITION, LanePart.VELOCITY)
+    leaves |= {"coordinate": ("m", int(LaneSlot.FREE_POSITION)), "velocity": ("m", int(LaneSlot.FREE_VELOCITY))}
+    places, equations = Places(("m", "order"), leaves), one_free(trace)
+    if equations is None:
+        return function_text("lane_one_free", places, "LANES", [])
+    first = {part: ("m", slots.places[part]) for part in LanePart}
+    guards = [("m", slots.places[LanePart.MARGINS] + i * SERIES_LENGTH) for i in range(len(equations.guards))]
+    numbers = [("m", slots.places[LanePart.CONSTANT_GUARDS] + i) for i in range(len(equations.constant_guards))]
+    curved = [("m", slots.places[LanePart.POSITIONS] + i * SERIES_LENGTH) for i in range(1, slots.own)]
+    targets = [first[LanePart.ACCELERATIONS], *curved, *guards]
+    state = [first[LanePart.POSITIONS]], [first[LanePart.VELOCITIES]]
+    rows = Rows(*state, targets, SERIES_LENGTH, any_order=False, numbers=numbers)
+    return function_text("lane_one_free", places, "LANES", [rows, tape(equations.roots, known, series=True)])
+
+
 def _impact(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
-    """`lane_impact(m)`: the side, positions and velocities after an impact at the new state, the tangent's columns included."""
+    """`lane_impact(m)`: the side, positions and velocities after an impact at the new state, the tangent's columns included.
+
+    Of a model with several contacts the mass matrix and E there.
+    """
+    if trace.signs:
+        entries = {LanePart.MASS: trace.mass, LanePart.RESTITUTION: trace.restitution}
+        filled = {("m", slots.places[part] + i): root for part, roots in entries.items() for i, root in enumerate(roots)}
+        return _at_new_state("lane_impact", slots, filled, known)
     if trace.contact is None or trace.next_side is None or trace.velocity_after is None:
         return _at_new_state("lane_impact", slots, {}, known)
     positions, velocities = [trace.contact], [trace.velocity_after]

@@ -47,6 +47,8 @@ class Slot(IntEnum):
     NEXT_CHECK = 29  # the number of impacts at which it is checked next that they do not accumulate without end
     LAST_CHECK = 30  # the time at which that was last checked
     NEW_SPEED = 31  # of an impact, before it, of a model with several contacts
+    FREE_POSITION = LaneSlot.FREE_POSITION
+    FREE_VELOCITY = LaneSlot.FREE_VELOCITY
 
 
 class Size(IntEnum):
@@ -66,7 +68,10 @@ class Size(IntEnum):
     SETTLE = 11  # whether a trajectory ends when it repeats itself
     ENDS_ASKED = 12  # whether the ends of forcing periods are asked for at all
     EVERY_END = 13  # whether each of them is looked at
-    CONTACTS = 14  # of a model with several; their coordinates stand behind, then their signs
+    ONE_FREE = 14  # whether there is a series for lanes in which one coordinate is free (see `one_free.py`)
+    GUARDS = 15  # of that series
+    CONSTANT_GUARDS = 16
+    CONTACTS = 17  # of a model with several; their coordinates stand behind, then their signs
 
 
 class LaneSetting(IntEnum):
@@ -134,6 +139,7 @@ class Code(IntEnum):
     FIELD = 2
     CONSTANTS = 3
     GEOMETRY = 4  # or `matrices`
+    ONE_FREE = 5  # of a model with several contacts: the series where one coordinate is free
 
 
 class JobArray(IntEnum):

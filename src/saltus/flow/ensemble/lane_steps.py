@@ -60,22 +60,29 @@ def step_limits(order, tol):
 
 
 @inline_jit
-def natural_step(m, at, sizes, limits):
-    """The step that every row's series allows, those of the tangent's columns included, and the size of the state.
-
-    `limits` are `step_limits` of the rows, and of the columns.
-    """
-    rows, size = sizes[Size.OWN], splat(SMALLEST)
-    for row in range(rows):
+def state_size(m, at, sizes):
+    """The largest coordinate or velocity."""
+    size = splat(SMALLEST)
+    for row in range(sizes[Size.OWN]):
         size = maximum(
             size, maximum(absolute(load(m, at[LanePart.POSITION] + row)), absolute(load(m, at[LanePart.VELOCITY] + row)))
         )
+    return size
+
+
+@inline_jit
+def natural_step(m, at, sizes, limits, size):
+    """The step that every row's series allows, those of the tangent's columns included, relative to the size of the state.
+
+    `limits` are `step_limits` of the rows, and of the columns.
+    """
+    rows = sizes[Size.OWN]
     step = row_step(m, at[LanePart.VELOCITIES], sizes[Size.ORDER], size, limits[0])
     for row in range(1, rows):
         step = minimum(step, row_step(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH, sizes[Size.ORDER], size, limits[0]))
     for first in range(rows, rows * (1 + sizes[Size.COLUMNS]), rows):
         step = minimum(step, column_step(m, at, sizes, first, limits[1]))
-    return step, size
+    return step
 
 
 @lean_jit

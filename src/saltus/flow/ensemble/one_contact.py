@@ -9,7 +9,16 @@ import numpy as np
 
 from saltus.flow.contact_side import side_of_state
 from saltus.flow.ensemble.lane_layout import FAST, Code, Flag, LaneArray, LaneSetting, Size, Slot
-from saltus.flow.ensemble.lane_steps import both_at, commit, margins_certain, natural_step, row_count, series_true, sweep
+from saltus.flow.ensemble.lane_steps import (
+    both_at,
+    commit,
+    margins_certain,
+    natural_step,
+    row_count,
+    series_true,
+    state_size,
+    sweep,
+)
 from saltus.flow.ensemble.meeting import meet
 from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE, pass_ends, record_others, record_range
 from saltus.flow.memory_layout import SERIES_LENGTH, LanePart
@@ -68,7 +77,8 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
     """
     order = sizes[Size.ORDER]
     code[Code.SERIES](m, order)
-    natural, size = natural_step(m, at, sizes, limits)
+    size = state_size(m, at, sizes)
+    natural = natural_step(m, at, sizes, limits, size)
     now, limit = load(m, Slot.NOW), load(m, Slot.STEP_LIMIT)
     h = minimum(natural, limit - now)
     alive = flags[Flag.BUSY] & ~flags[Flag.SCALAR]

@@ -15,6 +15,7 @@ from saltus.taylor import (
     absolute,
     bits,
     get,
+    inline_jit,
     lean_jit,
     load,
     mask,
@@ -40,7 +41,8 @@ MOST_MOVES = 60  # steps of Newton's method to a turning point: more than bisect
 def turning_value(m, at, row, order, low, high, v0, chosen):
     """The position where a velocity, monotonic and of two signs at the ends, the first that of `v0`, vanishes."""
     h, tau = high - low, 0.5 * (low + high)
-    active, start, before = chosen, load(m, at[LanePart.POSITION] + row), row * SERIES_LENGTH
+    before = row * SERIES_LENGTH
+    active, start = chosen, load(m, at[LanePart.POSITIONS] + before)
     for _ in range(MOST_MOVES):
         _, v, a, _ = motion_at(m, at, row, order, start, tau)
         first = mask(bits(v * v0 > 0.0))
@@ -66,7 +68,7 @@ def record_range(m, at, row, sizes, h, bend, begin, v_begin, end, x, v, chosen, 
     """
     order, positions = sizes[Size.ORDER], at[LanePart.POSITIONS] + row * SERIES_LENGTH
     high, low = load(m, Slot.HIGHEST), load(m, Slot.LOWEST)
-    v0, first = load(m, at[LanePart.VELOCITY] + row), 2.0 * load(m, positions + 2) * h * h
+    v0, first = load(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH), 2.0 * load(m, positions + 2) * h * h
     last = first + 6.0 * load(m, positions + 3) * (h * h * h)
     monotonic = bits(minimum(first, last) > bend) | bits(maximum(first, last) < -bend)
     turns = bits(v_begin * v < 0.0) & monotonic & chosen
@@ -108,20 +110,28 @@ def pass_ends(m, at, sizes, h, bend, past, helpers, poly, series):
     The state at the end is what the step's series give there. `forcing_periods.end_here` does the same for one lane that stands
     at the end.
     """
-    order, since, chosen = sizes[Size.ORDER], load(m, Slot.PERIOD_END) - load(m, Slot.NOW), mask(past)
+    order, since = sizes[Size.ORDER], load(m, Slot.PERIOD_END) - load(m, Slot.NOW)
+    chosen = mask(past)
     for row in range(row_count(at)):
         positions = at[LanePart.POSITIONS] + row * SERIES_LENGTH
         x, v = both_at(m, positions, at[LanePart.VELOCITIES] + row * SERIES_LENGTH, order, load(m, positions), since)
         replace(m, at[LanePart.ENDED_POSITION] + row, chosen, x)
         replace(m, at[LanePart.ENDED_VELOCITY] + row, chosen, v)
-    x, v = load(m, at[LanePart.ENDED_POSITION]), load(m, at[LanePart.ENDED_VELOCITY])
     if sizes[Size.EXTREMA] > 0:
+        x, v = load(m, at[LanePart.ENDED_POSITION]), load(m, at[LanePart.ENDED_VELOCITY])
         v_begin = load(m, at[LanePart.VELOCITY])
         record_range(m, at, 0, sizes, h, bend, splat(0.0), v_begin, since, x, v, past, helpers, poly, series)
         for row in range(1, sizes[Size.OWN]):
             q, w = load(m, at[LanePart.ENDED_POSITION] + row), load(m, at[LanePart.ENDED_VELOCITY] + row)
             w_begin, (_, _, _, bent) = load(m, at[LanePart.VELOCITY] + row), sweep(m, at, row, order, q, h)
             record_range(m, at, row, sizes, h, bent, splat(0.0), w_begin, since, q, w, past, helpers, poly, series)
+    keep_ended(m, at, sizes, past)
+
+
+@inline_jit
+def keep_ended(m, at, sizes, past):
+    """Keep the records of a forcing period that is over in the lanes in `past`, and begin new ones at the state at its end."""
+    chosen, x = mask(past), load(m, at[LanePart.ENDED_POSITION])
     high, low, least, impacts = load(m, Slot.HIGHEST), load(m, Slot.LOWEST), load(m, Slot.LEAST_SPEED), load(m, Slot.IMPACTS)
     replace(m, Slot.ENDED_SIDE, chosen, load(m, Slot.SIDE))
     replace(m, Slot.ENDED_HIGHEST, chosen, high)

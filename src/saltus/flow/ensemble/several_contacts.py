@@ -1,8 +1,9 @@
 """A step of all lanes of a model with several contacts: its smooth motion up to the first closing of a gap, and impacts.
 
-Its compiled part goes into one module with that of `driver.py`, in the place of `one_contact.py`. A lane goes on by itself while
-the contacts that are closed certainly push and one gap at most closes; its impacts are solved for one lane at a time
-(`contacts_handoff.py`). Releases, contacts that close together, slow impacts and rest are left to the scalar kernel.
+Its compiled part goes into one module with that of `driver.py`, in the place of `one_contact.py`, and with those of
+`contact_steps.py` and `lane_impacts.py`. A lane goes on by itself while the contacts that are closed certainly push and one gap
+at most closes. Releases, contacts that close together, slow impacts and rest are left to the scalar kernel, and so is every
+event of a motion with a tangent.
 """
 
 from __future__ import annotations
@@ -11,37 +12,34 @@ import numpy as np
 
 from saltus.flow.contacts.contact_impacts import solver_arrays
 from saltus.flow.contacts.contact_layout import ContactColumn
+from saltus.flow.ensemble.contact_steps import free_step, of_free, one_free_step, one_is_free, pass_ends_of_free
 from saltus.flow.ensemble.contacts_of_lane import tell_closed
-from saltus.flow.ensemble.lane_layout import FAST, Code, Flag, Helper, JobArray, LaneArray, LaneSetting, Size, Slot
-from saltus.flow.ensemble.lane_steps import both_at, commit, natural_step, row_count, series_true, sweep
-from saltus.flow.ensemble.meeting import meet
+from saltus.flow.ensemble.lane_impacts import resolve_impacts
+from saltus.flow.ensemble.lane_layout import Code, Flag, Helper, JobArray, LaneArray, LaneLabel, Size, Slot
+from saltus.flow.ensemble.lane_steps import commit
 from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE, pass_ends, record_others, record_range
 from saltus.flow.kernel_layout import WHERE_LENGTH, Mode
 from saltus.flow.memory_layout import SERIES_LENGTH, LanePart, State
 from saltus.taylor import (
-    ALL,
     WIDTH,
-    absolute,
     bits,
     first_lane,
-    fma,
     inline_jit,
     jit,
+    lane_count,
     lean_jit,
     load,
     mask,
-    minimum,
     put,
     select,
     splat,
-    store,
     vector_lane,
 )
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-TOGETHER = 1e-6  # of a step: gaps that close nearer to each other in time may close together, which the scalar kernel decides
-SMALL_GAP = 1e-9  # The same of a gap that is left when another one closes.
+
+COST_OF_SEVERAL = 3  # How much longer a step takes with the series of all coordinates than with that of one.
 
 
 @jit
@@ -84,7 +82,7 @@ def begin_contact(lane, code, sizes, at, m, lanes, env, state, piece):
         coordinate, position = sizes[Size.CONTACTS + 1 + i], solved[own * own + count * count + i]
         put(m, at[LanePart.CONTACTS] + i, lane, position)
         sign = sizes[Size.CONTACTS + 1 + count + i]
-        gap, rate = sign * (state[coordinate] - position), sign * state[own + coordinate]
+        gap, rate = sign * (state[coordinate] - position), sign * state[state.size // 2 + coordinate]
         contacts[i, ContactColumn.COORDINATE] = coordinate
         contacts[i, ContactColumn.CLOSED] = 1 if gap == 0.0 and rate == 0.0 else 0
         contacts[i, ContactColumn.SKIP], contacts[i, ContactColumn.RELEASED] = 1 if gap == 0.0 else 0, 0
@@ -93,92 +91,31 @@ def begin_contact(lane, code, sizes, at, m, lanes, env, state, piece):
             mode = Mode.BEYOND
         elif gap == 0.0 and mode == Mode.ARC:
             mode = Mode.CONTACT
+    lanes[LaneArray.LABELS][lane, LaneLabel.LEAVE_BY] = 1 if mode == Mode.CONTACT else 0  # derivatives are then one-sided
     return mode, 1 + tell_closed(lane, at, m, contacts)
-
-
-@lean_jit
-def stays_positive(m, series, order, h):
-    """Bits of the lanes in which a series is positive on [0, h] for certain, by its cubic's Bernstein coefficients."""
-    rest = splat(0.0)
-    for k in range(order - 1, 3, -1):
-        rest = fma(rest, h, absolute(load(m, series + k)))
-    square = h * h
-    c0, c1, c2 = load(m, series), h * load(m, series + 1), square * load(m, series + 2)
-    end = c0 + c1 + c2 + square * h * load(m, series + 3)
-    low = minimum(minimum(c0, c0 + c1 * (1.0 / 3.0)), minimum(c0 + (2.0 * c1 + c2) * (1.0 / 3.0), end))
-    return bits(low > rest * (square * square))
-
-
-@lean_jit
-def guards_certain(m, at, sizes, h):
-    """Bits of the lanes in which every closed contact pushes over the step for certain, and every margin stays positive."""
-    sure, count = ALL, sizes[Size.CONTACTS]
-    for i in range(sizes[Size.MARGINS]):
-        closed = ALL
-        if i < count:
-            coordinate, contact = sizes[Size.CONTACTS + 1 + i], load(m, at[LanePart.CONTACTS] + i)
-            start = load(m, at[LanePart.POSITION] + coordinate) - contact
-            closed = bits(load(m, at[LanePart.FREE] + coordinate) < 0.5) & bits(start * start <= 0.0)
-        if closed:
-            sure &= stays_positive(m, at[LanePart.MARGINS] + i * SERIES_LENGTH, sizes[Size.ORDER], h) | ~closed
-    return sure
-
-
-@inline_jit
-def first_closing(sizes, at, m, h, alive, helpers, space):
-    """The first gap that closes in the step. Returns bits of lanes in which one does, those in doubt, when, and which one."""
-    order, count = sizes[Size.ORDER], sizes[Size.CONTACTS]
-    hit, doubtful, tau, which = 0, 0, h, splat(0.0)
-    for i in range(count):
-        row = sizes[Size.CONTACTS + 1 + i]
-        opened = alive & bits(load(m, at[LanePart.FREE] + row) > 0.5)
-        if opened == 0:
-            continue
-        start = load(m, at[LanePart.POSITION] + row) - load(m, at[LanePart.CONTACTS] + i)
-        x, v, a, bend = sweep(m, at, row, order, start, h)
-        sign, skip = splat(1.0 * sizes[Size.CONTACTS + 1 + count + i]), bits(start * start <= 0.0)
-        closes, unclear, when, _ = meet(at, row, m, order, h, sign, start, (x, v, a), bend, skip, opened, helpers, space)
-        doubtful |= unclear | (hit & closes & bits(absolute(when - tau) < TOGETHER * h))
-        first = closes & (~hit | bits(when < tau))
-        tau, which = select(mask(first), when, tau), select(mask(first), splat(1.0 * i), which)
-        hit |= closes
-    return hit, doubtful, tau, which
-
-
-@inline_jit
-def put_new_state(sizes, at, m, tau, hit, which):
-    """Put the state at `tau`, with the contact that closes at its position. Returns lanes in which another gap is as small."""
-    order, count, near = sizes[Size.ORDER], sizes[Size.CONTACTS], 0
-    for row in range(row_count(at)):
-        positions, velocities = at[LanePart.POSITIONS] + row * SERIES_LENGTH, at[LanePart.VELOCITIES] + row * SERIES_LENGTH
-        x, v = both_at(m, positions, velocities, order, load(m, positions), tau)
-        store(m, at[LanePart.NEW_POSITION] + row, x)
-        store(m, at[LanePart.NEW_VELOCITY] + row, v)
-    for i in range(count if hit else 0):
-        row, contact = sizes[Size.CONTACTS + 1 + i], load(m, at[LanePart.CONTACTS] + i)
-        x, this = load(m, at[LanePart.NEW_POSITION] + row), hit & bits(absolute(which - 1.0 * i) < 0.5)
-        opened = bits(load(m, at[LanePart.FREE] + row) > 0.5)
-        near |= hit & ~this & opened & bits((x - contact) * (1.0 * sizes[Size.CONTACTS + 1 + count + i]) < SMALL_GAP)
-        store(m, at[LanePart.NEW_POSITION] + row, select(mask(this), contact, x))
-    return near
 
 
 @inline_jit
 def step_all(code, scalar, sizes, at, m, flags, settings, limits, helpers, lanes, jobs, tables, space):
-    """One step of all lanes. Returns bits for the scalar kernel, bits captured, and bits past the end of their forcing period."""
-    order, alive = sizes[Size.ORDER], flags[Flag.BUSY] & ~flags[Flag.SCALAR]
-    code[Code.SERIES](m, order)
-    natural, size = natural_step(m, at, sizes, limits)
-    now, limit = load(m, Slot.NOW), load(m, Slot.STEP_LIMIT)
-    h = minimum(natural, limit - now)
-    sound = bits(natural > settings[LaneSetting.SHORTEST_STEP]) & bits(size < FAST)
-    hit, doubtful, tau, which = first_closing(sizes, at, m, h, alive & sound, helpers, space)
-    sound &= ~doubtful & ~put_new_state(sizes, at, m, tau, hit, which) & guards_certain(m, at, sizes, tau)
-    store(m, Slot.NEW_TIME, select(mask(bits(natural >= limit - now) & ~hit), limit, now + tau))
-    if sizes[Size.CHECKED] > 0:
-        sound &= series_true(code, m, at, sizes, settings[LaneSetting.TOLERANCE], tau, size)
-    resolved, waiting = 0, hit & sound & alive
-    moved = alive & sound & ~hit
+    """A step of all lanes in which one coordinate is free, or of all others: of those of which more move for what it costs.
+
+    Which these are changes no motion, as the others wait. Returns bits for the scalar kernel, bits captured, and bits past the
+    end of their forcing period.
+    """
+    alive, one = flags[Flag.BUSY] & ~flags[Flag.SCALAR], False
+    if sizes[Size.ONE_FREE] > 0:
+        with_one = alive & one_is_free(sizes, at, m)
+        one = lane_count(alive & ~with_one) <= COST_OF_SEVERAL * lane_count(with_one)
+        alive = with_one if one else alive & ~with_one
+    if one:
+        hit, sound, h, tau, bend, which = one_free_step(code, sizes, at, m, settings, limits, alive, helpers, space)
+    else:
+        hit, sound, h, tau, bend, which = free_step(code, sizes, at, m, settings, limits, alive, helpers, space)
+    hit &= sound & alive
+    resolved, moved, waiting = 0, alive & sound & ~hit, 0
+    if hit and sizes[Size.COLUMNS] == 0:  # what becomes of a tangent is left to the scalar kernel
+        resolved = resolve_impacts(code, sizes, at, m, settings, hit, which)
+        waiting = hit & ~resolved
     while waiting:
         lane = first_lane(waiting)
         waiting &= waiting - 1
@@ -187,18 +124,29 @@ def step_all(code, scalar, sizes, at, m, flags, settings, limits, helpers, lanes
         if impact(lane, which_one, scalar, sizes, at, m, settings, lanes, jobs[JobArray.PARAMETERS], tables, space):
             resolved |= 1 << lane
     moved |= resolved
-    begin, v_begin = splat(0.0), load(m, at[LanePart.VELOCITY])
     past = moved & bits(load(m, Slot.NEW_TIME) > load(m, Slot.PERIOD_END))
-    bend = splat(0.0)
-    if sizes[Size.EXTREMA] > 0:
-        _, _, _, bend = sweep(m, at, 0, order, load(m, at[LanePart.POSITION]), h)
     if past and sizes[Size.ENDS_ASKED] > 0:
-        pass_ends(m, at, sizes, h, bend, past, helpers, space[0], space[1])
-        begin = select(mask(past), load(m, Slot.PERIOD_END) - now, begin)
-        v_begin = select(mask(past), load(m, at[LanePart.ENDED_VELOCITY]), v_begin)
+        if one:
+            pass_ends_of_free(m, at, sizes, h, bend, which, past, helpers, space)
+        else:
+            pass_ends(m, at, sizes, h, bend, past, helpers, space[0], space[1])
     if sizes[Size.EXTREMA] > 0:
-        x, v = load(m, at[LanePart.NEW_POSITION]), load(m, at[LanePart.NEW_VELOCITY])
-        record_range(m, at, 0, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, space[0], space[1])
-        record_others(m, at, sizes, h, past, tau, moved, helpers, space[0], space[1])
+        record_step(m, at, sizes, one, h, bend, tau, which, past, moved, helpers, space)
     commit(at, m, moved, resolved, load(m, Slot.NEW_SPEED))
     return alive & ~moved, 0, past
+
+
+@inline_jit
+def record_step(m, at, sizes, one, h, bend, tau, which, past, moved, helpers, space):
+    """Take the extrema of all coordinates up to the new state; in lanes `past` a period's end, from there on."""
+    after, positions, velocities = mask(past), at[LanePart.NEW_POSITION], at[LanePart.NEW_VELOCITY]
+    begin = select(after, load(m, Slot.PERIOD_END) - load(m, Slot.NOW), splat(0.0))
+    if one:  # those that are held stay where they are, and the records of the period begin there
+        v_begin = select(after, of_free(m, sizes, at[LanePart.ENDED_VELOCITY], which), load(m, Slot.FREE_VELOCITY))
+        x, v = of_free(m, sizes, positions, which), of_free(m, sizes, velocities, which)
+        record_range(m, at, 0, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, space[0], space[1])
+    else:
+        v_begin, x, v = load(m, at[LanePart.ENDED_VELOCITY]), load(m, positions), load(m, velocities)
+        v_begin = select(after, v_begin, load(m, at[LanePart.VELOCITY]))
+        record_range(m, at, 0, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, space[0], space[1])
+        record_others(m, at, sizes, h, past, tau, moved, helpers, space[0], space[1])

@@ -90,7 +90,7 @@ class Lanes:
 
     program: Program
     slots: Slots
-    functions: tuple[Any, ...]  # lane_series, lane_impact, lane_field
+    functions: tuple[Any, ...]  # lane_series, lane_impact, lane_field, and of a model with several contacts lane_one_free
     parameters: np.ndarray  # of the system; `Jobs.columns` replaces some
     tol: float
     kept: int  # how many of the last forcing periods are kept
@@ -169,7 +169,8 @@ class Lanes:
         """What every call of the driver is given: functions, sizes, places and settings."""
         structure, trace = self.program.structure, self.program.trace
         module, scalar = structure.module, self.program.model if self.several else structure.functions
-        code = (*self.functions, pointer(module.constants), pointer(module.matrices if self.several else module.geometry))
+        geometry = pointer(module.matrices if self.several else module.geometry)
+        code = (*self.functions[:3], pointer(module.constants), geometry, *self.functions[3:])
         contacts = np.array([len(trace.signs), *trace.held, *trace.signs], dtype=np.int64)
         sizes = np.concatenate([np.zeros(Size.CONTACTS, dtype=np.int64), contacts])
         given = {
@@ -179,6 +180,9 @@ class Lanes:
             Size.SIDES: module.SIDES,
             Size.CHECKED: module.STEEP,
             Size.RECORDS: self.slots.records,
+            Size.ONE_FREE: self.slots.guards is not None and not module.STEEP,
+            Size.GUARDS: self.slots.guards or 0,
+            Size.CONSTANT_GUARDS: self.slots.constant_guards,
             Size.ORDER: lane_order(self.tol),
             Size.SCALAR_ORDER: taylor_order(self.tol),
             Size.WORKSPACE: module.ROWS,

@@ -1,0 +1,76 @@
+"""The motion of a model with several contacts while one coordinate is free: one equation, whichever coordinate that is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import zip_longest
+
+from saltus.taylor import CommonForm, Expr, Trace, differentiate, number, substitute
+
+
+@dataclass(frozen=True)
+class OneFree:
+    """What the free coordinate does, as coordinate 0; the leaves `free` say which it is.
+
+    A reaction is p(q) q'' + p'(q) q'^2 + ..., of an element p of the mass matrix, so P'' + ..., where P is the integral of p. Of
+    a sine or a cosine that costs no product of series, and the guards of closed contacts are sums of `curved`'' and `guards`.
+    """
+
+    acceleration: Expr
+    curved: list[Expr]  # P of each contact that is closed
+    guards: list[Expr]  # what is left of their reactions, then those margins that change
+    constant_guards: list[Expr]  # the other margins
+
+    @property
+    def roots(self) -> list[Expr]:
+        """All of them."""
+        return [self.acceleration, *self.curved, *self.guards, *self.constant_guards]
+
+
+def equations_of_one_free(trace: Trace, margins: list[Expr]) -> OneFree | None:
+    """The equations with one free coordinate, where each coordinate has one contact; `margins` with accelerations put in.
+
+    All contacts but that of the free coordinate are then closed, so that the other coordinates are numbers. There are none
+    for a tangent, as the derivatives to all coordinates go on.
+    """
+    own = trace.dof
+    if len(trace.signs) < 2 or sorted(trace.held) != list(range(own)) or trace.columns:
+        return None
+    common = CommonForm([Expr("free", (), j) for j in range(own)])
+    accelerations, curved, changing, constant = [], [], [], []
+    for j in range(own):
+        leaves = _leaves(trace, j)
+        accelerations.append(substitute(trace.acceleration[j], leaves))
+        others = [root for root, coordinate in zip(trace.reactions, trace.held, strict=True) if coordinate != j]
+        halves = [_halves(common, substitute(root, leaves | _accelerations(own, j)), accelerations[j]) for root in others]
+        curved.append([half for half, _ in halves])
+        limits = [substitute(root, leaves) for root in margins]
+        changing.append([rest for _, rest in halves] + [limit for limit in limits if limit.degree != 0])
+        constant.append([limit for limit in limits if limit.degree == 0])
+    unified = [[common.of(row) for row in zip_longest(*rows, fillvalue=number(1.0))] for rows in (curved, changing, constant)]
+    return OneFree(common.of(accelerations), *unified)
+
+
+def _halves(common: CommonForm, reaction: Expr, acceleration: Expr) -> tuple[Expr, Expr]:
+    """P and what is left of a reaction, p q'' + p' q'^2 + ... = P'' + ...; the reaction itself where p has no such integral."""
+    q, v, a = (Expr(op, (), 0) for op in ("coordinate", "velocity", "acceleration"))
+    factor = differentiate(reaction, a)
+    integral = common.integral(factor, q)
+    if integral is None:
+        return number(0.0), substitute(reaction, {a: acceleration})
+    return integral, substitute(reaction, {a: number(0.0)}) - differentiate(factor, q) * (v * v)
+
+
+def _accelerations(own: int, j: int) -> dict[Expr, Expr]:
+    """The accelerations where only coordinate j is free."""
+    return {Expr("acceleration", (), i): Expr("acceleration", (), 0) if i == j else number(0.0) for i in range(own)}
+
+
+def _leaves(trace: Trace, j: int) -> dict[Expr, Expr]:
+    """What coordinates, velocities and `free` are where only coordinate j is free."""
+    leaves = {}
+    for i, position in zip(trace.held, trace.positions, strict=True):
+        leaves[Expr("coordinate", (), i)] = Expr("coordinate", (), 0) if i == j else position
+        leaves[Expr("velocity", (), i)] = Expr("velocity", (), 0) if i == j else number(0.0)
+        leaves[Expr("free", (), i)] = number(1.0 if i == j else 0.0)
+    return leaves
