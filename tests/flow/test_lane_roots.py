@@ -24,7 +24,8 @@ from saltus.taylor.vectors import WIDTH
 
 EPS = 2.0**-52
 H = 0.7  # the step
-PLACES = np.zeros(len(LanePart), dtype=np.int64)  # of a memory with the two series of one coordinate, and slots for what goes in and out
+# Of a memory with the two series of one coordinate, and slots for what goes in and out
+PLACES = np.zeros(len(LanePart), dtype=np.int64)
 PLACES[LanePart.POSITIONS], PLACES[LanePart.VELOCITIES] = 0, SERIES_LENGTH
 STEP, SIGN, TIME, SPEED, SIZE = range(2 * SERIES_LENGTH, 2 * SERIES_LENGTH + 5)
 COMPILED = {"np": np, "math": math, "SERIES_LENGTH": SERIES_LENGTH} | vars(lane_vectors) | vars(private_numba)
