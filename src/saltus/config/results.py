@@ -44,7 +44,8 @@ def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
         raise ParameterError(f"there is no file or folder {path}; give a .nc, .zarr, .toml or .json that saltus can read", "path")
     if path.is_dir() or path.suffix not in (".toml", ".json"):
         try:
-            return open_result(path)
+            found: xarray.Dataset | xarray.DataTree = open_result(path)
+            return found
         except ParameterError as error:
             raise ParameterError(str(error), error.parameter or "path") from None
     if path.suffix == ".toml":

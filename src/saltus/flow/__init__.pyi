@@ -1,5 +1,6 @@
 from .compiled import load_contact_segments, load_segments
 from .contacts.contact_layout import ContactColumn, SegmentEnd, SegmentLook, SegmentPlan
+from .dense_output import DenseOutput
 from .ensemble.compiled_lanes import load_advance, load_driver, load_helpers
 from .ensemble.dataset_reading import stop_names, stroboscopic
 from .ensemble.ensemble import compiled_lanes, simulate_many
@@ -10,7 +11,7 @@ from .ensemble.wanted import Wanted
 from .kernel_layout import STRUCTURE_SIZES, Where
 from .load_release import Release, contact_pull, load_releases, peak_near
 from .memory_layout import EventCode
-from .motion import DenseOutput, Event, EventKind, Impacts, Motion
+from .motion import Event, EventKind, Impacts, Motion
 from .motion_dataset import rate_name
 from .recurrence import (
     RECURRENCE,

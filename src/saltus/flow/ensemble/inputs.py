@@ -11,7 +11,8 @@ import numpy as np
 
 from saltus.checks import LIMITS, check_memory
 from saltus.errors import ParameterError, near
-from saltus.flow.ensemble.ensemble_dataset import rate_name, result_names
+from saltus.flow.ensemble.ensemble_dataset import result_names
+from saltus.flow.motion_dataset import rate_name
 from saltus.flow.request import ARGUMENTS
 from saltus.systems import System, broadcast_arrays, check_parameters, finite_array, numbers, parameter_table
 
