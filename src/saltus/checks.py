@@ -29,12 +29,16 @@ class Limits:
     count: int = 10_000_000  # Motions, points, samples: more of them at once is a slip of the pen, and fits into no memory.
     periods: int = 10**12  # Forcing periods, or units of time, of one motion: days of one core.
     threads: int = 1024  # More than a machine has cores; each thread takes memory before it does anything.
-    value: float = 1e100  # Of an axis, a window or a state: differences and squares of larger ones are no numbers.
+    value: float = 1e100  # Of any number in size: differences and squares of larger ones are no numbers.
     order: int = 1000  # Of a harmonic: the step of the integrator shrinks with it.
     seed: int = 2**63 - 1  # What files and random generators hold.
     motion: int = 2048  # Bytes that a motion of an ensemble takes; 1000 were measured, and samples come to it.
     dense: int = 6000  # Bytes that a forcing period of one motion takes which is kept whole; 5400 were measured.
     work: float = 1e12  # Motions times forcing periods: four days of one core, at three million in a second.
+    operations: int = (
+        600  # Loops over Taylor coefficients in a model's equations: a minute of compiling; saltus's own have 92 at most.
+    )
+    nodes: int = 100_000  # Operations of any kind in them, which take a minute too.
     memory: float = 0.8  # The share of the free memory that one request may take: the rest keeps the machine usable.
 
 
@@ -79,6 +83,8 @@ def number_problem(
         and (at_least is None or value >= at_least)
         and (at_most is None or value <= at_most)
     )
+    if inside and abs(float(value)) > LIMITS.value:
+        return f"must be at most {LIMITS.value:g} in size, got {shown(value)}"
     if inside:
         return None
     hint = " (degrees?)" if unit == "rad" and math.isfinite(value) and 3.2 < abs(value) <= 360 else ""

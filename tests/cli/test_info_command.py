@@ -109,11 +109,33 @@ def test_the_wall_oscillator(info):
     assert "on the wall, x = 2" in info('[model]\ntype = "WallOscillator"\nwall = 2\n[load]\nforce = 3\n')
 
 
-def test_a_model_of_ones_own_shows_what_every_model_has(info, tmp_path):
-    (tmp_path / "own.py").write_text(
-        "from dataclasses import dataclass\nfrom saltus.systems import Model\n\n"
-        "@dataclass(frozen=True, kw_only=True)\nclass Own(Model):\n    stiffness: float\n    channels = ('force',)\n"
+OWN = """
+from dataclasses import dataclass
+from saltus.systems import Model
+
+@dataclass(frozen=True, kw_only=True)
+class Own(Model):
+    stiffness: float
+    channels = ("force",)
+
+    def acceleration(self, t, x, velocity, side, load):
+        {body}
+"""
+
+
+def test_a_model_that_cannot_be_traced_is_refused(refused, tmp_path):
+    """Of which no motion could be computed: what it raises, where the study is."""
+    (tmp_path / "own.py").write_text(OWN.format(body="raise ZeroDivisionError('by naught')"))
+    (tmp_path / "study.toml").write_text('[model]\ntype = "own.py:Own"\nstiffness = 3\n')
+    sentence = refused("info", tmp_path / "study.toml")
+    assert (
+        sentence
+        == f"saltus: {tmp_path}/study.toml, model: Own.acceleration failed while it was traced: ZeroDivisionError: by naught"
     )
+
+
+def test_a_model_of_ones_own_shows_what_every_model_has(info, tmp_path):
+    (tmp_path / "own.py").write_text(OWN.format(body="return load.force(t) - self.stiffness * x"))
     text = info('[model]\ntype = "own.py:Own"\nstiffness = 3\n[load]\nfrequency = 1\nforce = { amplitude = 1 }\n')
     assert value(text, "model.stiffness") == 3
     assert "no mirror image" in text

@@ -58,6 +58,18 @@ CASES = {
     "date": (MODEL + "damping = 2022-01-01\n", ", line 4", "model.damping must be a number, got a date or a time"),
     "list": (MODEL + "damping = [1]\n", ", line 4", "model.damping must be a number, got a list"),
     "huge": (MODEL + f"damping = {10**400}\n", ", line 4", "model.damping must be a finite number, got a very large number"),
+    "large": (MODEL + "damping = 1e308\n", ", line 4", "model.damping must be at most 1e+100 in size, got 1e+308"),
+    "large_load": (
+        MODEL + "[load]\nfrequency = 1\nvertical = { amplitude = -1e101 }\n",
+        ", line 6",
+        "load.vertical.amplitude must be at most 1e+100 in size, got -1e+101",
+    ),
+    "no_module": ('[model]\ntype = "../x:Y"\n', ", line 2", 'model.type: the text "../x" is no Python file, such as my_model.py'),
+    "one_contact": (
+        MODEL + '[impact]\ntype = "NewtonImpact"\n',
+        ", line 4",
+        "NewtonImpact has no velocity_after, which a Metainterface with its one contact needs; give VelocityReduction(e=...)",
+    ),
     "smoothing": (MODEL + "smoothing = 100\nmass_ratio = 1\n", ", line 4", "model.smoothing is for symmetric layers only"),
     "e": (MODEL + '[impact]\ntype = "VelocityReduction"\ne = 1.2\n', ", line 6", "impact.e must lie in [0, 1], got 1.2"),
     "impact_type": (

@@ -1,6 +1,7 @@
 """Whatever is given, the answer is a result or one sentence: no traceback, no file left, no work begun that has no bounds.
 
-The cases are the same in every run: 200 of each kind, and with SALTUS_CASES or in `make thorough` as many as that says (20 000).
+The cases are the same in every run: 200 of each kind, and in `make thorough` 100 000 in all, or as many of each kind as
+SALTUS_CASES says, in four pieces with a seed each.
 """
 
 import inspect
@@ -17,7 +18,7 @@ from saltus.errors import SaltusError
 from saltus.systems import System
 
 THOROUGH = int(os.environ.get("SALTUS_CASES", "20000"))
-COUNTS = [200, pytest.param(THOROUGH, marks=pytest.mark.thorough)]
+PIECES = [(200, 0), *(pytest.param(THOROUGH // 4, piece, marks=pytest.mark.thorough) for piece in range(1, 5))]
 LONGEST, SLOWEST, LARGEST = 400, 10.0, 2e9  # characters, seconds, bytes
 
 
@@ -59,13 +60,13 @@ def answer(case: int, ask, *given, **named) -> str | None:
     return sentence
 
 
-@pytest.mark.parametrize("count", COUNTS)
-def test_bad_studies(tmp_path, nothing_is_computed, count):
+@pytest.mark.parametrize(("count", "piece"), PIECES)
+def test_bad_studies(tmp_path, nothing_is_computed, count, piece):
     from saltus.cli.guard import shortened
     from saltus.cli.run_command import check
     from saltus.config import load_study
 
-    path, rng, refused = tmp_path / "study.toml", random.Random(1), 0
+    path, rng, refused = tmp_path / "study.toml", random.Random(f"studies {piece}"), 0
 
     def run():
         try:
@@ -82,22 +83,22 @@ def test_bad_studies(tmp_path, nothing_is_computed, count):
     assert refused > count / 2
 
 
-@pytest.mark.parametrize("count", COUNTS)
-def test_bad_records(tmp_path, count):
+@pytest.mark.parametrize(("count", "piece"), PIECES)
+def test_bad_records(tmp_path, count, piece):
     from saltus.config import load_study
 
     text = '[model]\ntype = "Metainterface"\nbeta0 = 1.4\n[load]\nhorizontal = { file = "q.csv", quantity = "force" }\n'
     (tmp_path / "study.toml").write_text(text)
-    rng, refused = random.Random(2), 0
+    rng, refused = random.Random(f"records {piece}"), 0
     for case in range(count):
         (tmp_path / "q.csv").write_bytes(bad_inputs.record(rng))
         refused += answer(case, load_study, tmp_path / "study.toml") is not None
     assert refused > count / 3
 
 
-@pytest.mark.parametrize("count", COUNTS)
-def test_bad_json(count):
-    rng, refused = random.Random(3), 0
+@pytest.mark.parametrize(("count", "piece"), PIECES)
+def test_bad_json(count, piece):
+    rng, refused = random.Random(f"json {piece}"), 0
     for case in range(count):
         refused += answer(case, System.from_json, bad_inputs.system_json(rng)) is not None
     assert refused > count / 2
@@ -117,13 +118,13 @@ def results(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("count", [100, pytest.param(THOROUGH // 4, marks=pytest.mark.thorough)])
-def test_damaged_results(results, tmp_path, count):
+@pytest.mark.parametrize(("count", "piece"), [(100, 0), *PIECES[1:]])
+def test_damaged_results(results, tmp_path, count, piece):
     """A file of a store or a netCDF file is damaged: `status` and `plot` say so, or what is read is as it was."""
     from saltus.config import open_result
     from saltus.sweep import status
 
-    rng = random.Random(4)
+    rng = random.Random(f"results {piece}")
     store, motion = results / "stability_chart.zarr", results / "motion.nc"
     files = [motion] * 20 + sorted(file for file in store.rglob("*") if file.is_file())
     good = {path: open_result(path).load() for path in (store, motion)}
@@ -143,12 +144,12 @@ def test_damaged_results(results, tmp_path, count):
         file.write_bytes(content)
 
 
-@pytest.mark.parametrize("count", COUNTS)
-def test_bad_calls(nothing_is_computed, tmp_path, monkeypatch, count):
+@pytest.mark.parametrize(("count", "piece"), PIECES)
+def test_bad_calls(nothing_is_computed, tmp_path, monkeypatch, count, piece):
     monkeypatch.chdir(tmp_path)
     functions = [getattr(saltus, name) for name in saltus.__all__ if inspect.isfunction(getattr(saltus, name))]
     system = System.from_dict({name: bad_inputs.STUDY[name] for name in ("model", "load")})
-    rng, refused = random.Random(5), 0
+    rng, refused = random.Random(f"calls {piece}"), 0
     for case in range(count):
         function = rng.choice(functions)
         given, named = bad_inputs.call(rng, function, system)

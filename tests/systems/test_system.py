@@ -126,6 +126,20 @@ def test_what_is_no_system_in_json_is_refused_in_a_sentence(text):
         System.from_toml("= =")
 
 
+def test_a_key_that_is_given_twice_is_refused():
+    """As in TOML: of two values neither is meant more than the other."""
+    text = EXAMPLE.to_json().replace('"beta0"', '"beta0": 1.0, "beta0"', 1)
+    with pytest.raises(ParameterError, match="not the JSON of a system: the key 'beta0' is given twice"):
+        System.from_json(text)
+
+
+def test_numbers_beyond_what_can_be_squared_are_refused():
+    for path in ("model.damping", "load.horizontal.0.amplitude"):
+        with pytest.raises(ParameterError, match=rf"^{path} must be at most 1e\+100 in size, got 1e\+200") as refusal:
+            EXAMPLE.with_({path: 1e200})
+        assert refusal.value.parameter == path
+
+
 def test_an_impact_law_without_impacts_is_refused():
     with pytest.raises(ParameterError, match="has no impacts"):
         System(model=Metainterface(beta0=1.4, smoothing=50.0), impact=VelocityReduction(0.5))

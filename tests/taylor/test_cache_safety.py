@@ -1,5 +1,6 @@
 """Compiled code is run only from a folder of the user's own, and only as it was written; what is damaged is made again."""
 
+import hashlib
 import os
 import pickle
 import random
@@ -37,9 +38,9 @@ def home(tmp_path, monkeypatch):
     return tmp_path
 
 
-def run(home):
+def run(home, **more):
     """The printed number and the remarks of a process that loads the module."""
-    environment = os.environ | {"SALTUS_CACHE_DIR": str(home / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+    environment = os.environ | {"SALTUS_CACHE_DIR": str(home / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)} | more
     done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == 0, done.stderr
     return float(done.stdout), done.stderr
@@ -126,6 +127,53 @@ def test_damaged_compiled_code_is_made_again_with_a_remark(home, change):
         assert f"{path} is damaged" in remarks
     assert run(home) == (6.0, "")
     assert not (home / "planted").exists()
+
+
+def forged(path, planted):
+    """What a stranger writes: a pickle that makes a file when it is read, with the digest of its bytes."""
+    content = pickle.dumps(Planted(str(planted)))
+    path.write_bytes(content + hashlib.sha256(content).digest())
+
+
+def test_numba_s_own_setting_of_a_folder_is_not_followed(home):
+    """Compiled code lies beside its source, in the folder that was looked at, wherever else numba is told to keep it."""
+    elsewhere = home / "elsewhere"
+    elsewhere.mkdir()
+    assert run(home, NUMBA_CACHE_DIR=str(elsewhere)) == (6.0, "")
+    assert not [path for path in elsewhere.rglob("*") if path.is_file()]
+    compiled = {path for path in kept(home) if path.suffix in (".nbc", ".nbi")}
+    assert {path.parent for path in compiled} == {home / "cache" / "kernels" / "__pycache__"}
+    assert len(compiled) == 2
+
+
+@pytest.mark.parametrize(
+    "change", ["link", pytest.param("owner", marks=pytest.mark.skipif(os.getuid() != 0, reason="root alone"))]
+)
+def test_compiled_code_of_somebody_else_is_not_read(home, change):
+    """As was planted while the folder was open to all, with a digest that is right."""
+    assert run(home) == (6.0, "")
+    for path in [path for path in kept(home) if path.suffix in (".nbc", ".nbi")]:
+        target = home / "forged" if change == "link" else path
+        forged(target, home / "planted")
+        if change == "link":
+            path.unlink()
+            path.symlink_to(target)
+        else:
+            os.chown(path, 12345, 12345)
+        value, remarks = run(home)
+        assert value == 6.0
+        assert f"{path} is not the user's own; it is compiled again" in remarks
+        assert not (home / "planted").exists()
+    assert run(home) == (6.0, "")
+
+
+def test_a_folder_that_everybody_can_exchange_is_not_used(home):
+    """The folder itself is the user's alone, but not the one that it is in."""
+    (home / "cache" / "kernels").mkdir(parents=True, mode=0o700)
+    (home / "cache").chmod(0o777)
+    assert cache_directory() == home / "temporary" / f"saltus-kernels-{os.getuid()}"
+    (home / "cache").chmod(0o1777)
+    assert cache_directory() == home / "cache" / "kernels"
 
 
 def test_any_flipped_bit_of_compiled_code_is_noticed(home, caplog):

@@ -223,6 +223,37 @@ def test_comparison_in_a_gap_is_refused():
         traced(lambda t, x, v, s, load: -x, sides=(1, -1), gap=lambda self, x, side: np.maximum(side * x, 0.0))
 
 
+def nested(count):
+    """sin(sin(... x)), so many times."""
+
+    def formula(t, x, *_):
+        for _ in range(count):
+            x = np.sin(x)
+        return -x
+
+    return formula
+
+
+@pytest.mark.parametrize(
+    ("formula", "sentence"),
+    [
+        (
+            nested(3000),
+            "have 3003 operations, 3000 of them functions, products and quotients, .* take about 25 minutes to compile",
+        ),
+        (lambda t, x, *_: sum(np.sin(i * x) for i in range(20_000)), "19999 of them functions, .* about 1.1e.03 minutes"),
+        (
+            lambda t, x, *_: sum(x / (i + 2.0) for i in range(40_000)),
+            "have 120000 operations, 0 of them functions, .* about 1.4 minutes",
+        ),
+    ],
+)
+def test_equations_that_would_be_compiled_for_minutes_are_refused_with_the_estimate(formula, sentence):
+    with pytest.raises(TraceError, match=sentence):
+        traced(formula)
+    traced(nested(600))
+
+
 def test_misspelt_channel_is_refused_with_the_near_ones():
     with pytest.raises(TraceError, match=r"Small reads load.forse, not one of its channels; did you mean 'force'"):
         traced(lambda t, x, v, s, load: load.forse(t) - x)

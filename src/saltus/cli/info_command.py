@@ -13,10 +13,16 @@ LEAST_START = 1e-6  # rad; below it a free vibration is too small to speak of
 
 
 def print_info(path: Path) -> None:
-    """Print what is known of the system in the study at `path`."""
-    from saltus.config import load_study
+    """Print what is known of the system in the study at `path`.
+
+    Raises:
+        SaltusError: a bad study, or a model that cannot be traced, so that no motion of it could be computed.
+    """
+    from saltus.config import Ask, load_study
+    from saltus.taylor import trace
 
     study = load_study(path, questions=False)
+    study.answer(Ask(kind="model", options={}), trace)
     console = Console(highlight=False)
     console.print(f"[bold]{type(study.system.model).__name__}[/] ", end="")
     console.print(f"from {path}", markup=False, soft_wrap=True)

@@ -22,6 +22,7 @@ def plot_store(path: Path, output: Path | None) -> None:
     folder = path.parent if output is None else output
     check_writable(folder)
     data = open_result(path)
+    _check_sizes(path, data)
     try:
         files = draw_file(path, folder / path.stem, data)
     except (SaltusError, OSError):
@@ -35,6 +36,18 @@ def plot_store(path: Path, output: Path | None) -> None:
     if path.is_file() and not has_checksum(path.read_bytes()):
         Console(highlight=False, stderr=True).print(f"{path} {UNCHECKED}.", markup=False, soft_wrap=True)
     Console(highlight=False).print(f"The picture is in {folder}: {names}", markup=False, soft_wrap=True)
+
+
+def _check_sizes(path: Path, data: Any) -> None:
+    """Refuse numbers that no axis can hold, as computing never gives them."""
+    import numpy as np
+
+    from saltus.checks import LIMITS
+
+    for node in getattr(data, "subtree", (data,)):
+        for name, variable in node.variables.items():
+            if variable.dtype.kind == "f" and (np.isfinite(variable.values) & (np.abs(variable.values) > LIMITS.value)).any():
+                raise ParameterError(f"{path} cannot be drawn: {name!s:.60} has numbers above {LIMITS.value:g} in size")
 
 
 def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import number_problem
+from saltus.checks import LIMITS, number_problem
 from saltus.config.source import Keys, Source
 from saltus.errors import near
 
@@ -55,6 +55,8 @@ def read_number(value: Any) -> float:
         number = math.inf
     if not math.isfinite(number):
         raise ValueError(f"must be a finite number, got {show(value)}")
+    if abs(number) > LIMITS.value:
+        raise ValueError(f"must be at most {LIMITS.value:g} in size, got {show(value)}")
     return number
 
 

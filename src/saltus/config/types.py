@@ -38,6 +38,10 @@ def find_class(source: Source, kind: str, name: str) -> type:
             return known[name]
         source.refuse(keys, f'{kind}.type "{name}" is not known; {near(name, known)} (one of your own is "file.py:Class")')
     place, _, attribute = name.rpartition(":")
+    if not place.endswith(".py") and not all(part.isidentifier() for part in place.split(".")):
+        source.refuse(
+            keys, f"{kind}.type: {show(place)} is no Python file, such as my_model.py, and no module, such as my.module"
+        )
     module = _from_file(source, kind, place) if place.endswith(".py") else _installed(source, kind, place)
     cls: Any = getattr(module, attribute, None)
     wanted: Any = Model if kind == "model" else ImpactLaw

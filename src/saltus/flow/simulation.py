@@ -154,10 +154,11 @@ def _refuse(system: System, status: int, now: KernelState) -> None:
     if status == Status.NOT_FINITE:
         raise MotionError(
             f"the motion leaves the range of numbers {at}; its velocity was last "
-            f"{velocity:.6g}; a power or root of the model may have no Taylor series there, such as abs(x)**1.5 at x = 0"
+            f"{velocity:.6g}; a number of the system may be too large, or a power or root of the model may have no Taylor series "
+            "there, such as abs(x)**1.5 at x = 0"
         )
     if status == Status.STALLED and not system.model.singularity:
-        raise MotionError(f"the steps shrink to nothing {at}: the acceleration is singular there")
+        raise MotionError(f"the steps shrink to nothing {at}: the acceleration is singular there, or far too large")
 
 
 def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Recorder) -> Motion:

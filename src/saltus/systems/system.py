@@ -53,6 +53,12 @@ class System:
         if self.model.contacts:
             check_contacts(self.model)
             self.impact.restitution_matrix(self.model)
+        elif self.model.sides and type(self.impact).velocity_after is ImpactLaw.velocity_after:
+            raise ParameterError(
+                f"{type(self.impact).__name__} has no velocity_after, which a {type(self.model).__name__} with its one contact "
+                "needs; give VelocityReduction(e=...)",
+                "impact",
+            )
         elif not self.model.sides and self.impact != VelocityReduction():
             raise ParameterError(
                 f"this {type(self.model).__name__} has no impacts, so {self.impact!r} cannot act; leave it out", "impact"
@@ -131,7 +137,7 @@ class System:
         Raises:
             ParameterError: text that is no JSON, or no system.
         """
-        return cls.from_dict(_parsed(text, json.loads, "JSON"))
+        return cls.from_dict(_parsed(text, _json, "JSON"))
 
     def to_toml(self) -> str:
         """The system as TOML."""
@@ -184,6 +190,20 @@ def _of(model: Model, values: list[Any]) -> Any:
 
 def _each(value: Any) -> list[Any]:
     return list(value) if isinstance(value, (tuple, list)) else [value]
+
+
+def _json(text: str) -> Any:
+    """What a JSON text says, without keys that are given twice, of which the last would hold in silence."""
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for name, value in pairs:
+            if name in found:
+                raise ValueError(f"the key {shown(name)} is given twice")
+            found[name] = value
+        return found
+
+    return json.loads(text, object_pairs_hook=once)
 
 
 def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:

@@ -65,7 +65,9 @@ def _own_folder() -> Path:
 def _problem(folder: Path) -> str | None:
     """Why a folder is not one to keep code in, or None; it is made as needed."""
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if any(_open_to_all(above.stat()) for above in folder.resolve().parents):
+            return "other users may put another folder in its place"
         for part in (folder, folder / "__pycache__"):  # the second is numba's, which would let the user's group write to it
             with contextlib.suppress(FileExistsError):
                 part.mkdir(mode=0o700)
@@ -75,6 +77,11 @@ def _problem(folder: Path) -> str | None:
     except OSError as error:
         return f"it cannot be made ({(error.strerror or str(error)).lower()})"
     return None if os.access(folder, os.W_OK) else "it cannot be written to"
+
+
+def _open_to_all(found: os.stat_result) -> bool:
+    """Whether everybody may rename what is in a folder, as they may not in a temporary directory."""
+    return hasattr(os, "getuid") and bool(found.st_mode & stat.S_IWOTH) and not found.st_mode & stat.S_ISVTX
 
 
 def _shared(found: os.stat_result) -> str | None:

@@ -285,6 +285,12 @@ def is_steep(roots: list[Expr]) -> bool:
     return any(node.op in FUNCTIONS and FUNCTIONS[node.op].steep and node.degree is None for node in ordered(roots))
 
 
+def loop_count(roots: list[Expr]) -> int:
+    """How many operations have a loop over their Taylor coefficients: functions, and products and quotients of two series."""
+    nodes = [node for node in ordered(roots) if node.degree is None and node.args]
+    return sum(n.op not in ("add", "sub") and (n.op in FUNCTIONS or all(a.degree != 0 for a in n.args)) for n in nodes)
+
+
 def substitute(root: Expr, leaves: dict[Expr, Any]) -> Expr:
     """The expression with some leaves replaced."""
     made: dict[int, Expr] = {id(old): as_expr(new) for old, new in leaves.items()}

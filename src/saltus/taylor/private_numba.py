@@ -21,11 +21,13 @@ import importlib
 import io
 import logging
 import os
+import stat
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 from llvmlite import ir
@@ -82,7 +84,10 @@ def _kept(function: Any) -> Any:
     class Kept(FUNCTION_CACHE):  # type: ignore[misc,valid-type]
         def __init__(self, py_func: Any) -> None:
             super().__init__(py_func)
-            self._cache_file.__class__ = _with_digests()
+            # Beside the source, which is in a folder of the user's own; numba's settings may name any other one.
+            self._cache_path = os.path.join(os.path.dirname(py_func.__code__.co_filename), "__pycache__")
+            stamp = self._impl.locator.get_source_stamp()
+            self._cache_file = _with_digests()(self._cache_path, self._impl.filename_base, stamp)
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             """The code for a signature, or None."""
@@ -117,15 +122,19 @@ def _with_digests() -> Any:
 
 
 def _sound(path: str) -> bool:
-    """Whether a file is there and ends with the digest of its bytes; what is damaged is removed, with a remark."""
+    """Whether a file is there, the user's own, and ends with the digest of its bytes; any other is removed, with a remark.
+
+    Anybody can make a digest: a file of another user, or a link, was planted while others could write to the folder.
+    """
     try:
-        with open(path, "rb") as file:
-            content = file.read()
+        found = os.lstat(path)
+        own = stat.S_ISREG(found.st_mode) and (not hasattr(os, "getuid") or found.st_uid == os.getuid())
+        content = Path(path).read_bytes() if own else b""
     except OSError:
         return False
-    if hashlib.sha256(content[:-DIGEST]).digest() == content[-DIGEST:]:
+    if own and hashlib.sha256(content[:-DIGEST]).digest() == content[-DIGEST:]:
         return True
-    log.warning("%s is damaged; it is compiled again", path)
+    log.warning("%s is %s; it is compiled again", path, "damaged" if own else "not the user's own")
     with suppress(OSError):
         os.unlink(path)
     return False

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from saltus.checks import LIMITS
 from saltus.errors import ParameterError, SaltusError, TraceError, near
 from saltus.systems import Pulse, Record, System, constrained_acceleration, mass_and_force, reactions
 from saltus.systems import substitute as substitute_numbers
@@ -16,6 +17,7 @@ from saltus.taylor.graph import (
     Expr,
     combine,
     differentiate,
+    loop_count,
     number,
     ordered,
     substitute,
@@ -250,6 +252,7 @@ def _check(result: Trace, model: str) -> None:
     expanded = [*result.acceleration, *result.reactions, *result.margins.values()]
     if result.gap is not None:
         expanded += [result.gap]
+    _check_size(expanded, model)
     for node in ordered(expanded):
         if node.op in POINTWISE:
             where = f"{model} uses {node.op} in an acceleration, a gap or a margin"
@@ -259,6 +262,17 @@ def _check(result: Trace, model: str) -> None:
             if node.op in ("time", "record", "velocity"):
                 raise TraceError(f"{model}.gap may depend on the coordinate, the side and the parameters only")
     _check_abs(result, expanded)
+
+
+def _check_size(expanded: list[Expr], model: str) -> None:
+    """Refuse equations that would be compiled for minutes or hours: the time grows as the square of the number of loops."""
+    loops, nodes = loop_count(expanded), len(ordered(expanded))
+    if loops > LIMITS.operations or nodes > LIMITS.nodes:
+        minutes = max(loops / LIMITS.operations, nodes / LIMITS.nodes) ** 2
+        raise TraceError(
+            f"the equations of {model} have {nodes} operations, {loops} of them functions, products and quotients, which would "
+            f"take about {minutes:.2g} minutes to compile; {LIMITS.nodes} and {LIMITS.operations} are the most"
+        )
 
 
 def _check_abs(result: Trace, expanded: list[Expr]) -> None:
