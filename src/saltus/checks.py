@@ -193,7 +193,7 @@ def check_dataset(
         raise ParameterError(f"{name} must be the dataset of {source}; this one lacks {lacks[0]!r}", name)
 
 
-def check_bounds(bounds: Any) -> tuple[float, float]:
+def check_bounds(bounds: Any, name: str = "bounds") -> tuple[float, float]:
     """Two finite numbers, the smaller first.
 
     Raises:
@@ -202,9 +202,9 @@ def check_bounds(bounds: Any) -> tuple[float, float]:
     try:
         low, high = (float(x) for x in bounds)
     except (TypeError, ValueError):
-        raise ParameterError(f"bounds must be two numbers (lowest, highest), got {shown(bounds)}", "bounds") from None
+        raise ParameterError(f"{name} must be two numbers (lowest, highest), got {shown(bounds)}", name) from None
     if not -math.inf < low < high < math.inf:
-        raise ParameterError(f"bounds must be two numbers, the smaller one first, got {shown(bounds)}", "bounds")
+        raise ParameterError(f"{name} must be two numbers, the smaller one first, got {shown(bounds)}", name)
     return low, high
 
 

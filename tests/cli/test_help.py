@@ -1,5 +1,6 @@
 """Help that teaches, and is immediate."""
 
+import os
 import subprocess
 import sys
 
@@ -48,3 +49,12 @@ def test_wrong_use_ends_with_status_2(saltus, arguments):
     result = saltus(*arguments)
     assert result.exit_code == 2
     assert "Usage: saltus" in result.stderr
+
+
+def test_a_terminal_of_few_letters_shows_the_others_as_escapes(tmp_path):
+    (tmp_path / "größe.toml").write_text('[model]\ntype = "WallOscillator"\n')
+    environment = os.environ | {"PYTHONIOENCODING": "ascii", "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-m", "saltus", "info", "größe.toml"]
+    done = subprocess.run(command, capture_output=True, cwd=tmp_path, env=environment, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert rb"WallOscillator from gr\xf6\xdfe.toml" in done.stdout

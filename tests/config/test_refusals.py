@@ -153,6 +153,8 @@ RECORDS = {
     "words": ("time,a\nunit,m\n0,0\n", "line 2 must be two finite numbers"),
     "decimal_commas": ("0,0,0,1\n0,5,1,2\n", "line 2 must be two finite numbers"),
     "one_column": ("0\n1\n2\n", "line 2 must be two finite numbers"),
+    "grouped": ("0,0\n1_0,1\n", 'line 2 must be two finite numbers, got the text "1_0,1"'),
+    "other_digits": ("0,0\n\u0661,1\n", "line 2 must be two finite numbers"),
     "long_cell": ("0,0\n1," + "1" * 200_000 + "\n", "line 2 must be two finite numbers"),
     "long_words": ("0,0\n1," + "x" * 200_000 + "\n", "line 2 must be two finite numbers"),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -239,7 +240,10 @@ def report(
 
 
 def main() -> None:
-    """The entry point of the command `saltus`."""
+    """The entry point of the command `saltus`; what a terminal's encoding lacks is written as an escape."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         app()
     except KeyboardInterrupt:  # outside any command, such as while importing one

@@ -109,4 +109,6 @@ def _row(line: str) -> tuple[float, float] | None:
         time, value = (float(cell) for cell in (cells if separator == "," else cells[:2]))
     except ValueError:
         return None
-    return (time, value) if math.isfinite(time) and math.isfinite(value) else None
+    written = "".join(cells[:2])
+    plain = written.isascii() and "_" not in written  # Python reads 1_0 as ten, and digits of any script
+    return (time, value) if plain and math.isfinite(time) and math.isfinite(value) else None

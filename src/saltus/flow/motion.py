@@ -184,6 +184,8 @@ class Motion:
 
     def closed_at(self, time: float) -> int:
         """The contacts that are closed just after a time, of a model with several: the sum of 2^i over them."""
+        if not self.start <= time <= self.time:
+            raise ParameterError(f"time must lie in [{self.start:g}, {self.time:g}], the span of the motion", "time")
         return int(self._states(np.array([time]))[2][0]) - 1
 
     @property

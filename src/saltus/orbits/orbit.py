@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import LIMITS, check_count
 from saltus.flow import Motion, Validity, simulate
 from saltus.flow import segments as at
 from saltus.notebook import html_table
@@ -239,6 +240,7 @@ class PeriodicOrbit:
 
     def defect_after(self, rounds: int) -> float:
         """The same after so many of its periods, where it has no impact at its start."""
+        check_count("rounds", rounds, 1, LIMITS.periods // self.period)
         start, motion = self.start(), self.motion(rounds * self.period)
         apart = np.subtract(motion.position, [start[name] for name in self.system.model.coordinates])
         return float(np.abs(np.append(apart, np.subtract(motion.velocity, start["velocity"]))).max())

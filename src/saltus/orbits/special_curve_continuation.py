@@ -134,7 +134,7 @@ def _limits(special: SpecialPoint, value: float, bounds: Any, first_bounds: Any)
         first_bounds = (max(low, own / TENFOLD), high) if own > 0 else (low, min(high, own / TENFOLD) if own < 0 else high)
     if bounds is None:
         bounds = sorted((value / TENFOLD, value * TENFOLD)) if value else (-1.0, 1.0)
-    limits = [check_bounds(first_bounds), check_bounds(bounds)]
+    limits = [check_bounds(first_bounds, "first_bounds"), check_bounds(bounds)]
     for (low, high), inside, name in zip(limits, (own, value), ("first", "second"), strict=True):
         if not low <= inside <= high:
             raise ParameterError(

@@ -167,7 +167,7 @@ def remove_store(path: Path | str) -> None:
     if not path.exists():
         return
     if not ((path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file()):
-        raise ParameterError(f"{path} is no store, so it is not removed; name another place", "store")
+        raise ParameterError(f"{path} is no store, so it is not removed; name another place", "path")
     if files.in_use(path):
         raise SweepError(f"a run is writing to {path}; wait for it, or stop it, and run again")
     try:

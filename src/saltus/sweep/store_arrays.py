@@ -55,6 +55,7 @@ def _array(dtype: str, dimensions: list[str], shape: list[int], chunk: list[int]
         "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
         "codecs": CODECS,
         "storage_transformers": [],
+        "filled": True,  # Zarr before 3.1 would take 0 for a fill value that is not there
     }
 
 
@@ -62,4 +63,5 @@ def _described(metadata: dict[str, Any]) -> dict[str, Any]:
     """What the metadata of an array say, as `_array` has it."""
     said = {key: metadata.get(key) for key in _array("", [], [], [])}
     codecs = [codec if isinstance(codec, str) else codec["name"] for codec in metadata["codecs"]]
-    return said | {"codecs": codecs, "storage_transformers": list(metadata.get("storage_transformers") or [])}
+    filled = metadata.get("fill_value") is not None
+    return said | {"codecs": codecs, "storage_transformers": list(metadata.get("storage_transformers") or []), "filled": filled}

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.checks import RADIANS, check_count, check_number, settle_numbers
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.public_functions import answering
 
 
@@ -122,6 +122,17 @@ QUANTITIES = ("force", "displacement", "velocity", "acceleration")
 QUANTITY_ORDER = {"force": 0, "displacement": 0, "velocity": 1, "acceleration": 2}  # which derivative of its channel it is
 
 
+def _samples(where: str, name: str, given: Any) -> np.ndarray:
+    """The numbers of a list."""
+    try:
+        samples = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        samples = np.array(0.0)
+    if samples.ndim != 1:
+        raise ParameterError(f"{where}: {name} must be a list of numbers, got {shown(given)}", name)
+    return samples
+
+
 @answering("__init__")
 @dataclass(frozen=True, eq=False)
 class Record(Signal):
@@ -154,14 +165,9 @@ class Record(Signal):
             raise ParameterError(f"quantity must be one of {', '.join(QUANTITIES)}, got {self.quantity!r}", "quantity")
         settle_numbers(self, "scale")
         where = f"record {self.source!r}" if isinstance(self.source, str) and self.source else "record"
-        try:
-            time, value = (np.array(a, dtype=float) for a in (self.time, self.value))
-        except (TypeError, ValueError):
-            raise ParameterError(f"{where}: time and value must be lists of numbers", "value") from None
-        if time.ndim != 1 or time.shape != value.shape:
-            raise ParameterError(
-                f"{where}: time and value must be two lists of one length, got shapes {time.shape} and {value.shape}", "value"
-            )
+        time, value = (_samples(where, name, getattr(self, name)) for name in ("time", "value"))
+        if time.shape != value.shape:
+            raise ParameterError(f"{where}: time and value must have one length, got {time.size} and {value.size}", "value")
         least = 4 if self.quantity in ("velocity", "displacement") else 2
         if time.size < least:
             raise ParameterError(f"{where}: a record of {self.quantity} needs at least {least} samples, got {time.size}", "time")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import RADIANS, settle_numbers
+from saltus.checks import RADIANS, check_number, settle_numbers
 from saltus.errors import ParameterError, shown
 from saltus.public_functions import Numbers, answering
 from saltus.systems.cell_layout import CellLayout
@@ -178,8 +178,9 @@ class UnitCell:
         """
         if not (isinstance(misaligned, tuple | list) and len(misaligned) == 2 and set(misaligned) <= {1, -1}):
             raise ParameterError(f"misaligned must be two signs, 1 or -1, got {shown(misaligned)}", "misaligned")
-        if theta_1 < 0 or theta_2 > 0:
-            raise ParameterError(f"a cell has theta_1 >= 0 and theta_2 <= 0, got {theta_1!r} and {theta_2!r}", "theta_1")
+        limit = self.kinematic_limit + ANGLE_ROUNDING
+        check_number("theta_1", theta_1, at_least=0.0, at_most=limit, unit="rad")
+        check_number("theta_2", theta_2, at_least=-limit, at_most=0.0, unit="rad")
         phi = (float(self.phi(theta_1)) * misaligned[0], float(self.phi(theta_2)) * misaligned[1])
         return CellLayout.build(self.base, self.lambda_, (self.beta(theta_1), self.beta(theta_2)), phi)
 

@@ -101,7 +101,10 @@ def check_basin_store(path: Path, system: System) -> None:
     """Refuse, before attractors are looked for, what is surely not the store of the basins of this system."""
     from saltus.sweep import BEGIN_ANEW, read_plan
 
-    kept = read_plan(path)
+    try:
+        kept = read_plan(path)
+    except ParameterError as error:
+        raise ParameterError(str(error), "store") from None
     if kept["function"] != FUNCTION or kept["arguments"]["system"] != json.loads(json.dumps(system.to_dict())):
         raise ParameterError(f"{path} is the store of another sweep, or of the basins of another system; {BEGIN_ANEW}", "store")
     check_provenance(kept["attrs"], system, str(path), BEGIN_ANEW)
