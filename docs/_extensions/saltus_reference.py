@@ -61,13 +61,14 @@ def _inside(name):
 
 def plain_text_as_rst(_app, _what, _name, _found, _options, lines):
     """Docstrings are plain text: an indented paragraph after an empty line is an equation, stars and bars are what they are."""
-    given, equation = list(lines), 0  # by how much the text before an equation is indented, and one
+    given, example, equation = list(lines), False, 0  # by how much the text before an equation is indented, and one
     lines.clear()
     for number, line in enumerate(given):
         indent = len(line) - len(line.lstrip())
         if line.strip() and indent < equation:
             equation = 0
-        if equation or line.lstrip().startswith((">>>", "...")):
+        example = line.strip() and (example or line.lstrip().startswith(">>>"))
+        if equation or example:
             lines.append(line)
             continue
         lines.append("".join(_escaped(part) for part in re.split(r"(`[^`]*`(?:\w)?)", line)))

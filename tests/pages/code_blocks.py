@@ -4,7 +4,7 @@ A page is read from top to bottom, in a folder of its own:
 
     ```python    runs with the names of the blocks above; what it prints stands in a ```text block right below it
     ```console   each line after `$ ` is a command `saltus ...`, what it prints stands below it
-    ```toml, ```python or ```csv whose first line is `# name.ext`, a file's name: the file that is then there
+    ```toml, ```python or ```text whose first line is `# name.ext`, a file's name: the file that is then there
     ```toml      else must be a table that TOML knows
     ```text, ```sh  are not run: trees, formulas, commands of other programs
 
@@ -26,7 +26,7 @@ FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"# ([\w.-]+\.(?:toml|py|csv))\n")
 NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?(?![\w])")
 ROUNDING = 1e-10
-KINDS = ("python", "console", "toml", "csv", "text", "sh")
+KINDS = ("python", "console", "toml", "text", "sh")
 
 
 def blocks(text):
