@@ -14,7 +14,7 @@ from saltus.bounds.energy_barrier import CLIMB, climb
 from saltus.bounds.gap_equation import SPEED, Leaves, Opening, reads
 from saltus.bounds.intervals import SLACK, Interval, enclose
 from saltus.systems import System, broadcast_arrays, check_parameters, check_system, finite_array, parameter_table
-from saltus.taylor import Expr, Trace, differentiate, number, record_tables, substitute, trace
+from saltus.taylor import Expr, Trace, differentiate, number, record_tables, structure_key, substitute, trace
 
 
 @dataclass(frozen=True)
@@ -88,19 +88,30 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
 
 def proved_speeds(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
     """`capture_speed` for flat columns of numbers that the system takes; (n,), or (1,) for numbers alone."""
-    traced = trace(system)
+    traced, law = _law_of(system)
     arrays = (given.get(path, np.asarray(value)) for path, value in system.parameters.items())
     columns = np.broadcast_arrays(*map(np.atleast_1d, arrays))
     result = np.zeros(columns[0].size)
-    if not traced.sides:
+    if law is None:
         return result
     records = _record_ranges(system, traced, given)
-    law = _Law(traced)
     for start in range(0, result.size, CAPTURE.batch):
         part = slice(start, start + CAPTURE.batch)
         leaves = Leaves([Interval(c[None, part]) for c in columns], records)
         result[part] = law.capture(leaves, result[part].size)
     return result
+
+
+def _law_of(system: System) -> tuple[Trace, _Law | None]:
+    """The trace of a system and what is bounded of it, None without a contact: made once for each structure, whatever its numbers."""
+    key = structure_key(system)
+    if key not in _laws:
+        traced = trace(system)
+        _laws[key] = traced, _Law(traced) if traced.sides else None
+    return _laws[key]
+
+
+_laws: dict[Any, tuple[Trace, _Law | None]] = {}
 
 
 def keeps_rest(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
