@@ -107,14 +107,15 @@ def sweep_up(parts: Iterable[Path]) -> None:
                 part.unlink()
 
 
-def lock(file: IO[bytes], shared: bool = False) -> bool | None:
-    """Try to lock an open file until it is closed or its process ends: whether it could, None where there are no locks."""
+def lock(file: IO[bytes], shared: bool = False, wait: bool = False) -> bool | None:
+    """Try to lock an open file until it is closed or its process ends, or wait for it: whether it could, None where there are no
+    locks."""
     try:
         import fcntl
     except ImportError:
         return None
     try:
-        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | (0 if wait else fcntl.LOCK_NB))
     except BlockingIOError:
         return False
     except OSError:

@@ -20,11 +20,13 @@ import stat
 import sys
 import tempfile
 import threading
+from collections.abc import Iterator
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
 from types import ModuleType
 
+from saltus.files import lock
 from saltus.taylor import private_numba
 
 MARKER = "# --- compiled from here on"
@@ -131,8 +133,18 @@ def load_module(kind: str, text: str) -> ModuleType:
             path = cache_directory() / f"{name.removeprefix('saltus_')}.py"
             if not _holds(path, text):
                 _write(path, text)
-            _execute(name, path, text)
+            with contextlib.nullcontext() if is_compiled(name) else _alone(path):
+                _execute(name, path, text)
         return sys.modules[name]
+
+
+@contextlib.contextmanager
+def _alone(path: Path) -> Iterator[None]:
+    """Let other processes that want the same source wait, and load what this one has compiled; they compile it too where files
+    cannot be locked."""
+    with path.open("rb") as file:
+        lock(file, wait=True)
+        yield
 
 
 def _holds(path: Path, text: str) -> bool:
