@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.orbits import SpecialCurve, SpecialPoint
+from saltus.orbits import SpecialCurve, SpecialPoint, conditions
 from saltus.orbits.codimension import normal_form
 from saltus.orbits.conditions import Singular
 from saltus.orbits.orbit_curve import OrbitCurve
@@ -202,6 +202,21 @@ def test_the_unsymmetric_orbits_change_sides_at_a_degenerate_symmetry_breaking()
     forms = [normal_form(locus.points[place + k]) for k in (-2, 2)]
     ratio = [form / shift[0] for form, shift in zip(forms, shifts, strict=True)]
     assert ratio[0] * ratio[1] > 0  # the sign of the normal form says the side
+
+
+def test_the_normal_form_does_not_depend_on_the_step_where_phases_respond_strongly(monkeypatch) -> None:
+    """At Omega = 0.1 a small change of the speeds moves the phases of the impacts by radians."""
+    orbit = saltus.find_orbit(metainterface(0.1, 0.0324, -1.38), theta=-1.1171, velocity=-0.0569, settle=0)
+    flip = next(s for s in saltus.continue_orbit(orbit, AMPLITUDE, (0.0315, 0.035)).special if s.kind == "PD")
+    curve = saltus.continue_special(flip, VERTICAL, bounds=(-1.4, -1.36), first_bounds=(0.0, 0.035))
+    assert not curve.special
+    usual = np.array([normal_form(point) for point in curve.points])
+    monkeypatch.setattr(conditions, "SETTINGS", replace(conditions.SETTINGS, long_shift=1e-3, farthest=5e-4))
+    shorter = np.array([normal_form(point) for point in curve.points])
+    known = np.isfinite(shorter)
+    assert np.abs(usual).max() > 1e4 * np.abs(usual).min()
+    assert known.sum() > 0.9 * len(usual)
+    assert usual[known] == pytest.approx(shorter[known], rel=0.5)  # the sign is what counts
 
 
 def test_there_is_no_normal_form_where_the_equations_are_singular() -> None:
