@@ -207,7 +207,9 @@ def test_of_processes_that_want_the_same_code_at_once_one_compiles_it(home):
     script = SCRIPT.replace("print(", "function = ").replace(".doubled(3.0))", ".doubled") + (
         "print(sum(function.stats.cache_misses.values()), function(3.0))"
     )
-    begun = [subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, env=environment) for _ in range(3)]
+    begun = [
+        subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, env=environment) for _ in range(3)
+    ]
     said = [process.communicate()[0].split() for process in begun]
     assert sorted(misses for misses, _ in said) == ["0", "0", "1"]
     assert {value for _, value in said} == {"6.0"}

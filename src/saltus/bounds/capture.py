@@ -103,7 +103,7 @@ def proved_speeds(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray
 
 
 def _law_of(system: System) -> tuple[Trace, _Law | None]:
-    """The trace of a system and what is bounded of it, None without a contact: made once for each structure, whatever its numbers."""
+    """The trace of a system and what is bounded of it, None without a contact; once for each structure, whatever its numbers."""
     key = structure_key(system)
     if key not in _laws:
         traced = trace(system)

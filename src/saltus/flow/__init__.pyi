@@ -1,3 +1,4 @@
+from .approach import approached
 from .compiled import load_contact_segments, load_segments
 from .contacts.contact_layout import ContactColumn, SegmentEnd, SegmentLook, SegmentPlan
 from .dense_output import DenseOutput
@@ -59,6 +60,7 @@ __all__ = [
     "Validity",
     "Wanted",
     "Where",
+    "approached",
     "available_cores",
     "compiled_lanes",
     "contact_pull",

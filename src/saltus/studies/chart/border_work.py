@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from saltus.sweep import Plan
 
 ENDS, CURVES = "saltus.studies.chart.border_work:ends", "saltus.studies.chart.border_work:curves"
-CHUNK = 1000  # changes of a chunk: with fewer the lanes have too little to do, and more take longer than one would lose
+# Changes of a chunk, as many as most charts have: where the end of one is enclosed in many steps, it had better be in the company
+# of all others. Together they take some seconds, no more than one would lose.
+CHUNK = 10_000
 CURVE_BYTES = 1 << 17  # of a curve as text: 1000 points
 # Of a curve in each direction. Curves from one side of a chart to the other take 20 to 75; one that needs more creeps beside a
 # grazing, by less than a hundredth of a cell a step, and four fifths of the time of Fig. 14 (a) went into such steps.

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import Window
-from saltus.flow import find_recurrence
+from saltus.flow import approached, find_recurrence
 from saltus.orbits import initial_states
 from saltus.studies.chart.cell_outcomes import outcomes
 from saltus.studies.chart.cell_verdicts import CellVerdicts
@@ -40,6 +40,11 @@ class CellSettings:
     patience: int = 4
     patient_with: int = 3
     negligible: float = 0.5  # Motions below this share of the least amplitude are not followed to where they settle.
+    # Nor are those that have been below this share for their last forcing period, whatever they were before. Without loss at
+    # impacts they take 100 000 of these to come to rest, and where load (i) nearly lifts the cell off at Omega = 0.1 most of the
+    # time of a chart went into such impacts.
+    vanishing: float = 0.05
+    kept: int = 9  # Stroboscopic states from which it is read where a motion is going: enough for orbits of one and two periods.
     rounds: int = 400  # Rounds of starts from neighbours: more than the cells along a side of any chart.
 
 
@@ -141,9 +146,10 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
             many = np.bincount(moving["cell"], minlength=size)[moving["cell"]] > SETTINGS.patient_with
             left.append(moving[many])
             moving = moving[~many]
-        moving, rests = _followed(request, moving, math.ceil(share * request.periods))
+        moving, rests, latest = _followed(request, moving, math.ceil(share * request.periods))
         settled = moving["period"] > 0
-        small = ~rests & (moving["amplitude"] < least * np.where(settled, 1.0, SETTINGS.negligible))
+        small = moving["amplitude"] < least * np.where(settled, 1.0, SETTINGS.negligible)
+        small = ~rests & (small | (~settled & (latest < SETTINGS.vanishing * least)))
         found.append(moving[settled & ~small])
         _count(captured, moving[rests])
         _count(tiny, moving[small])
@@ -162,26 +168,33 @@ def _count(number: np.ndarray, motions: np.ndarray) -> None:
     np.add.at(number, motions["cell"], motions["starts"])
 
 
-def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
-    """The motions some forcing periods later, with the period of those that have settled, and which of them are captured."""
+def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The motions some forcing periods later, with the period of those that have settled, which of them are captured, and their
+    amplitudes in the last forcing period alone.
+
+    What is about to settle is put where it is going.
+    """
     motions = motions.copy()
     if not len(motions):
-        return motions, np.zeros(0, dtype=bool)
+        return motions, np.zeros(0, dtype=bool), np.zeros(0)
     ends = find_recurrence(
         request.system,
         motions["state"],
         periods,
         parameters={path: values[motions["cell"]] for path, values in request.parameters.items()},
         max_period=request.max_period,
-        kept=0,
+        kept=SETTINGS.kept,
         extrema=True,
         impact_count=True,
         tol=request.tol,
     )
     high, low = ends.highest, -ends.lowest
-    motions["state"], motions["period"], motions["impact_count"] = ends.last, ends.period, ends.impact_count
+    ahead, _ = approached(ends.states, request.max_period)
+    motions["state"] = np.where(ends.unsettled[:, None], ahead, ends.last)
+    motions["period"], motions["impact_count"] = ends.period, ends.impact_count
     motions["amplitude"], motions["other"] = np.maximum(high, low), np.minimum(high, low)
-    return motions, ends.rest
+    assert ends.extrema is not None
+    return motions, ends.rest, np.abs(ends.extrema[:, -1]).max(axis=1)
 
 
 def joined(motions: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from saltus.flow import find_recurrence, return_period
+from saltus.flow import approached, find_recurrence, return_period
 from saltus.studies.chart.motions import ALIKE
 from saltus.systems import System
 
@@ -82,7 +82,12 @@ class TraceSettings:
     rounds: int = 200
     # A motion that is found again where it was lost from farther away is looked for within so many times the step that led there.
     stride: float = 4.0
-    stages: tuple[float, ...] = (1 / 20, 9 / 20)  # Shares of the forcing periods after which what is lost is not followed on.
+    # Shares of the forcing periods after which what is lost is not followed on, and what is about to settle is put where it is
+    # going.
+    stages: tuple[float, ...] = (1 / 20, 1 / 20, 2 / 5)
+    # Up to this number of motions an ensemble takes longer to begin than to follow them all the way.
+    few_motions: int = 16
+    few_stages: tuple[float, ...] = (1 / 2,)
     # States a number of periods apart that are as near as this share of the amplitude are of one motion that settles slowly, as
     # it does beside its special point.
     slow: float = 1e-3
@@ -116,7 +121,7 @@ class Ways:
         found, settled = np.zeros(len(rows), WAY), np.zeros(len(rows), dtype=bool)
         left = np.arange(len(rows))
         found["share"], found["state"] = share, states
-        for part in SETTINGS.stages:
+        for part in SETTINGS.stages if len(rows) > SETTINGS.few_motions else SETTINGS.few_stages:
             if not left.size:
                 break
             found[left], settled[left] = self.followed(rows[left], found[left], math.ceil(part * self.periods))
@@ -137,12 +142,14 @@ class Ways:
             impact_count=True,
             tol=self.tol,
         )
+        ahead, _ = approached(ends.states, self.max_period)
         size = np.nanmax(np.abs(ends.states[:, :, 0]), axis=1, initial=0.0)[:, None]
         slow = return_period(ends.states, self.max_period, SETTINGS.slow * size)
         settled = ends.periodic | ends.rest
         ends = replace(ends, period=np.where(settled, ends.period, slow))
         found = motions.copy()
-        found["state"], found["period"], found["impact_count"] = ends.last, ends.period, ends.impact_count
+        found["state"], found["period"] = np.where(settled[:, None], ends.last, ahead), ends.period
+        found["impact_count"] = ends.impact_count
         high, low = ends.highest, -ends.lowest
         found["amplitude"], found["other"] = np.maximum(high, low), np.minimum(high, low)
         for name in ("period", "impact_count", "amplitude", "other"):
