@@ -58,3 +58,15 @@ def test_a_terminal_of_few_letters_shows_the_others_as_escapes(tmp_path):
     done = subprocess.run(command, capture_output=True, cwd=tmp_path, env=environment, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
     assert rb"WallOscillator from gr\xf6\xdfe.toml" in done.stdout
+
+
+@pytest.mark.parametrize(("own", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
+def test_linear_algebra_has_one_thread_unless_the_user_says_otherwise(own, threads):
+    """Before numpy is loaded, which reads it then."""
+    script = (
+        "import os, sys; sys.argv = ['saltus', '--version']\nfrom saltus.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules)"
+    )
+    clean = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=clean | own)
+    assert done.stdout.split()[-2:] == [threads, "False"]

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from saltus.paper.panel_work import compute_panels
+from saltus.paper.parts import FIGURES, LONGEST
 
 
 def marked(folder: str, name: str, value: int) -> int:
@@ -39,3 +40,8 @@ def test_parts_get_their_panels_in_order_and_a_shared_one_is_computed_once(tmp_p
 def test_a_panel_that_fails_ends_the_others_with_its_own_error(panels: dict) -> None:
     with pytest.raises(ZeroDivisionError):
         list(compute_panels({"part": panels}))
+
+
+def test_what_is_computed_first_is_among_the_parts():
+    assert set(LONGEST) < set(FIGURES)
+    assert len(set(LONGEST)) == len(LONGEST)

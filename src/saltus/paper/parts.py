@@ -14,3 +14,7 @@ FIGURE_FILES = (
 )
 FILES = (*(f"saltus.paper.figures.{name}" for name in FIGURE_FILES), "saltus.paper.sections.statements")
 FIGURES: dict[str, PaperFigure] = {part.name: part for part in (import_module(file).FIGURE for file in FILES)}
+
+# The parts with the longest panels, these first, in which order parts are computed, and the others after them in that of the
+# paper: so that no core is left alone with a long panel at the end.
+LONGEST = (*("both_layers", "quasi", "fig14", "fig09", "fig11", "fig15"), *("fig10", "fig12", "fig13", "smoothing", "appendix"))

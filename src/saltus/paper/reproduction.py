@@ -40,7 +40,7 @@ def reproduce(
     Raises:
         ParameterError: an unknown name, with the near ones; an output folder that cannot be written to.
     """
-    from saltus.paper.parts import FIGURES
+    from saltus.paper.parts import FIGURES, LONGEST
 
     for name in names:
         if name not in FIGURES:
@@ -48,18 +48,19 @@ def reproduce(
     output = Path(output)
     check_writable(output)
     chosen = [figure for name, figure in FIGURES.items() if not names or name in names]
-    seconds = _make([figure for figure in chosen if force or not state.up_to_date(figure, output)], output, progress)
+    stale = {figure.name: figure for figure in chosen if force or not state.up_to_date(figure, output)}
+    longest = [name for name in LONGEST if name in stale]
+    seconds = _make({name: stale[name] for name in (*longest, *stale)}, output, progress)
     progress(1.0, "writing the report")
     results = [_result(figure, output, seconds) for figure in chosen]
     write_report(FIGURES.values(), output, {result.name: result.claims for result in results})
     return results
 
 
-def _make(stale: Sequence[PaperFigure], output: Path, progress: Progress) -> dict[str, float]:
-    """Compute, draw and judge these parts, the later ones of the paper first, as they take longest; returns their seconds."""
-    figures = {figure.name: figure for figure in reversed(stale)}
+def _make(figures: Mapping[str, PaperFigure], output: Path, progress: Progress) -> dict[str, float]:
+    """Compute, draw and judge these parts, begun in their order; returns their seconds."""
     seconds: dict[str, float] = {}
-    progress(0.0, f"computing {len(stale)} parts")
+    progress(0.0, f"computing {len(figures)} parts")
     for name, made, computing in compute_panels({name: figure.panels(**figure.parameters) for name, figure in figures.items()}):
         figure, start = figures[name], time.process_time()
         data = figure.join(made)
@@ -68,7 +69,7 @@ def _make(stale: Sequence[PaperFigure], output: Path, progress: Progress) -> dic
         claims = figure.claims(data)
         seconds[name] = computing + time.process_time() - start
         state.write(figure, output, claims, seconds[name])
-        progress(len(seconds) / len(stale), f"{name}, {figure.title}")
+        progress(len(seconds) / len(figures), f"{name}, {figure.title}")
     return seconds
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,10 +40,6 @@ class CellSettings:
     patience: int = 4
     patient_with: int = 3
     negligible: float = 0.5  # Motions below this share of the least amplitude are not followed to where they settle.
-    # Nor are those that have been below this share for their last forcing period, whatever they were before. Without loss at
-    # impacts they take 100 000 of these to come to rest, and where load (i) nearly lifts the cell off at Omega = 0.1 most of the
-    # time of a chart went into such impacts.
-    vanishing: float = 0.05
     kept: int = 9  # Stroboscopic states from which it is read where a motion is going: enough for orbits of one and two periods.
     rounds: int = 400  # Rounds of starts from neighbours: more than the cells along a side of any chart.
 
@@ -146,10 +142,9 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
             many = np.bincount(moving["cell"], minlength=size)[moving["cell"]] > SETTINGS.patient_with
             left.append(moving[many])
             moving = moving[~many]
-        moving, rests, latest = _followed(request, moving, math.ceil(share * request.periods))
+        moving, rests = _followed(request, moving, math.ceil(share * request.periods))
         settled = moving["period"] > 0
-        small = moving["amplitude"] < least * np.where(settled, 1.0, SETTINGS.negligible)
-        small = ~rests & (small | (~settled & (latest < SETTINGS.vanishing * least)))
+        small = ~rests & (moving["amplitude"] < least * np.where(settled, 1.0, SETTINGS.negligible))
         found.append(moving[settled & ~small])
         _count(captured, moving[rests])
         _count(tiny, moving[small])
@@ -168,15 +163,14 @@ def _count(number: np.ndarray, motions: np.ndarray) -> None:
     np.add.at(number, motions["cell"], motions["starts"])
 
 
-def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The motions some forcing periods later, with the period of those that have settled, which of them are captured, and their
-    amplitudes in the last forcing period alone.
+def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
+    """The motions some forcing periods later, with the period of those that have settled, and which of them are captured.
 
     What is about to settle is put where it is going.
     """
     motions = motions.copy()
     if not len(motions):
-        return motions, np.zeros(0, dtype=bool), np.zeros(0)
+        return motions, np.zeros(0, dtype=bool)
     ends = find_recurrence(
         request.system,
         motions["state"],
@@ -188,13 +182,13 @@ def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple
         impact_count=True,
         tol=request.tol,
     )
-    high, low = ends.highest, -ends.lowest
-    ahead, _ = approached(ends.states, request.max_period)
+    ahead, period = approached(ends.states, request.max_period)
+    going = replace(ends, period=np.where(ends.unsettled, period, ends.period))  # its extrema are those of where it is going
+    high, low = going.highest, -going.lowest
     motions["state"] = np.where(ends.unsettled[:, None], ahead, ends.last)
     motions["period"], motions["impact_count"] = ends.period, ends.impact_count
     motions["amplitude"], motions["other"] = np.maximum(high, low), np.minimum(high, low)
-    assert ends.extrema is not None
-    return motions, ends.rest, np.abs(ends.extrema[:, -1]).max(axis=1)
+    return motions, ends.rest
 
 
 def joined(motions: np.ndarray) -> np.ndarray:
