@@ -6,6 +6,7 @@ The panels of a figure are given by the value in which they differ, in rising or
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -105,14 +106,18 @@ def _collision(panels: Panels) -> Measured:
     return measured(most if decided else None, panels=rows)
 
 
-def _stable_share(spectrum: Any, low: float, high: float) -> float:
-    """The share of a range over which there is a stable periodic motion."""
-    return float((stable_motions(spectrum, np.linspace(low, high, CRITERIA.inner + 2)[1:-1]) > 0).mean())
+def _stable_shares(spectrum: Any, ranges: Sequence[tuple[float, float]]) -> list[float]:
+    """The share of each range over which there is a stable periodic motion."""
+    values = np.linspace(*np.reshape(ranges, (-1, 2)).T, CRITERIA.inner + 2)[1:-1]
+    shares = (stable_motions(spectrum, values.ravel()) > 0).reshape(values.shape).mean(axis=0)
+    return [float(share) for share in shares]
 
 
 def pierced(spectrum: Any, **panel: float) -> Measured:
     """Whether a stable periodic motion goes through a band of chaos; `panel` is the load or frequency of the panel."""
-    rows = [band | {"share": _stable_share(spectrum, band["low"], band["high"])} for band in bands_of(spectrum)]
+    bands = bands_of(spectrum)
+    shares = _stable_shares(spectrum, [(band["low"], band["high"]) for band in bands])
+    rows = [band | {"share": share} for band, share in zip(bands, shares, strict=True)]
     return measured(any(row["share"] > 0.0 for row in rows), bands=rows, grazings=count(spectrum, "GR"), **panel)
 
 
@@ -219,7 +224,8 @@ def _large_between(spectrum: Any, low: float, high: float) -> bool:
     branches = [branch for _, branch in branches_of(spectrum)]
     middle = np.concatenate([amplitudes_at(branch, (low + high) / 2, stable=True) for branch in branches])
     largest = max(float(np.max(branch["amplitude"].values[branch["stable"].values == 1], initial=0.0)) for branch in branches)
-    return _stable_share(spectrum, low, high) > 0.5 and float(middle.max(initial=0.0)) > CRITERIA.large_motion * largest
+    large = float(middle.max(initial=0.0)) > CRITERIA.large_motion * largest
+    return large and _stable_shares(spectrum, [(low, high)])[0] > 0.5
 
 
 def shifts(panels: Panels) -> Measured | None:

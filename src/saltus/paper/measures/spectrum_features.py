@@ -70,20 +70,18 @@ def passing(lines: list[BranchLine], value: float, stable: bool | None = None) -
     return np.concatenate(found)
 
 
-def _passes(x: np.ndarray, value: Any) -> np.ndarray:
-    """Which steps from x[i] to x[i + 1] contain a value, or the values (n, 1), their lower ends counted in."""
+def _passes(x: np.ndarray, value: float) -> np.ndarray:
+    """Which steps from x[i] to x[i + 1] contain a value, their lower ends counted in."""
     return np.asarray((np.minimum(x[:-1], x[1:]) <= value) & (value < np.maximum(x[:-1], x[1:])))
 
 
 def stable_motions(spectrum: Any, values: np.ndarray) -> np.ndarray:
     """How many stable periodic motions coexist at values of the parameter (n,), mirror images counted once, (n,)."""
-    values = np.asarray(values, dtype=float)
-    number = np.zeros(values.shape, dtype=int)
-    for _, branch in branches_of(spectrum):
-        for line in smooth_lines(branch):
-            if line.stable:
-                number += _passes(line.places[:, 0], values[:, None]).sum(axis=1)
-    return number
+    lines = [line.places[:, 0] for _, branch in branches_of(spectrum) for line in smooth_lines(branch) if line.stable]
+    steps = np.concatenate([np.empty((0, 2)), *(np.stack([x[:-1], x[1:]], axis=1) for x in lines)])
+    # A step is passed at its lower end already and at its upper end no more, as in `_passes`.
+    begun, over = (np.searchsorted(np.sort(ends), values, side="right") for ends in (steps.min(axis=1), steps.max(axis=1)))
+    return np.asarray(begun - over)
 
 
 def first_fold(branch: Any) -> tuple[float, float]:
