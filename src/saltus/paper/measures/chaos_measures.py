@@ -108,7 +108,8 @@ def _collision(panels: Panels) -> Measured:
 
 def _stable_shares(spectrum: Any, ranges: Sequence[tuple[float, float]]) -> list[float]:
     """The share of each range over which there is a stable periodic motion."""
-    values = np.linspace(*np.reshape(ranges, (-1, 2)).T, CRITERIA.inner + 2)[1:-1]
+    low, high = np.reshape(ranges, (-1, 2)).T
+    values = np.linspace(low, high, CRITERIA.inner + 2)[1:-1]
     shares = (stable_motions(spectrum, values.ravel()) > 0).reshape(values.shape).mean(axis=0)
     return [float(share) for share in shares]
 
