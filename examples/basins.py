@@ -4,6 +4,7 @@ Three attractors, their basins and the curves between
 
 Where motions of the metainterface end: three attractors under one load, their basins, and the curves that part them."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -33,7 +34,8 @@ curves = [stable_manifold(saddle, window=((-2.0, 2.0), (-2.0, 2.0))) for saddle 
 for curve in curves:
     print(curve)
 
-draw_basins(picture, [curve.states for curve in curves])
+figure, ax = plt.subplots()
+draw_basins(picture, [curve.states for curve in curves], ax=ax)
 
 labels = picture.label.values
 rows, columns = np.nonzero(labels[:, 1:] != labels[:, :-1])
