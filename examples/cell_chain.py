@@ -26,7 +26,7 @@ for cell in range(4):
     theta = np.abs(motion.at(times)[0]).reshape(4, 2, -1)[cell].max(axis=0)
     ax.plot(times, theta + 0.6 * cell, label=f"cell {cell + 1}")
 ax.set(xlabel="time", ylabel="opening of the cells, one above another")
-ax.legend()
+ax.legend(loc="center right")
 
 assert (np.diff(opening.argmax(axis=1)) > 0).all()  # each cell is widest open after the one before it
 assert len(motion.closed) == 8

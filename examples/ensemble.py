@@ -44,7 +44,7 @@ mesh = ax.pcolormesh(H, V, chart.impact_count.T / chart.periods.T)
 figure.colorbar(mesh, label="impacts in a forcing period")
 ax.plot(theory.critical_horizontal(np.deg2rad(80), V.values), V, "w--", label=r"$\hat{H}_{cr}$")
 ax.set(xlabel=r"$\hat{H}$", ylabel="$V$", xlim=(0, 0.2))
-ax.legend()
+ax.legend(facecolor="0.4", labelcolor="w")
 
 border = H.where(chart.impact_count > 0).min("H")  # the least force that lifts it off, for each V
 excess = border - theory.critical_horizontal(np.deg2rad(80), chart.V)

@@ -29,7 +29,8 @@ figure, ax = plt.subplots()
 ax.plot(branch.parameters, np.where(branch.stable, branch.amplitudes, np.nan), "k")
 ax.plot(branch.parameters, np.where(branch.stable, np.nan, branch.amplitudes), "k:")
 for point in branch.special:
-    ax.annotate(point.kind, (point.parameter, point.orbit.amplitude), fontsize=7, color="tab:red")
+    if point.kind == "LP" and point.parameter > 0.5:
+        ax.annotate(point.kind, (point.parameter, point.orbit.amplitude), fontsize=7, color="tab:red")
 ax.set(xlabel=r"frequency $\Omega$", ylabel="amplitude (rad)", title="dotted: unstable")
 
 # Where the orbit touches the contact between its two impacts, four more appear: a pair and its mirror image.

@@ -32,7 +32,7 @@ figure, ax = plt.subplots()
 for number in range(spectrum["branches"].sizes["branch"]):
     branch = saltus.branch_of(spectrum, number)
     ax.plot(branch.parameter, branch.amplitude, label=f"period {int(branch.period[0])}")
-ax.set(xlabel=r"frequency $\Omega$", ylabel="amplitude (rad)")
+ax.set(xlabel=r"frequency $\Omega$", ylabel="amplitude (rad)", xlim=(1.9, 3.3))
 ax.legend()
 
 dots = spectrum["attractors"]

@@ -26,6 +26,7 @@ print(f"error ~ B^-{order:.3f}")
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.6), layout="constrained")
 left.loglog(B, errors, "o-")
+left.xaxis.set_minor_formatter(plt.NullFormatter())
 left.set(xlabel="slope $B$ of the smoothed sign", ylabel="error after 5 periods")
 for system, style in ((exact, "-"), (exact.with_({"model.smoothing": 50.0}), "--")):
     branch = saltus.continue_orbit(saltus.find_orbit(system, theta=0.3), "load.frequency", (0.25, 1.1))

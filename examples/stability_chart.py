@@ -25,7 +25,7 @@ mesh = ax.pcolormesh(H, V, chart["amplitude"])
 figure.colorbar(mesh, label="largest amplitude (rad)")
 ax.plot(border, V, "w--", label=r"$\hat{H}_{cr} = |V| / \tan\beta_0$")
 ax.set(xlabel=r"$\hat{H}$", ylabel=r"$V$", xlim=(0, 0.3), ylim=(-1.2, -0.1))
-ax.legend()
+ax.legend(facecolor="0.4", labelcolor="w")
 
 moving = chart["count"].values > 0
 beyond = H[None, :] > border[:, None]

@@ -34,7 +34,7 @@ times = np.linspace(phase, motion.time, 1000)
 figure, ax = plt.subplots()
 ax.plot(times, motion.at(times)[0])
 ax.plot([event.time for event in motion.events], [1.0, -1.0, 1.0, -1.0], "ko", label="impacts, half a period apart")
-ax.set(xlabel="time", ylabel="$x$")
+ax.set(xlabel="time", ylabel="$x$", ylim=(-1.1, 1.5))
 ax.legend()
 
 assert [event.contact for event in motion.events] == ["right", "left", "right", "left"]

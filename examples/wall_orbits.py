@@ -3,7 +3,7 @@ The impact oscillator and its closed form
 =========================================
 
 Orbits of a linear oscillator that hits a wall once a period are known in closed form: the amplitude of the load as a function of
-the impact's speed. The branch that saltus follows knows nothing of it, and lies on the curve, fold included.
+the impact's speed. The exact motion that begins on such an orbit knows nothing of it, and comes back to where it began.
 """
 
 import matplotlib.pyplot as plt
