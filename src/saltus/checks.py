@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -260,48 +260,76 @@ def check_along(system: Any, path: str, values: Iterable[float], name: str) -> N
             raise ParameterError(f"{name} reach beyond what the system allows: {error}", name) from None
 
 
-Rectangle = tuple[tuple[float, float], tuple[float, float]]  # bounds of the coordinate, and of the velocity
+Box = tuple[tuple[float, float], ...]  # bounds of each coordinate, then of each velocity
 
 
-class Window(NamedTuple):
-    """A rectangle of the state plane, by the bounds of the first coordinate and of its velocity."""
+class Window(Box):
+    """A box of the state space by the bounds of each coordinate, then of each velocity; of one coordinate it is a rectangle."""
 
-    coordinate: tuple[float, float]
-    velocity: tuple[float, float]
+    __slots__ = ()
 
     @property
     def centre(self) -> np.ndarray:
-        """Its middle, (2,)."""
+        """Its middle, (d,) for d state variables."""
         return np.asarray(self).mean(axis=1)
 
     @property
     def half(self) -> np.ndarray:
-        """Its half widths, (2,)."""
+        """Its half widths, (d,)."""
         return 0.5 * np.diff(np.asarray(self), axis=1)[:, 0]
 
     def scaled(self, states: np.ndarray) -> np.ndarray:
-        """States (..., 2) in half widths from the middle."""
+        """States (..., d) in half widths from the middle."""
         return np.asarray((states - self.centre) / self.half)
 
 
 def check_window(window: Any, system: System) -> Window:
-    """A window of the state plane; that of half widths 1.5 around the contact, or around 0 without one, for None.
+    """A window of the states; for None that of half widths 1.5 around the contact, or around 0 without one.
+
+    With several contacts that is as much of it as the contacts leave. Of several coordinates bounds may be equal: that state
+    variable then has one value.
 
     Raises:
-        ParameterError: what is no pair of bounds for the coordinate and one for the velocity.
+        ParameterError: what is no pair of bounds for each coordinate and each velocity, or lies beyond the contacts.
     """
+    names = system.model.coordinates
     if window is None:
-        contact = float(system.model.contact) if system.model.sides else 0.0
-        return Window((contact - HALF_WIDTH, contact + HALF_WIDTH), (-HALF_WIDTH, HALF_WIDTH))
+        return _default_window(system)
     try:
         bounds = np.asarray(window, dtype=float)
     except (TypeError, ValueError):
         bounds = np.empty(0)
-    if bounds.shape != (2, 2) or not (np.abs(bounds) <= LIMITS.value).all() or not (bounds[:, 0] < bounds[:, 1]).all():
-        raise ParameterError(
-            f"window must be ((least, largest coordinate), (least, largest velocity)), got {shown(window)}", "window"
-        )
-    return Window(*map(tuple, bounds.tolist()))
+    single = len(names) == 1
+    sound = bounds.shape == (2 * len(names), 2) and (np.abs(bounds) <= LIMITS.value).all()
+    if not sound or not ((bounds[:, 0] < bounds[:, 1]) if single else (bounds[:, 0] <= bounds[:, 1])).all():
+        meant = "((least, largest coordinate), (least, largest velocity))"
+        if not single:
+            meant = f"{2 * len(names)} pairs (least, largest), of {', '.join(names)}, then of their velocities,"
+        raise ParameterError(f"window must be {meant}, got {shown(window)}", "window")
+    for contact in system.model.contacts:
+        low, high = bounds[names.index(contact.coordinate)]
+        if max(contact.gap(low), contact.gap(high)) < 0.0:
+            raise ParameterError(
+                f"window must reach to where {contact.coordinate} can be, and all of ({low:g}, {high:g}) is beyond the contact "
+                f"{contact.name} at {contact.position:g}",
+                "window",
+            )
+    return Window(map(tuple, bounds.tolist()))
+
+
+def _default_window(system: System) -> Window:
+    """Half widths 1.5 around the contact, or around 0 without one, as far as contacts leave room."""
+    model = system.model
+    if model.sides:
+        middle = float(model.contact)
+        return Window(((middle - HALF_WIDTH, middle + HALF_WIDTH), (-HALF_WIDTH, HALF_WIDTH)))
+    bounds = {name: [-HALF_WIDTH, HALF_WIDTH] for name in model.coordinates}
+    for contact in model.contacts:
+        at, pair = float(contact.position), bounds[contact.coordinate]
+        alone = sum(other.coordinate == contact.coordinate for other in model.contacts) == 1
+        pair[:] = sorted((at, at + contact.sign * HALF_WIDTH)) if alone else pair
+        pair[contact.sign < 0] = at
+    return Window([*((low, high) for low, high in bounds.values()), *[(-HALF_WIDTH, HALF_WIDTH)] * len(bounds)])
 
 
 def check_names(name: str, values: Any, meaning: str) -> tuple[str, ...]:
@@ -334,18 +362,19 @@ def instants(times: Any) -> np.ndarray:
     return asked
 
 
-def check_states(name: str, states: Any) -> np.ndarray:
-    """States (coordinate, velocity) as an array (n, 2).
+def check_states(name: str, states: Any, dimension: int = 2) -> np.ndarray:
+    """States, coordinates then velocities, as an array (n, dimension).
 
     Raises:
         ParameterError: with the name, for what is no such array, or not finite.
     """
     try:
-        array = np.asarray(states, dtype=float).reshape(-1, 2)
+        array = np.asarray(states, dtype=float).reshape(-1, dimension)
     except (TypeError, ValueError):
-        array = np.full((1, 2), np.nan)
+        array = np.full((1, dimension), np.nan)
     if not (np.abs(array) <= LIMITS.value).all():
-        raise ParameterError(f"{name} must be states (coordinate, velocity), an array (n, 2), got {shown(states)}", name)
+        each = "coordinate, velocity" if dimension == 2 else "coordinates, velocities"
+        raise ParameterError(f"{name} must be states ({each}), an array (n, {dimension}), got {shown(states)}", name)
     return array
 
 

@@ -11,7 +11,7 @@ from attractor_cases import strobes
 from shared_systems import forced, steady, walled
 
 from saltus.attractors import basins_of_attraction
-from saltus.attractors.basins.basin_cells import cell_arguments, cells
+from saltus.attractors.basins.basin_cells import Grid, cell_arguments, cells
 from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.find import Attractors, find_attractors
 from saltus.errors import ParameterError
@@ -72,7 +72,8 @@ def test_a_cell_on_an_attractor_has_reached_it(found: Attractors) -> None:
 
 
 def test_blocks_with_plain_arguments_give_the_whole(found: Attractors, picture: xarray.Dataset) -> None:
-    arguments = json.loads(json.dumps(cell_arguments(SYSTEM, Labelling(SYSTEM, found.targets, 500, 1e-2, 1e-11))))
+    plane = Grid(("theta", "velocity"), THETA, VELOCITY, {"theta": 0.0, "velocity": 0.0})
+    arguments = json.loads(json.dumps(cell_arguments(SYSTEM, Labelling(SYSTEM, found.targets, 500, 1e-2, 1e-11), plane)))
     for rows in (slice(0, 4), slice(4, 11)):
         block = cells(arguments, {"velocity": VELOCITY[rows].tolist(), "theta": THETA.tolist()})
         assert np.array_equal(block["label"], picture["label"].values[rows])

@@ -8,7 +8,7 @@ import pytest
 import saltus
 from saltus.attractors import classify, lyapunov_spectrum
 from saltus.errors import ParameterError
-from saltus.systems import Harmonic, Load, NewtonImpact, System, TwoLayer, TwoStops
+from saltus.systems import FourCells, Harmonic, Load, NewtonImpact, System, ThreeCells, TwoCells, TwoLayer, TwoStops
 
 
 def layers(H, m=0.1, e=(0.0, 0.0), transfer=0.0):
@@ -69,6 +69,28 @@ def test_chaos_between_two_walls_has_the_exponent_of_two_neighbouring_motions():
     mean, spread = np.mean(growth[20:]), np.std(growth[20:]) / math.sqrt(len(growth) - 20)
     exponent, error = verdict.evidence["largest_exponent"], verdict.evidence["largest_exponent_error"]
     assert abs(mean / (2 * math.pi) - exponent) < 3 * math.hypot(spread / (2 * math.pi), error / 2)
+
+
+@pytest.mark.parametrize(
+    ("kind", "cells"),
+    [(TwoCells, 2), *(pytest.param(*each, marks=pytest.mark.thorough) for each in ((ThreeCells, 3), (FourCells, 4)))],
+)
+@pytest.mark.parametrize("coupling", [0.0, 0.3])
+def test_a_chain_of_equal_cells_is_classified_and_ends_on_the_orbit_of_one_of_them(kind, cells, coupling):
+    """Cells that move alike do not stretch the springs between them, and their events happen at one instant: without a spring
+    each cell is a `TwoLayer`, and with one the motion in which all are alike is the same and attracts here."""
+    load = Load(frequency=1.0, vertical=-0.5, horizontal=Harmonic(amplitude=0.4))
+    numbers = {"beta0": math.radians(80), "damping": 0.1, "mass_ratio": 0.2}
+    chain = System(model=kind(coupling=coupling, **numbers), load=load, impact=NewtonImpact())
+    start = {f"{layer}_{cell}": 0.1 * cell * (layer == "lower") for cell in range(1, cells + 1) for layer in ("lower", "upper")}
+    verdict = classify(chain, **start, velocity=(0.0,) * 2 * cells, periods=120, transient=60)
+    alone = saltus.find_orbit(System(model=TwoLayer(**numbers), load=load, impact=NewtonImpact()), theta_1=0.1, theta_2=0.0)
+    assert (str(verdict.kind), verdict.period) == ("periodic", alone.period)
+    assert verdict.orbit.amplitude == pytest.approx(alone.amplitude, abs=1e-9)
+    assert verdict.orbit.signature.impact_count == cells * alone.signature.impact_count
+    if coupling == 0.0:  # every cell adds the multipliers of its own
+        moduli = np.sort(np.abs(verdict.orbit.multipliers))[-cells:]
+        np.testing.assert_allclose(moduli, abs(alone.multipliers[0]), rtol=0, atol=1e-6)
 
 
 def test_an_orbit_whose_impacts_die_away_is_undecided_by_name():

@@ -180,7 +180,7 @@ def test_chaos_and_a_periodic_motion_coexist() -> None:
         (lambda: find_attractors(forced(), also=[[1.0, np.inf]]), "also"),
         (lambda: find_attractors(forced(), known=[3]), "known must be"),
         (lambda: find_attractors("loaded"), "System"),
-        (lambda: find_attractors(saltus.System(model=saltus.TwoLayer(beta0=1.4))), "one coordinate"),
+        (lambda: find_attractors(saltus.System(model=saltus.TwoLayer(beta0=1.4)), window=((-1.0, 1.0), (-1.0, 1.0))), "4 pairs"),
         (
             lambda: find_attractors(forced().with_({"load.horizontal": saltus.Record([0.0, 1.0], [0.0, 1.0])})),
             "does not repeat",

@@ -224,7 +224,9 @@ def test_impacts_in_turn_within_one_instant_end_though_the_gaps_vanish_as_square
 def test_bouncing_without_loss_a_million_times_a_unit_of_time_is_refused_at_once_with_the_contact():
     """Below 45 degrees the impulse on the upper layer presses the lower one: nothing of a bounce is lost."""
     system = layers(e=(0.5, 1.0), V=-0.5, beta0=math.radians(40))
-    with pytest.raises(MotionError, match=r"more than 20000 impacts at 'upper' \(e = 1\)"):
+    with pytest.raises(
+        MotionError, match=r"more than 20000 impacts at 'upper' \(e = 1\).* without a loss .* never end.*e below 1"
+    ):
         moved(system, (0.0, 1e-15), (0.0, 0.0), 5.0)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import saltus
 from saltus.errors import MotionError, ParameterError
-from saltus.orbits import SpecialKind, defects, orbits_of
+from saltus.orbits import SpecialKind, as_bytes, defects, from_bytes, orbits_of
 from saltus.systems import (
     Harmonic,
     Load,
@@ -191,6 +191,15 @@ def test_a_grazing_is_where_the_linear_response_reaches_the_walls():
     free = saltus.continue_orbit(orbit, "load.frequency", (W - 0.2, W + 0.4))
     grazing = [special for special in free.special if special.kind == SpecialKind.GR]
     assert grazing[0].parameter == pytest.approx(W, abs=1e-10)
+
+
+def test_an_orbit_survives_bytes():
+    """As a store of a diagram keeps it: the equations read back are those of several contacts, with equal solutions."""
+    orbit = saltus.find_orbit(layers(H=0.2), theta_1=0.1, theta_2=0.0)
+    again = from_bytes(as_bytes(orbit))
+    np.testing.assert_array_equal(again.solution.unknowns, orbit.solution.unknowns)
+    np.testing.assert_array_equal(again.multipliers, orbit.multipliers)
+    assert again.signature == orbit.signature
 
 
 def test_a_branch_and_its_orbits_survive_a_file(branch):

@@ -179,7 +179,7 @@ def found(load="periodic", undecided=0.25):
         "start_velocity": ("start", [1.0, 1.0, 1.0, 1.0]),
         "end": ("start", [0, 1, 1, -1]),
     }
-    return xarray.Dataset(columns, {"attractor": [0, 1]}, {"load": load, "undecided": undecided})
+    return xarray.Dataset(columns, {"attractor": [0, 1]}, {"load": load, "undecided": undecided, "plane": ["theta", "velocity"]})
 
 
 def test_attractors_are_named_with_their_shares_and_errors():

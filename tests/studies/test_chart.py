@@ -10,7 +10,7 @@ from shared_systems import forced
 from saltus.checks import check_window
 from saltus.errors import ParameterError
 from saltus.orbits import find_orbit, search_orbits
-from saltus.studies import stability_chart
+from saltus.studies import bordered_chart, stability_chart
 from saltus.studies.chart.cells import beyond_limits, joined, seeds, starts
 from saltus.studies.chart.changes import monostable
 from saltus.studies.chart.motions import MOTION, distinct, has_alike
@@ -155,7 +155,7 @@ def test_limits_of_the_mechanism():
 
 def some(*rows):
     """Motions from (cell, period, impact_count, amplitude, other)."""
-    return np.array([(cell, 1, *row, (0.0, float(i))) for i, (cell, *row) in enumerate(rows)], dtype=MOTION)
+    return np.array([(cell, 1, *row, 0.0, (0.0, float(i))) for i, (cell, *row) in enumerate(rows)], dtype=MOTION)
 
 
 def test_a_motion_and_its_mirror_image_are_one():
@@ -236,5 +236,5 @@ def test_systems_without_a_chart_are_refused():
     two = type(forced(1.0))(
         model=TwoLayer(beta0=1.4), load=Load(frequency=1.0, horizontal=Harmonic(amplitude=0.1), vertical=-0.5)
     )
-    with pytest.raises(ParameterError, match="one coordinate"):
-        stability_chart(two)
+    with pytest.raises(ParameterError, match="the borders of a chart is for models with one coordinate"):
+        bordered_chart(two)

@@ -12,7 +12,7 @@ from saltus.attractors.attractor import REST, Attractor, Attractors, Target
 from saltus.attractors.attractors_dataset import about, attractor_columns, variable
 from saltus.attractors.find import find_attractors
 from saltus.attractors.kind import AttractorKind
-from saltus.checks import Rectangle, check_along, check_number, check_path
+from saltus.checks import Box, check_along, check_number, check_path
 from saltus.errors import ParameterError
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
@@ -41,7 +41,7 @@ def attractors_along(
     path: str,
     values: Iterable[float],
     *,
-    window: Rectangle | None = None,
+    window: Box | None = None,
     starts: int = 128,
     max_period: int = 16,
     seed: int = 0,
@@ -83,7 +83,7 @@ def attractors_along(
                [1.]])
     """
     check_number("threshold", threshold, above=0.0)
-    grid, followed = _values(system, path, values), _Followed(threshold)
+    grid, followed = _values(system, path, values), _Followed(threshold, system.dimension)
     for i, value in enumerate(grid):
         here = find_attractors(
             system.with_({path: float(value)}),
@@ -106,14 +106,15 @@ class _Followed:
     """The attractors at the values so far, and the identities of each by its label there."""
 
     threshold: float
+    dimension: int  # of the states
     rows: list[Attractors] = field(default_factory=list)
     names: list[dict[int, int]] = field(default_factory=list)
 
     @property
     def seeds(self) -> np.ndarray:
-        """States of the attractors at the last value, (n, 2)."""
+        """States of the attractors at the last value, (n, d)."""
         last = self.rows[-1] if self.rows else ()
-        return np.concatenate([np.empty((0, 2)), *(member.states[-SETTINGS.seeds :] for member in last)])
+        return np.concatenate([np.empty((0, self.dimension)), *(member.states[-SETTINGS.seeds :] for member in last)])
 
     def add(self, here: Attractors) -> None:
         """Add the attractors at the next value, found from the seeds too: each goes on as the nearest one before, or is new."""
@@ -124,8 +125,8 @@ class _Followed:
         taken = max((name for row in self.names for name in row.values()), default=REST)
         for member in here:
             if member.label not in found:
-                taken += member.kind is not AttractorKind.REST
-                found[member.label] = REST if member.kind is AttractorKind.REST else taken
+                taken += member.label != REST
+                found[member.label] = REST if member.label == REST else taken
         self.rows.append(here)
         self.names.append(found)
 
@@ -164,7 +165,7 @@ def set_distance(one: Target, other: Target) -> float:
 def _apart(old: Attractor, new: Attractor, led: bool) -> float:
     """The distance of two attractors, larger for different periods, and smaller where motions from one settle on the other."""
     if AttractorKind.REST in (old.kind, new.kind):
-        return 0.0 if old.kind == new.kind else np.inf
+        return set_distance(old.target, new.target) if old.kind == new.kind else np.inf
     distance = set_distance(old.target, new.target)
     if old.period != new.period:
         return distance / SETTINGS.other_period

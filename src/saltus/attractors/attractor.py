@@ -29,7 +29,7 @@ class Target:
 
     label: int
     kind: AttractorKind
-    states: np.ndarray  # (n, 2), coordinate and velocity at phase 0
+    states: np.ndarray  # (n, d), coordinates and velocities at phase 0
 
     @property
     def dense(self) -> bool:
@@ -51,15 +51,14 @@ class Target:
         return float(2.0 * np.quantile(apart[:, 1], 0.95))
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """How far states (..., 2) are from the nearest of its own, in the larger of the two coordinates, (...)."""
+        """How far states (..., d) are from the nearest of its own, by their largest difference in a variable, (...)."""
         if self.dense:
             finite = np.isfinite(points).all(axis=-1)
             apart, _ = self._tree.query(np.where(finite[..., None], points, 0.0), p=np.inf)
             return np.where(finite, apart, np.inf)
         distance = np.full(points.shape[:-1], np.inf)
         for state in self.states:
-            apart = np.maximum(np.abs(points[..., 0] - state[0]), np.abs(points[..., 1] - state[1]))
-            np.fmin(distance, apart, out=distance)
+            np.fmin(distance, np.abs(points - state).max(axis=-1), out=distance)
         return distance
 
     def to_dict(self) -> dict[str, Any]:
@@ -69,7 +68,7 @@ class Target:
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Target:
         """The inverse of `to_dict`."""
-        return cls(int(data["label"]), AttractorKind(data["kind"]), np.asarray(data["states"], dtype=float).reshape(-1, 2))
+        return cls(int(data["label"]), AttractorKind(data["kind"]), np.atleast_2d(np.asarray(data["states"], dtype=float)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +82,7 @@ class Attractor:
     """
 
     target: Target
-    highest: float  # of the coordinate
+    highest: float  # of the coordinate, or of all of several
     lowest: float
     orbit: PeriodicOrbit | None  # of a periodic one: solved by its own equations, and stable by its multipliers
     starts: int  # how many of the initial states end there
@@ -103,7 +102,7 @@ class Attractor:
 
     @property
     def states(self) -> np.ndarray:
-        """Its states at phase 0 of the load, (n, 2)."""
+        """Its states at phase 0 of the load, (n, d)."""
         return self.target.states
 
     @property
@@ -152,7 +151,7 @@ class Attractors:
 
     system: System
     members: tuple[Attractor, ...]
-    states: np.ndarray  # (n, 2): the initial states that were sampled
+    states: np.ndarray  # (n, d): the initial states that were sampled
     assigned: np.ndarray  # (n,): the label of the attractor on which each ends, or UNDECIDED
     carried: np.ndarray  # (k,): the same of the further states that were given
     window: Window  # of the initial states

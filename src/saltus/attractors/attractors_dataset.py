@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors.stroboscopic_section import is_constant
+from saltus.flow import extrema_names, state_names
 from saltus.provenance import provenance
 
 if TYPE_CHECKING:
@@ -23,19 +24,17 @@ def attractors_dataset(found: Attractors) -> xarray.Dataset:
     """The table of the attractors, with their states at phase 0 and the initial states with the labels where they end."""
     import xarray
 
-    name, unit = coordinate(found.system)
     table = attractor_table(found.members, found.system)
-    table |= {
-        f"start_{name}": variable("start", found.states[:, 0], unit, f"{name} at the start"),
-        "start_velocity": variable("start", found.states[:, 1], unit, "velocity at the start"),
-        "end": variable("start", found.assigned, "1", "attractor on which it ends, -1 for undecided"),
-    }
+    for i, (name, unit) in enumerate(state_units(found.system).items()):
+        table[f"start_{name}"] = variable("start", found.states[:, i], unit, f"{name} at the start")
+    table["end"] = variable("start", found.assigned, "1", "attractor on which it ends, -1 for undecided")
     attributes = about(
         found.system,
         "attractors",
         tol=found.tol,
         seed=found.seed,
         window=np.ravel(found.window).tolist(),
+        plane=list(state_plane(found.system)),
         undecided=found.undecided,
         reasons=list(found.reasons),
     )
@@ -54,10 +53,16 @@ def about(system: System, kind: str, **numbers: Any) -> dict[str, Any]:
     return attributes | provenance(system, **numbers)
 
 
-def coordinate(system: System) -> tuple[str, str]:
-    """The coordinate's name and unit; times are dimensionless, so that its velocity has the same unit."""
-    name = system.model.coordinates[0]
-    return name, system.model.unit_of(name)
+def state_units(system: System) -> dict[str, str]:
+    """The units of the state variables by their names; times are dimensionless, so that velocities have those of coordinates."""
+    names = system.model.coordinates
+    return dict(zip(state_names(names), 2 * [system.model.unit_of(name) for name in names], strict=True))
+
+
+def state_plane(system: System) -> tuple[str, str]:
+    """The two state variables over which attractors are drawn: the first coordinate and its velocity."""
+    names = state_names(system.model.coordinates)
+    return names[0], names[len(names) // 2]
 
 
 def labels(members: Iterable[Attractor]) -> Any:
@@ -67,21 +72,23 @@ def labels(members: Iterable[Attractor]) -> Any:
 
 def attractor_columns(system: System) -> dict[str, tuple[str, str, str]]:
     """The numbers that a table holds of each attractor: by their names in it the property of `Attractor`, unit and text."""
-    name, unit = coordinate(system)
+    names, unit = system.model.coordinates, system.model.unit_of(system.model.coordinates[0])
+    high, low = extrema_names(names)
+    name = names[0] if len(names) == 1 else "any coordinate"
     return {
         "fraction": ("fraction", "1", "share of the initial states that end there"),
         "error": ("error", "1", "binomial standard error of the share"),
         "amplitude": ("amplitude", unit, f"max abs({name})"),
-        f"largest_{name}": ("highest", unit, f"the largest {name}"),
-        f"smallest_{name}": ("lowest", unit, f"the smallest {name}"),
+        high: ("highest", unit, f"the largest {name}"),
+        low: ("lowest", unit, f"the smallest {name}"),
         "period": ("period", "1", "forcing periods after which it repeats, 0 where it does not"),
     }
 
 
 def attractor_table(members: tuple[Attractor, ...], system: System) -> dict[str, Any]:
     """Variables over (attractor,) and, of the states at phase 0, over (attractor, state)."""
-    name, unit = coordinate(system)
-    states = np.full((len(members), max([1, *(min(len(m.states), MOST_STATES) for m in members)]), 2), np.nan)
+    most = max([1, *(min(len(m.states), MOST_STATES) for m in members)])
+    states = np.full((len(members), most, system.dimension), np.nan)
     for row, member in zip(states, members, strict=True):
         row[: len(member.states)] = member.states[:MOST_STATES]
     columns: dict[str, Any] = {}
@@ -97,7 +104,7 @@ def attractor_table(members: tuple[Attractor, ...], system: System) -> dict[str,
         "evidence": (np.array([m.evidence for m in members], dtype=str), "why it is one"),
     }
     columns |= {key: variable("attractor", values, "1", text) for key, (values, text) in more.items()}
-    for i, label in enumerate((name, "velocity")):
+    for i, (label, unit) in enumerate(state_units(system).items()):
         columns[f"section_{label}"] = variable(("attractor", "state"), states[:, :, i], unit, f"{label} at phase 0 of the load")
     return columns
 

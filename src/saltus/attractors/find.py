@@ -13,7 +13,7 @@ from saltus.attractors.attractor import REST, UNDECIDED, Attractor, Attractors
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.registry import NoLabel, Registry
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.checks import Rectangle, check_count, check_number, check_starts, check_states, check_window
+from saltus.checks import Box, check_count, check_number, check_starts, check_states, check_window
 from saltus.errors import ParameterError
 from saltus.flow import RECURRENCE, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, initial_states
@@ -39,7 +39,7 @@ def _check(
     system: System, window: Any, starts: int, max_period: int, seed: int, known: Any, also: Any, tol: float, progress: object
 ) -> None:
     with_clock(system)
-    check_states("also", also)
+    check_states("also", also, system.dimension)
     check_starts(starts)
     check_count("max_period", max_period, 1, RECURRENCE.compiled_max_period)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
@@ -52,7 +52,7 @@ def _check(
 def find_attractors(
     system: System,
     *,
-    window: Rectangle | None = None,
+    window: Box | None = None,
     starts: int = 256,
     max_period: int = 16,
     seed: int = 0,
@@ -70,26 +70,27 @@ def find_attractors(
     equilibria are found, as orbits of period 1.
 
     Args:
-        system: what moves: any model of one coordinate, under a load with a frequency or a constant one.
-        window: of the state plane, ((least, largest coordinate), (least, largest velocity)), covered evenly by initial states; by
-            default that of half widths 1.5 around the contact, or around 0 without one.
+        system: what moves, under a load with a frequency or a constant one.
+        window: of the states, ((least, largest coordinate), (least, largest velocity)), covered evenly by initial states; with
+            several coordinates such a pair for each of them, then for each velocity. By default half widths are 1.5 around the
+            contact, or around 0 without one. With several contacts starts take turns in which of them are closed.
         starts: how many.
         max_period: the longest period of an orbit, at most 16.
         seed: shifts the states.
         known: stable orbits, or branches of which those at the system's parameter are taken, that count as attractors too.
-        also: further initial states (n, 2), which do not count in the shares.
+        also: further initial states (n, d), coordinates and velocities, which do not count in the shares.
         tol: the error of a step, as for `simulate_many`.
         progress: called with the fraction done and what is being done.
 
     Raises:
-        ParameterError: several coordinates, a load that never repeats, known orbits of another system, numbers without meaning.
+        ParameterError: a load that never repeats, known orbits of another system, numbers without meaning.
 
     Examples:
         >>> found = saltus.find_attractors(system, starts=16)
         >>> [attractor.period for attractor in found]
         [1]
     """
-    clock, further, area = with_clock(system), check_states("also", also), check_window(window, system)
+    clock, further, area = with_clock(system), check_states("also", also, system.dimension), check_window(window, system)
     progress(0.0, "motions")
     states, registry = initial_states(clock, starts, area, seed), Registry(clock)
     for orbit in _known(system, known):
@@ -132,16 +133,21 @@ def _assigned(registry: Registry, states: np.ndarray, max_period: int, tol: floa
 
 
 def final_labels(members: list[Attractor]) -> dict[int, int]:
-    """Labels by those of a registry, the same for the same set: rest, then orbits by period, amplitude and sign, then others."""
+    """Labels by those of a registry, the same for the same set: rest, then orbits by period, amplitude and sign, then others.
+
+    With several contacts there may be more than one state of rest; 0 is that of the least coordinates.
+    """
 
     def rank(member: Attractor) -> tuple[float, ...]:
+        if member.kind is AttractorKind.REST:
+            return -1.0, *map(float, member.states[0])
         if member.orbit is None:
             return 1.0, 0.0, round(member.amplitude, 2), -round(float(member.states[:, 0].mean()), 2)
         return 0.0, float(member.period), round(member.amplitude, 6), -round(member.highest, 6)
 
-    moving = sorted((member for member in members if member.kind is not AttractorKind.REST), key=rank)
-    labels = {member.label: REST for member in members if member.kind is AttractorKind.REST}
-    return labels | {member.label: i for i, member in enumerate(moving, 1)}
+    ordered = sorted(members, key=rank)
+    first = REST if ordered and ordered[0].kind is AttractorKind.REST else REST + 1
+    return {member.label: i for i, member in enumerate(ordered, first)}
 
 
 def _known(system: System, known: Any) -> list[PeriodicOrbit]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.attractors.stroboscopic_section import section_states
 from saltus.errors import MotionError
-from saltus.flow import nearest_return
+from saltus.flow import EventKind, Stop, nearest_return, simulate
 from saltus.orbits import PeriodicOrbit, Signature, orbit_from, problem_of
 from saltus.systems import System
 
@@ -78,7 +78,7 @@ class Certificate:
 
 
 def certify(system: System, state: np.ndarray, period: int | None, max_period: int = 16) -> Certificate:
-    """The orbit under a motion with this state (coordinate, velocity) at phase 0, which repeats itself after `period` periods.
+    """The orbit under a motion with this state (d,) at phase 0, which repeats itself after `period` forcing periods.
 
     Without a period the one of its nearest return within `max_period` is tried, and a motion on its way there may be farther off.
     """
@@ -89,13 +89,12 @@ def certify(system: System, state: np.ndarray, period: int | None, max_period: i
     within = SETTINGS.defect if period else SETTINGS.slow
     if orbit is None:
         return Certificate(None, np.inf, within)
-    position, velocity = orbit.state
-    apart = np.abs(states[:q] - np.append(position, velocity)).max(axis=1)
+    apart = np.abs(states[:q] - orbit.section_state).max(axis=1)
     return Certificate(orbit, float(apart.min()), within)
 
 
 def solved_orbit(system: System, state: np.ndarray, period: int, admissible: bool = True) -> PeriodicOrbit | None:
-    """The orbit that a motion from a state (2,) at phase 0 follows over so many periods, if one solves its equations there."""
+    """The orbit that a motion from a state (d,) at phase 0 follows over so many periods, if one solves its equations there."""
     try:
         orbit = orbit_from(problem_of(system, Signature((), 1)), start_at(system, state), period)
     except MotionError:
@@ -103,8 +102,21 @@ def solved_orbit(system: System, state: np.ndarray, period: int, admissible: boo
     return orbit if orbit is not None and (orbit.admissible or not admissible) else None
 
 
+def stays_at_rest(system: System, state: np.ndarray) -> bool:
+    """Whether several contacts hold a state (d,) over a whole forcing period, and so, as the load repeats, for good."""
+    if not system.model.contacts:
+        return False
+    motion = simulate(system, **start_at(system, state), periods=1, dense=False)
+    return motion.stop is Stop.REST and not any(event.kind in (EventKind.IMPACT, EventKind.RELEASE) for event in motion.events)
+
+
 def start_at(system: System, state: np.ndarray) -> dict[str, Any]:
     """A state (coordinates, velocities) as `simulate` takes it."""
     names = system.model.coordinates
     velocities = tuple(map(float, state[len(names) :]))
     return {**dict(zip(names, map(float, state), strict=False)), "velocity": velocities[0] if len(names) == 1 else velocities}
+
+
+def state_vector(system: System, state: dict[str, Any]) -> np.ndarray:
+    """The inverse of `start_at`: coordinates, then velocities, (d,)."""
+    return np.append([state[name] for name in system.model.coordinates], state["velocity"])

@@ -9,11 +9,11 @@ import numpy as np
 
 from saltus.attractors.attractor import SAME_STATE, UNDECIDED, Attractor, Target
 from saltus.attractors.kind import AttractorKind
-from saltus.attractors.orbit_certificate import solved_orbit, start_at
+from saltus.attractors.orbit_certificate import solved_orbit, start_at, state_vector, stays_at_rest
 from saltus.attractors.stroboscopic_section import section_states
 from saltus.attractors.verdict.classification import classify
-from saltus.flow import Recurrence, motions_from, stroboscopic
-from saltus.orbits import PeriodicOrbit, is_symmetric
+from saltus.flow import Recurrence, extrema_names, motions_from, stroboscopic
+from saltus.orbits import PeriodicOrbit, is_symmetric, rest_state
 from saltus.systems import System
 
 
@@ -51,8 +51,8 @@ class Registry:
     def assign(self, ends: Recurrence) -> np.ndarray:
         """The label of the attractor on which each motion ends, or a `NoLabel`, (n,)."""
         labels = np.full(len(ends), int(NoLabel.OPEN))
-        if ends.rest.any():
-            labels[ends.rest] = self.add_rest()
+        for row in np.flatnonzero(ends.rest):
+            labels[row] = self.add_rest(self._rest_state(ends.last[row]))
         if ends.ended.any():
             labels[ends.ended] = NoLabel.FAILED
             self.reasons.append(f"{int(ends.ended.sum())} motions are ended by a margin of the model or cannot go on")
@@ -71,9 +71,11 @@ class Registry:
         known = self.label_of(states)
         if known is not None:
             return known
-        where = f"at ({states[-1, 0]:.6g}, {states[-1, 1]:.6g})"
+        if len(states) == 1 and stays_at_rest(self.system, states[-1]):
+            return self.add_rest(states[-1])
+        where = f"at {_shown(states[-1])}"
         orbit = solved_orbit(self.system, states[-1], len(states))
-        if orbit is None or _cycle(states).distance(np.array(orbit.state)) > SETTINGS.beside * _near(states):
+        if orbit is None or _cycle(states).distance(orbit.section_state) > SETTINGS.beside * _near(states):
             return self._fail(
                 f"motions repeat themselves every {len(states)} periods {where}, but no orbit solves its equations there"
             )
@@ -88,19 +90,23 @@ class Registry:
         self.reasons.append(reason)
         return int(NoLabel.FAILED)
 
-    def add_rest(self) -> int:
-        """The label of rest at the contact."""
+    def _rest_state(self, last: np.ndarray) -> np.ndarray:
+        """Where a motion rests whose last state is this: at the contact, or, with several, just there."""
+        return last if self.system.model.contacts else rest_state(self.system)
+
+    def add_rest(self, state: np.ndarray) -> int:
+        """The label of rest in a state (d,)."""
         for member in self.members:
-            if member.kind is AttractorKind.REST:
+            if member.kind is AttractorKind.REST and np.abs(member.states[0] - state).max() < _near(state):
                 return member.label
-        contact = float(self.system.model.contact)
+        held = state[: len(self.system.model.coordinates)]
         evidence = "proved: captured at the contact for all later loads, or at rest where no load ever pulls"
-        return self._add(AttractorKind.REST, np.array([[contact, 0.0]]), (contact, contact), evidence)
+        return self._add(AttractorKind.REST, state[None], (float(held.min()), float(held.max())), evidence)
 
     def add_orbit(self, orbit: PeriodicOrbit, states: np.ndarray | None = None) -> int:
         """The label of a stable orbit."""
         if states is None:
-            states = section_states(self.system, np.array([orbit.state]), orbit.period)[0]
+            states = section_states(self.system, orbit.section_state[None], orbit.period)[0]
         known = self.label_of(states)
         if known is not None:
             return known
@@ -139,14 +145,14 @@ class Registry:
                     break
 
     def judge(self, state: np.ndarray, max_period: int) -> int:
-        """Classify a motion that does not settle, from a state (2,): the label of its attractor, or FAILED if it has none."""
+        """Classify a motion that does not settle, from a state (d,): the label of its attractor, or FAILED if it has none."""
         start, longest = start_at(self.system, state), max(max_period, 16)
         verdict = classify(self.system, **start, periods=SETTINGS.verdict_periods, max_period=longest)
         if verdict.kind is AttractorKind.REST:
-            return self.add_rest()
+            return self.add_rest(self._rest_state(state_vector(self.system, verdict.state)))
         if verdict.orbit is not None and verdict.kind is AttractorKind.PERIODIC:
             return self.add_orbit(verdict.orbit)
-        where = f"from ({state[0]:.6g}, {state[1]:.6g})"
+        where = f"from {_shown(state)}"
         if verdict.kind is AttractorKind.UNDECIDED or verdict.exponents is None:
             return self._fail(f"{where}: {verdict.reason}")
         if float(verdict.exponents.values.sum()) > -SETTINGS.lossless:
@@ -154,8 +160,7 @@ class Registry:
         sample = motions_from(
             self.system, state[None], periods=SETTINGS.sample, sample=("state", "extrema"), last="all", tol=1e-10
         )
-        name = self.system.model.coordinates[0]
-        low, high = (float(sample[f"overall_{which}_{name}"].values[0]) for which in ("smallest", "largest"))
+        high, low = (float(sample[f"overall_{name}"].values[0]) for name in extrema_names(self.system.model.coordinates))
         return self._add(verdict.kind, stroboscopic(self.system, sample)[0], (low, high), verdict.reason)
 
     def add_images(self) -> None:
@@ -186,6 +191,10 @@ class Registry:
 
 def _cycle(states: np.ndarray) -> Target:
     return Target(0, AttractorKind.PERIODIC, states)
+
+
+def _shown(state: np.ndarray) -> str:
+    return f"({', '.join(f'{value:.6g}' for value in state)})"
 
 
 def _near(states: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""The stroboscopic section of a system with one coordinate: its states at phase 0 of the load."""
+"""The stroboscopic section of a system: its states at phase 0 of the load."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from saltus.flow import motions_from, stroboscopic
 from saltus.systems import Load, System, check_system
 
 
-def with_clock(system: System, asking: str = "the search of attractors", any_model: bool = False) -> System:
+def with_clock(system: System) -> System:
     """The system with a forcing period, which fixes the stroboscopic section: its load's, or 2 pi under a constant load.
 
-    Equilibria are then orbits of period 1. With `any_model` there may be several coordinates and several contacts.
+    Equilibria are then orbits of period 1.
 
     Raises:
-        ParameterError: several coordinates, or a load of records, which never repeats.
+        ParameterError: what is no system, or a load of records, which never repeats.
     """
-    check_system(system, asking, coordinates=None if any_model else 1, several_contacts=any_model)
+    check_system(system, "the search of attractors", several_contacts=True)
     check_periodic(system)
     if system.load.frequency is not None:
         return system
@@ -44,5 +44,5 @@ def is_constant(load: Load) -> bool:
 
 
 def section_states(system: System, states: np.ndarray, periods: float, tol: float = 1e-13) -> np.ndarray:
-    """The states after 1, 2, ... forcing periods from states (n, 2) at phase 0, (n, periods, 2); of half a period, at its end."""
+    """The states after 1, 2, ... forcing periods from states (n, d) at phase 0, (n, periods, d); of half a period, at its end."""
     return stroboscopic(system, motions_from(system, states, periods=periods, last="all", tol=tol))

@@ -10,9 +10,10 @@ from importlib import import_module
 from types import SimpleNamespace
 from typing import Any, get_type_hints
 
-from saltus.config.readers import Reader, read_table, reader_of
+from saltus.config.readers import Reader, read_table, read_values, read_values_or_number, reader_of
 from saltus.config.source import Source
 from saltus.errors import ParameterError
+from saltus.flow import state_names
 from saltus.systems import System
 
 QUESTIONS: dict[str, tuple[str, ...]] = {
@@ -54,7 +55,7 @@ def keys_of(kind: str, coordinates: tuple[str, ...] = ()) -> dict[str, Reader]:
     """The keys that the table of a question may have, with their readers: the arguments of types that a file can give.
 
     Args:
-        coordinates: the names of the coordinates, which stand for an open-ended argument that holds one array for each.
+        coordinates: the names of the coordinates; the state variables of such a model stand for an open-ended argument.
     """
     keys: dict[str, Reader] = {}
     for function in functions_of(kind):
@@ -62,7 +63,11 @@ def keys_of(kind: str, coordinates: tuple[str, ...] = ()) -> dict[str, Reader]:
         for argument in inspect.signature(function).parameters.values():
             reader = reader_of(hints[argument.name])
             if reader is not None and argument.name not in NOT_IN_FILES:
-                keys |= dict.fromkeys(coordinates if argument.kind is argument.VAR_KEYWORD else (argument.name,), reader)
+                lists = reader is read_values_or_number
+                if argument.kind is argument.VAR_KEYWORD:  # of one coordinate alone no number will do
+                    keys |= dict.fromkeys(coordinates, read_values if lists and len(coordinates) == 1 else reader)
+                else:
+                    keys[argument.name] = reader
     return keys
 
 
@@ -74,4 +79,6 @@ def _hints(function: Callable[..., Any]) -> dict[str, Any]:
 
 def read_ask(source: Source, system: System, kind: str, data: Any) -> Ask:
     """The question in a table."""
-    return Ask(kind=kind, options=read_table(source, (kind,), data, keys_of(kind, system.model.coordinates)))
+    names = system.model.coordinates
+    keys = keys_of(kind, state_names(names) if len(names) > 1 else names)
+    return Ask(kind=kind, options=read_table(source, (kind,), data, keys))

@@ -115,6 +115,11 @@ def read_values(value: Any) -> np.ndarray:
     raise ValueError(f"must be a list of numbers or a table such as {EXAMPLE}, got {given}")
 
 
+def read_values_or_number(value: Any) -> np.ndarray | float:
+    """Numbers as `read_values` reads them, or one number (or angle)."""
+    return read_values(value) if isinstance(value, (list, dict)) else read_angle(value)
+
+
 def _spaced(table: dict[str, Any]) -> np.ndarray:
     """`count` numbers evenly spaced between the two ends in a table."""
     unknown = [name for name in table if name not in SPACED]
@@ -186,10 +191,11 @@ READERS: dict[Any, Reader] = {
     str: read_text,
     bool: read_switch,
     Pair: read_pair,
-    tuple[Pair, Pair]: read_pairs,
+    tuple[Pair, ...]: read_pairs,
     tuple[str, str]: read_paths,
     Iterable[Pair]: read_pairs,
     Iterable[float]: read_values,
+    Iterable[float] | float: read_values_or_number,
 }  # how a file gives an argument of each type
 
 

@@ -5,6 +5,7 @@ from .dense_output import DenseOutput
 from .ensemble.compiled_lanes import load_advance, load_driver, load_helpers
 from .ensemble.dataset_reading import stop_names, stroboscopic
 from .ensemble.ensemble import compiled_lanes, simulate_many
+from .ensemble.ensemble_dataset import extrema_names
 from .ensemble.inputs import Inputs, read_inputs
 from .ensemble.tangent_ensemble import TangentEnsemble
 from .ensemble.threads import Jobs, Lanes, available_cores
@@ -13,7 +14,7 @@ from .kernel_layout import STRUCTURE_SIZES, Where
 from .load_release import Release, contact_pull, load_releases, peak_near
 from .memory_layout import EventCode
 from .motion import Event, EventKind, Impacts, Motion
-from .motion_dataset import rate_name
+from .motion_dataset import rate_name, state_names
 from .recurrence import (
     RECURRENCE,
     Outcome,
@@ -65,6 +66,7 @@ __all__ = [
     "compiled_lanes",
     "contact_pull",
     "contact_regularity",
+    "extrema_names",
     "find_recurrence",
     "last_states",
     "limits_of",
@@ -85,6 +87,7 @@ __all__ = [
     "sensitivities",
     "simulate",
     "simulate_many",
+    "state_names",
     "stop_names",
     "stroboscopic",
     "taylor_order",

@@ -80,3 +80,8 @@ def rate_name(name: str, names: tuple[str, ...]) -> str:
 def _default_times(motion: Motion, period: float | None) -> np.ndarray:
     count = 10 * PERIOD_SAMPLES if period is None else int(np.ceil(PERIOD_SAMPLES * (motion.time - motion.start) / period))
     return np.linspace(motion.start, motion.time, max(2, count + 1))
+
+
+def state_names(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names of the state variables, coordinates and then velocities, of a model with these coordinates."""
+    return *names, *(rate_name(name, names) for name in names)

@@ -15,8 +15,9 @@ import numpy as np
 
 from saltus.flow.ensemble.dataset_reading import stop_names, stroboscopic
 from saltus.flow.ensemble.ensemble import simulate_many
-from saltus.flow.ensemble.ensemble_dataset import extrema_names, rate_name
+from saltus.flow.ensemble.ensemble_dataset import extrema_names
 from saltus.flow.load_release import load_releases
+from saltus.flow.motion_dataset import state_names
 from saltus.flow.stops import Stop
 from saltus.progress import Progress, silent
 from saltus.systems import System
@@ -79,6 +80,7 @@ class Recurrence:
     states: np.ndarray  # (n, kept, d): the stroboscopic states, the last one last, nan where there were fewer
     extrema: np.ndarray | None = None  # (n, kept, 2): largest and smallest of all coordinates in each of these periods
     impact_counts: np.ndarray | None = None  # (n, kept): impacts in each of these periods
+    speeds: np.ndarray | None = None  # (n, kept): the least speed before an impact in each of these periods, inf without
 
     def __len__(self) -> int:
         return len(self.outcome)
@@ -106,7 +108,7 @@ class Recurrence:
     @property
     def within_period(self) -> np.ndarray:
         """Which of the kept forcing periods are the last `period` ones of a motion, (n, kept); all where it has no period."""
-        kept = max(a.shape[1] for a in (self.states, self.extrema, self.impact_counts) if a is not None)
+        kept = max(a.shape[1] for a in (self.states, self.extrema, self.impact_counts, self.speeds) if a is not None)
         length = np.where(self.period > 0, self.period, kept)
         return np.asarray(np.arange(kept)[::-1] < length[:, None])
 
@@ -128,6 +130,13 @@ class Recurrence:
         assert self.impact_counts is not None
         return np.asarray(np.nansum(np.where(self.within_period, self.impact_counts, 0.0), axis=1).astype(int))
 
+    @property
+    def slowest(self) -> np.ndarray:
+        """The least speed before an impact over the motion's period, (n,); 0 without impacts."""
+        assert self.speeds is not None
+        least = np.nanmin(np.where(self.within_period, self.speeds, np.nan), axis=1, initial=np.inf)
+        return np.asarray(np.where(np.isfinite(least), least, 0.0))
+
     def only(self, rows: Any) -> Recurrence:
         """The results of some of the motions."""
         columns = {part.name: getattr(self, part.name) for part in fields(self)}
@@ -148,6 +157,7 @@ def find_recurrence(
     kept: int | None = None,
     extrema: bool = False,
     impact_count: bool = False,
+    speed: bool = False,
     stop_early: bool = True,
     tol: float = RECURRENCE.tol,
     threads: int | None = None,
@@ -163,7 +173,7 @@ def find_recurrence(
         parameters: numbers by dotted path, (n,) each, in place of the system's.
         max_period: the longest period looked for. Those above 16 need `kept` to be more than twice as many.
         kept: how many of the last stroboscopic states are kept, by default all; 0 for none.
-        extrema, impact_count: whether these are recorded, over max(kept, max_period) of the last forcing periods.
+        extrema, impact_count, speed: whether these are recorded, over max(kept, max_period) of the last forcing periods.
         stop_early: False follows every motion for all periods, and reads its period off the last states (`near_return`).
         tol: the error that one step may make.
         threads: how many cores to use; by default all.
@@ -172,7 +182,7 @@ def find_recurrence(
     A motion at the contact is at rest for good if it is proved to be captured, or if the load never pulls there; with parameters
     of its own, only if it is proved.
     """
-    wanted = {"state": kept != 0, "extrema": extrema, "impact_count": impact_count}
+    wanted = {"state": kept != 0, "extrema": extrema, "impact_count": impact_count, "speed": speed}
     size = periods if kept is None else kept
     result = motions_from(
         system,
@@ -181,7 +191,7 @@ def find_recurrence(
         periods=periods,
         until=("rest", "settled") if stop_early else (),
         sample=tuple(name for name, chosen in wanted.items() if chosen),
-        last=max(1, min(max(size, max_period if extrema or impact_count else 1), periods)),
+        last=max(1, min(max(size, max_period if extrema or impact_count or speed else 1), periods)),
         tol=tol,
         threads=threads,
         progress=progress,
@@ -201,7 +211,7 @@ def motions_from(system: System, states: np.ndarray, **options: Any) -> xarray.D
 
 def last_states(system: System, result: xarray.Dataset) -> np.ndarray:
     """The states at the end of an ensemble's motions, (..., d)."""
-    return np.stack([result[name].values for name in _state_names(system)], axis=-1)
+    return np.stack([result[name].values for name in state_names(system.model.coordinates)], axis=-1)
 
 
 def return_distances(states: np.ndarray, max_period: int) -> np.ndarray:
@@ -224,11 +234,6 @@ def nearest_return(states: np.ndarray, max_period: int) -> int:
     return 1 + int(np.argmin(return_distances(states, max_period)))
 
 
-def _state_names(system: System) -> list[str]:
-    names = system.model.coordinates
-    return [*names, *(rate_name(name, names) for name in names)]
-
-
 def _read(system: System, result: xarray.Dataset, with_states: bool) -> Recurrence:
     """What was recorded of the motions, whose outcomes are not known yet."""
     names, last = extrema_names(system.model.coordinates), last_states(system, result)
@@ -241,6 +246,7 @@ def _read(system: System, result: xarray.Dataset, with_states: bool) -> Recurren
         states=stroboscopic(system, result) if with_states else np.empty((len(last), 0, last.shape[1])),
         extrema=extrema,
         impact_counts=result["period_impact_count"].values if "period_impact_count" in result else None,
+        speeds=result["least_speed"].values if "least_speed" in result else None,
     )
 
 

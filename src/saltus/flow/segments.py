@@ -36,8 +36,20 @@ SHORT = 1e-6  # a segment's duration below which the derivatives of its quotient
 
 
 @lean_jit
+def look_at_other(q, v, h, order, roots, poly, seen):
+    """Take in the range of a coordinate that has no contact."""
+    scale_gap(v, 0, order, h, poly)
+    size = 0.0
+    for k in range(order + 1):
+        size += abs(poly[k])
+    for i in range(roots_within(poly, order, roots, NOISE * size) + 2):
+        x = q[0] if i == 0 else horner(q, order, h if i == 1 else roots[i - 2] * h)
+        seen[TOP], seen[BOTTOM] = max(seen[TOP], x), min(seen[BOTTOM], x)
+
+
+@lean_jit
 def look(where, model, work, side, t, h, order, roots, seen):
-    """Take in what a step of a segment shows: turning points of the coordinate, minima of the gap and of the margins."""
+    """Take in what a step of a segment shows: turning points of the coordinates, minima of the gap and of the margins."""
     q, v, m, poly = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.MARGINS], work[Work.POLYNOMIAL]
     seen[TOP], seen[BOTTOM] = max(seen[TOP], q[0, 0]), min(seen[BOTTOM], q[0, 0])
     scale_gap(v[0], 0, order, h, poly)
@@ -56,6 +68,8 @@ def look(where, model, work, side, t, h, order, roots, seen):
             turn = turn * roots[i] + k * poly[k]
         if where[Where.SIDES] > 0 and rate * turn > 0.0 and gap < seen[HUMP]:
             seen[HUMP], seen[HUMP_TIME] = gap, t + roots[i] * h
+    for a in range(1, where[Where.OWN]):
+        look_at_other(q[a], v[a], h, order, roots, poly, seen)
     for j in range(where[Where.MARGINS]):
         least, size = min(m[j, 0], horner(m[j], order, h)), abs(m[j, 0])
         for k in range(1, order + 1):

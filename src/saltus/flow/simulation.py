@@ -115,8 +115,8 @@ def _advance(system: System, run: Program, now: KernelState, recorder: Recorder,
         if recorder.total > counted + many:
             if time < checked_at + unit:
                 raise MotionError(
-                    f"more than {many} impacts{_at_contacts(system, recorder)} from time {checked_at:.6g} to {time:.6g}: they "
-                    "accumulate too slowly to be followed; raise the loss at impact, or ask for a shorter time"
+                    f"more than {many} impacts{_at_contacts(system, recorder)} from time {checked_at:.6g} to {time:.6g}: "
+                    f"{_why_so_many(system, recorder)}, or ask for a shorter time"
                 )
             checked_at, counted = time, recorder.total
         if recorder.total > MOST.events:
@@ -132,6 +132,17 @@ def _at_contacts(system: System, recorder: Recorder) -> str:
         return ""
     matrix, hit = system.impact.restitution_matrix(system.model), recorder.last_hit()
     return " at " + " and ".join(f"{system.model.contacts[i].name!r} (e = {float(matrix[i][i]):g})" for i in hit)
+
+
+def _why_so_many(system: System, recorder: Recorder) -> str:
+    """Why impacts follow so fast on one another, and what to change."""
+    matrix = system.impact.restitution_matrix(system.model) if system.model.contacts else []
+    if any(float(matrix[i][i]) == 1.0 for i in (recorder.last_hit() if system.model.contacts else ())):
+        return (
+            "without a loss impacts on a contact that stays pressed never end, and with several contacts they are not averaged; "
+            "give them a loss, an e below 1"
+        )
+    return "they accumulate too slowly to be followed; raise the loss at impact"
 
 
 def _refuse(system: System, status: int, now: KernelState) -> None:

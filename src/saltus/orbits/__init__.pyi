@@ -11,17 +11,17 @@ from .orbit import PeriodicOrbit
 from .orbits_as_bytes import as_bytes, from_bytes
 from .problem import Problem
 from .resting import RestingOrbit
-from .search import EVEN, Search, initial_states, search_orbits, within_window
+from .search import Search, search_orbits
 from .signature import Signature
 from .special_curve import SpecialCurve
 from .special_curve_continuation import continue_special
 from .special_point import OrbitEnd, SpecialKind, SpecialPoint
+from .starts import even_steps, initial_states, is_still, rest_state, states_beside, within_window
 from .switching import Cascade, doubling_cascade, switch_branch
 from .symmetry import is_symmetric, keeps_symmetry
 from .verify import closing_distances, closing_rows, defects, same_orbit
 
 __all__ = [
-    "EVEN",
     "STEP",
     "Branch",
     "Cascade",
@@ -44,11 +44,13 @@ __all__ = [
     "continue_special",
     "defects",
     "doubling_cascade",
+    "even_steps",
     "find_orbit",
     "follow_stable",
     "free_orbit",
     "from_bytes",
     "initial_states",
+    "is_still",
     "is_symmetric",
     "keeps_symmetry",
     "mean_dissipated_power",
@@ -56,10 +58,12 @@ __all__ = [
     "orbits_near_returns",
     "orbits_of",
     "problem_of",
+    "rest_state",
     "same_orbit",
     "search_orbits",
     "solve",
     "solved_near",
+    "states_beside",
     "switch_branch",
     "transmissibility",
     "within_window",

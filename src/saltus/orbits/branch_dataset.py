@@ -33,7 +33,7 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
     data |= _multipliers(orbits) | _unknowns(orbits) | _special(branch.special) | _rests(orbits)
     attributes: dict[str, Any] = {
         "path": branch.path,
-        "coordinate": problem.system.model.coordinates[0],
+        "coordinate": " ".join(problem.system.model.coordinates),
         "ends": [str(end) for end in branch.ends],
         "end_reasons": [end.reason.code for end in branch.ends],
         "end_kinds": [str(end.kind) for end in branch.ends],
@@ -47,8 +47,7 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
 def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[str, str]]]:
     """What is one number of each orbit."""
     model = orbits[0].problem.system.model
-    coordinate = model.coordinates[0]
-    angle = {"units": model.unit_of(coordinate)}
+    angle, coordinate = {"units": model.unit_of(model.coordinates[0])}, " or ".join(model.coordinates)
 
     def column(value: Any, kind: Any = float) -> np.ndarray:
         return np.array([value(orbit) for orbit in orbits], dtype=kind)

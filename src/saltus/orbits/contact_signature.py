@@ -69,11 +69,28 @@ def read_signature(base: ContactProblem, motion: Motion, periods: int) -> tuple[
 def _mode_changes(base: ContactProblem, motion: Motion, together: float) -> list[tuple[float, ModeChange]]:
     """The events at which the contacts change, each with its time and the contacts that are closed after it.
 
+    What happens at one instant to contacts of different groups, such as cells of a chain that move alike, are events in a row:
+    their impulses do not act on one another, so that the order makes no difference.
+
     Raises:
         MotionError: events for which orbits have no equations.
     """
-    names = [contact.name for contact in base.system.model.contacts]
     changes: list[tuple[float, ModeChange]] = []
+    for time, acting in _instants(base, motion, together):
+        closed = int(motion.closed_at(time))
+        for contact, is_impact in acting.items():  # those whose turn comes later are as they were
+            closed = closed & ~(1 << contact) if is_impact else closed | 1 << contact
+        after = int(motion.closed_at(time))
+        for contact, is_impact in acting.items():
+            closed = closed & ~(1 << contact) | after & 1 << contact
+            changes.append((time, ModeChange(is_impact, contact, closed)))
+    return changes
+
+
+def _instants(base: ContactProblem, motion: Motion, together: float) -> list[tuple[float, dict[int, bool]]]:
+    """The instants at which contacts change: which of them, and whether each is hit, or let go."""
+    contacts = base.system.model.contacts
+    names, instants = [contact.name for contact in contacts], list[tuple[float, dict[int, bool]]]()
     events: Sequence[Any] = motion.events
     for event in events:
         if event.kind is EventKind.HELD:
@@ -83,14 +100,14 @@ def _mode_changes(base: ContactProblem, motion: Motion, together: float) -> list
             )
         if event.kind not in (EventKind.IMPACT, EventKind.RELEASE):
             continue
-        if event.contact not in names:
-            raise MotionError(f"{event.contact} act at one instant, {event.time:.6g}: an orbit has no equations for that")
-        is_impact, contact = event.kind is EventKind.IMPACT, names.index(event.contact)
-        if changes and event.time - changes[-1][0] < together:
-            before = changes.pop()
-            if is_impact or before[1].contact != contact:
-                raise MotionError(f"two events at one instant, {event.time:.6g}: an orbit has no equations for that")
-            is_impact = before[1].is_impact
-        closed = int(motion.closed_at(event.time))
-        changes.append((event.time, ModeChange(is_impact, contact, closed)))
-    return changes
+        if not instants or event.time - instants[-1][0] >= together:
+            instants.append((event.time, {}))
+        time, acting = instants[-1]
+        instants[-1] = event.time, acting
+        for contact in range(len(names)) if event.contact == "both" else map(names.index, event.contact.split("+")):
+            is_impact = event.kind is EventKind.IMPACT
+            groups = {contacts[other].group for other in acting if other != contact}
+            if contacts[contact].group in groups or (contact in acting and is_impact):
+                raise MotionError(f"two events at one instant, {time:.6g}: an orbit has no equations for that")
+            acting.setdefault(contact, is_impact)
+    return instants

@@ -7,15 +7,17 @@ what converges is then solved for as an orbit with its impacts, each once.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from saltus.errors import MotionError
 from saltus.flow import RECURRENCE, last_states, motions_from
+from saltus.orbits.contact_problem import problem_of
 from saltus.orbits.find import orbit_from
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
+from saltus.orbits.starts import states_beside
 from saltus.orbits.verify import same_orbit
 from saltus.systems import System
 
@@ -33,6 +35,7 @@ class NearReturnSettings:
     same_state: float = 1e-5  # States at one value are on the same orbit if they are this near.
     still: float = 1e-6  # An orbit no larger than this is rest.
     tol: float = 1e-11  # The error of a step.
+    difference: float = 1e-6  # Of a state, for derivatives where lanes have none: half of the digits of what a step keeps.
 
 
 SETTINGS = NearReturnSettings()
@@ -46,11 +49,11 @@ def orbits_near_returns(
     Args:
         system, path: what moves, and the parameter that is varied.
         values: (n,) of it.
-        states: (n, motions, kept, 2): successive stroboscopic states of motions at each of them; nan where there are fewer.
-        known: for each value the states (k, 2) at phase 0 of orbits that are known there, which are not given again.
+        states: (n, motions, kept, d): successive stroboscopic states of motions at each of them; nan where there are fewer.
+        known: for each value the states (k, d) at phase 0 of orbits that are known there, which are not given again.
     """
     found: list[tuple[int, PeriodicOrbit]] = []
-    known = [other.reshape(-1, 2) for other in known]
+    known = [other.reshape(-1, system.dimension) for other in known]
     for period in range(1, min(max_period, states.shape[2] - 1) + 1):
         guesses = [_guesses(at_value, period) for at_value in states]
         rows = np.repeat(np.arange(len(values)), [len(at_value) for at_value in guesses])
@@ -67,19 +70,20 @@ def orbits_near_returns(
 
 def solved_near(system: System, path: str, state: np.ndarray, period: int) -> PeriodicOrbit | None:
     """The orbit of a system near a state at phase 0 that nearly repeats itself, to be followed along a parameter; or None."""
-    name, base = system.model.coordinates[0], Problem(system, Signature((), 1), (path,))
+    names, base = system.model.coordinates, problem_of(system, Signature((), 1), (path,))
+    velocity: Any = float(state[1]) if len(names) == 1 else tuple(map(float, state[len(names) :]))
     try:
-        orbit = orbit_from(base, {name: float(state[0]), "velocity": float(state[1])}, period)
+        orbit = orbit_from(base, {**dict(zip(names, map(float, state), strict=False)), "velocity": velocity}, period)
     except MotionError:
         return None
     return orbit if orbit is not None and orbit.admissible and orbit.amplitude > SETTINGS.still else None
 
 
 def _guesses(states: np.ndarray, period: int) -> np.ndarray:
-    """The states (k, 2) nearest to which motions (n, kept, 2) come back after a period, but that do not repeat themselves."""
+    """The states (k, d) nearest to which motions (n, kept, d) come back after a period, but that do not repeat themselves."""
     distance = np.abs(states[:, period:] - states[:, :-period]).max(axis=2).ravel()
-    begin = states[:, :-period].reshape(-1, 2)
-    chosen = np.empty((0, 2))
+    begin = states[:, :-period].reshape(-1, states.shape[-1])
+    chosen = begin[:0]
     for i in np.flatnonzero(distance < SETTINGS.near)[np.argsort(distance[distance < SETTINGS.near])]:
         if len(chosen) >= SETTINGS.guesses:
             break
@@ -90,25 +94,40 @@ def _guesses(states: np.ndarray, period: int) -> np.ndarray:
 
 
 def _improved(system: System, path: str, values: np.ndarray, states: np.ndarray, period: int) -> tuple[np.ndarray, np.ndarray]:
-    """The states (n, 2) after Newton's method for x = Phi(x), and the numbers of those that have converged."""
+    """The states (n, d) after Newton's method for x = Phi(x), and the numbers of those that have converged."""
     states, active, good = states.copy(), np.arange(len(states)), np.zeros(len(states), dtype=bool)
     for _ in range(SETTINGS.iterations):
         if not active.size:
             break
-        options = {
-            "parameters": {path: values[active]},
-            "periods": period,
-            "sensitivities": (),
-            "sample": (),
-            "tol": SETTINGS.tol,
-        }
-        result = motions_from(system, states[active], **options)
-        apart, slope = last_states(system, result) - states[active], result["derivative"].values
+        ends, slope = _mapped(system, path, values[active], states[active], period)
+        apart = ends - states[active]
         sound = np.isfinite(slope).all(axis=(1, 2)) & np.isfinite(apart).all(axis=1)
         good[active] = sound & (np.abs(apart).max(axis=1) < SETTINGS.converged)
         going = sound & ~good[active]
         active, apart, slope = active[going], apart[going], slope[going]
-        steps = [np.linalg.lstsq(np.eye(2) - d, a, rcond=None)[0] for d, a in zip(slope, apart, strict=True)]
-        step = np.array(steps).reshape(-1, 2)
-        states[active] += step / np.maximum(1.0, np.abs(step).max(axis=1, initial=0.0) / SETTINGS.longest)[:, None]
+        steps = [np.linalg.lstsq(np.eye(len(a)) - d, a, rcond=None)[0] for d, a in zip(slope, apart, strict=True)]
+        step = np.array(steps).reshape(-1, states.shape[1])
+        step = step / np.maximum(1.0, np.abs(step).max(axis=1, initial=0.0) / SETTINGS.longest)[:, None]
+        states[active] = states_beside(system, states[active], step)
     return states, np.flatnonzero(good)
+
+
+def _mapped(system: System, path: str, values: np.ndarray, states: np.ndarray, period: int) -> tuple[np.ndarray, np.ndarray]:
+    """States (n, d) some periods later, and their derivatives to the ones at the start, (n, d, d).
+
+    With several contacts lanes have no derivatives: differences take their place, of motions beside on which closed contacts stay
+    closed.
+    """
+    options: dict[str, Any] = {"periods": period, "sample": (), "tol": SETTINGS.tol}
+    if not system.model.contacts:
+        result = motions_from(system, states, parameters={path: values}, sensitivities=(), **options)
+        return last_states(system, result), result["derivative"].values
+    n, d = states.shape
+    shifts = SETTINGS.difference * np.concatenate([np.zeros((1, d)), np.eye(d)])
+    begun = states_beside(system, np.repeat(states, d + 1, axis=0), np.tile(shifts, (n, 1)))
+    result = motions_from(system, begun, parameters={path: np.repeat(values, d + 1)}, **options)
+    ends = last_states(system, result).reshape(n, d + 1, d)
+    moved = np.einsum("nii->ni", begun.reshape(n, d + 1, d)[:, 1:] - states[:, None])  # each along its own variable
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = np.where(moved[:, :, None] != 0.0, (ends[:, 1:] - ends[:, :1]) / moved[:, :, None], 0.0)
+    return ends[:, 0], slope.transpose(0, 2, 1)

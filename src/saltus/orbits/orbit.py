@@ -121,13 +121,13 @@ class PeriodicOrbit:
 
     @cached_property
     def highest(self) -> float:
-        """The largest value of the first coordinate."""
+        """The largest value of the coordinate, or of all of several."""
         top, bottom = self._looks[:, at.TOP].max(), self._looks[:, at.BOTTOM].min()
         return float(max(top, -bottom) if self.symmetric else top)
 
     @cached_property
     def lowest(self) -> float:
-        """The least value of the first coordinate."""
+        """The least value of the coordinate, or of all of several."""
         return -self.highest if self.symmetric else float(self._looks[:, at.BOTTOM].min())
 
     @property
@@ -257,6 +257,11 @@ class PeriodicOrbit:
         ahead = max(1, math.ceil(start["time"] / period)) * period - start["time"]
         motion = simulate(self.system, **start, duration=ahead, tol=1e-13, dense=False)
         return motion.position, motion.velocity
+
+    @property
+    def section_state(self) -> np.ndarray:
+        """The same as one array, coordinates, then velocities, (d,)."""
+        return np.append(*self.state)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name in ("problem", "solution"):

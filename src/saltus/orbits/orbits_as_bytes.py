@@ -51,7 +51,7 @@ class _OrbitWriter(pickle.Pickler):
         if isinstance(found, System):
             return _system, (found.to_json(),)
         if isinstance(found, Problem):
-            return Problem, (found.system, found.signature, found.paths, found.tol)
+            return type(found), (found.system, found.signature, found.paths, found.tol)
         if type(found) is OrbitPoint:
             return _point, (found.curve, found.place, found.tangent, found.iterations)
         if type(found) is PeriodicOrbit:

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import Rectangle, Window, check_count, check_path, check_starts, check_window
+from saltus.checks import Box, Window, check_count, check_path, check_starts, check_window
 from saltus.errors import ParameterError
 from saltus.flow import Recurrence, find_recurrence
 from saltus.orbits.near_returns import orbits_near_returns, solved_near
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.starts import initial_states, is_still, rest_state
 from saltus.orbits.verify import same_orbit
 from saltus.progress import Progress, silent
 from saltus.systems import System, check_system
@@ -30,7 +31,6 @@ class SearchSettings:
 
 
 SETTINGS = SearchSettings()
-EVEN = 1.32471795724474602596 ** -np.array([1.0, 2.0])  # steps that cover a square evenly: x^-1, x^-2 of x^3 = x + 1
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Search:
     values: np.ndarray  # of the parameter
     starts: int  # at each value
     max_period: int  # forcing periods
-    window: Window  # of the state plane
+    window: Window  # of the states
     seed: int
     unsettled: np.ndarray  # (values,): how many motions did not settle on an orbit of up to `max_period`: slow or chaotic
     at_rest: np.ndarray  # (values,): how many came to rest
@@ -85,17 +85,17 @@ def search_orbits(
     *,
     max_period: int = 6,
     starts: int = 48,
-    window: Rectangle | None = None,
+    window: Box | None = None,
     seed: int = 0,
     repelling: int | None = None,
     progress: Progress = silent,
 ) -> Search:
     """Periodic orbits of up to `max_period` forcing periods at several values of a parameter, each once for each value.
 
-    Initial states are spread evenly (a sequence of low discrepancy) over a window of the state plane, by default that of half
-    widths 1.5 around the contact, or around 0 for a model without one. Motions that settle lead to the attracting orbits.
-    Returns of the motions near to where they were, on their way or in chaos, are first guesses for Newton's method, which finds
-    repelling ones, of up to `repelling` forcing periods (by default `max_period`; 0 looks for none).
+    Initial states are spread evenly (a sequence of low discrepancy) over a window of the states, as `find_attractors` takes it;
+    by default its half widths are 1.5 around the contact, or around 0 for a model without one. Motions that settle lead to the
+    attracting orbits. Returns of the motions near to where they were, on their way or in chaos, are first guesses for Newton's
+    method, which finds repelling ones, of up to `repelling` forcing periods (by default `max_period`; 0 looks for none).
 
     Raises:
         ParameterError: an unknown parameter, no values, an effort without meaning.
@@ -105,7 +105,7 @@ def search_orbits(
         >>> len(found.orbits)
         1
     """
-    check_system(system, "search_orbits", coordinates=1)
+    check_system(system, "search_orbits", several_contacts=True)
     check_count("max_period", max_period, 1)
     if repelling is not None:
         check_count("repelling", repelling, 0)
@@ -130,7 +130,7 @@ def search_orbits(
         found, known = found + here, [*known, attracting]
         returning[i, moving - i * starts] = True
         progress(0.5 * (i + 1) / len(grid), "searching")
-    shape = (len(grid), starts, -1, 2)
+    shape = (len(grid), starts, -1, system.dimension)
     states = np.concatenate([early.states.reshape(shape), late.states.reshape(shape)], axis=1)
     states[~np.tile(returning, (1, 2))] = np.nan
     near = orbits_near_returns(system, path, grid, states, known, max_period if repelling is None else repelling)
@@ -141,35 +141,13 @@ def search_orbits(
     return Search(path, tuple(found), grid, starts, max_period, area, seed, unsettled, at_rest, dots)
 
 
-def initial_states(system: System, count: int, window: Window, seed: int) -> np.ndarray:
-    """(count, 2): coordinates and velocities spread over a window; those beyond a one-sided contact are reflected at it."""
-    offset = np.random.default_rng(int(seed)).random(2)
-    return within_window(system, 2.0 * ((offset + np.arange(1, count + 1)[:, None] * EVEN) % 1.0) - 1.0, window)
-
-
-def within_window(system: System, points: np.ndarray, window: Window, shrunk: Any = 1.0) -> np.ndarray:
-    """The states (..., 2) at points of the square (-1, 1)^2 laid over a window, drawn in towards the contact by a factor; those
-    beyond a one-sided contact are reflected at it."""
-    contact = _contact(system)
-    states = (points * window.half + (window.centre - contact)) * shrunk
-    model = system.model
-    if len(model.sides) == 1:
-        inward = np.sign(float(model.gap(model.contact + 1.0, model.sides[0])))
-        states[..., 0] = inward * np.abs(states[..., 0])
-    return np.asarray(states + contact)
-
-
-def _contact(system: System) -> np.ndarray:
-    return np.array([float(system.model.contact) if system.model.sides else 0.0, 0.0])
-
-
 def _follow(system: System, path: str, grid: np.ndarray, states: np.ndarray, max_period: int) -> tuple[Recurrence, Recurrence]:
     """Motions from the same states at every value, a row for each: their first periods, and how they go on and settle."""
     kept = max(SETTINGS.transient, max_period + 1)
     parameters = {path: np.repeat(grid, len(states))}
     options: dict[str, Any] = {"parameters": parameters, "max_period": max_period, "kept": kept, "stop_early": False}
     early = find_recurrence(system, np.tile(states, (len(grid), 1)), kept, **options)
-    begin = np.where(np.isfinite(early.states[:, -1]), early.states[:, -1], _contact(system))
+    begin = np.where(np.isfinite(early.states[:, -1]), early.states[:, -1], rest_state(system))
     return early, find_recurrence(system, begin, SETTINGS.settling, extrema=True, **options)
 
 
@@ -177,7 +155,8 @@ def _moving(system: System, late: Recurrence, rows: np.ndarray) -> tuple[np.ndar
     """Which of these motions neither rest at the contact nor have ended, and how many rest."""
     assert late.extrema is not None
     alive = rows[np.isfinite(late.states[rows]).all(axis=(1, 2))]
-    moving = alive[np.abs(late.extrema[alive] - _contact(system)[0]).max(axis=(1, 2), initial=0.0) > SETTINGS.still]
+    high, low = late.extrema[alive, :, 0].max(axis=1, initial=-np.inf), late.extrema[alive, :, 1].min(axis=1, initial=np.inf)
+    moving = alive[~is_still(system, high, low, SETTINGS.still)]
     return moving, len(alive) - len(moving)
 
 
@@ -188,7 +167,7 @@ def _attracting(
     have not settled."""
     found: list[PeriodicOrbit] = []
     seen: list[tuple[int, float, float]] = []
-    known = np.empty((0, 2))
+    known = np.empty((0, system.dimension))
     unsettled = 0
     for states, period, highest, lowest in zip(late.states, late.period.tolist(), late.highest, late.lowest, strict=True):
         if known.size and np.abs(known - states[-1]).max(axis=1).min() < SETTINGS.same_state:

@@ -22,7 +22,7 @@ def is_symmetric(system: System) -> bool:
         >>> saltus.orbits.is_symmetric(system)
         True
     """
-    check_system(system, "is_symmetric")
+    check_system(system, "is_symmetric", several_contacts=True)
     mirrored = system.mirrored()
     if mirrored is None or system.load.period is None:
         return False

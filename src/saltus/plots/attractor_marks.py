@@ -7,6 +7,7 @@ from typing import Any
 
 from matplotlib.lines import Line2D
 
+from saltus.plots.axis_names import symbol
 from saltus.plots.conventions import INK, legend_of, shades
 
 UNDECIDED_COLOUR = "#ffffff"
@@ -23,11 +24,20 @@ def attractor_colours(numbers: Sequence[int]) -> dict[int, Any]:
     return {n: AT_REST if n == 0 else moving.pop(0) for n in numbers}
 
 
-def draw_points(ax: Any, dataset: Any, name: str, i: int, **style: Any) -> None:
+def draw_points(ax: Any, dataset: Any, i: int, **style: Any) -> None:
     """Attractor `i` at phase 0 of the load: large marks where it repeats itself, else some of its points."""
     repeats = str(dataset["attractor_kind"].values[i]) in ("rest", "periodic")
     mark = MARK | {"marker": MARKERS[i % len(MARKERS)]} if repeats else POINT
-    ax.plot(dataset[f"section_{name}"].values[i], dataset["section_velocity"].values[i], **{**mark, **style})
+    x, y = (dataset[f"section_{name}"].values[i] for name in dataset.attrs["plane"])
+    ax.plot(x, y, **{**mark, **style})
+
+
+def name_plane(ax: Any, plane: tuple[str, str], unit: str, constant: bool) -> None:
+    """The names of the two state variables on the axes; under a `constant` load there is no phase."""
+    when = "" if constant else " at phase 0"
+    ax.set_xlabel(f"${symbol(plane[0])}${when}{unit}")
+    dotted = rf"\dot{{{symbol(plane[0])}}}" if plane[1] == "velocity" else symbol(plane[1])
+    ax.set_ylabel(f"${dotted}${when}{'' if plane[1].endswith('velocity') else unit}")
 
 
 def steady(dataset: Any) -> bool:

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patheffects import Normal, Stroke
 
-from saltus.plots.attractor_marks import UNDECIDED_COLOUR, attractor_colours, attractor_legend, draw_points, steady
-from saltus.plots.axis_names import symbol, unit_in_brackets
+from saltus.plots.attractor_marks import UNDECIDED_COLOUR, attractor_colours, attractor_legend, draw_points, name_plane, steady
+from saltus.plots.axis_names import unit_in_brackets
 from saltus.plots.conventions import INK, SINGLE_COLUMN, new_figure, styled
 
 START_MARK: dict[str, Any] = {
@@ -26,18 +26,16 @@ HALO = [Stroke(linewidth=2.2, foreground="white"), Normal()]  # so that an attra
 @styled
 def draw_attractors(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
     """Draw the dataset of attractors that were searched: a dot for each start, a mark for each point at phase 0; returns `ax`."""
-    name = next(str(v).removeprefix("section_") for v in dataset if str(v).startswith("section_") and v != "section_velocity")
+    x, y = (str(name) for name in dataset.attrs["plane"])
     colours = attractor_colours([int(n) for n in dataset["attractor"].values])
     own, ax = ax is None, new_figure(width, 0.82 * width + 4.2 * (len(colours) + 1) // 2).subplots() if ax is None else ax
     ends = dataset["end"].values
     for n, colour in {**colours, -1: UNDECIDED_COLOUR}.items():
         here = ends == n
-        ax.plot(dataset[f"start_{name}"].values[here], dataset["start_velocity"].values[here], color=colour, **START_MARK)
+        ax.plot(dataset[f"start_{x}"].values[here], dataset[f"start_{y}"].values[here], color=colour, **START_MARK)
     for i, colour in enumerate(colours.values()):
-        draw_points(ax, dataset, name, i, markerfacecolor=colour, path_effects=HALO)
-    when = "" if steady(dataset) else " at phase 0"
-    ax.set_xlabel(rf"${symbol(name)}${when}{unit_in_brackets(dataset[f'start_{name}'])}")
-    ax.set_ylabel(rf"$\dot{{{symbol(name)}}}${when}")
+        draw_points(ax, dataset, i, markerfacecolor=colour, path_effects=HALO)
+    name_plane(ax, (x, y), unit_in_brackets(dataset[f"start_{x}"]), steady(dataset))
     undecided = ("o", f"{100 * float(dataset.attrs['undecided']):.3g} %") if (ends == -1).any() else None
     attractor_legend(ax, own, dataset, colours, lambda i: _share(dataset, i), undecided)
     return ax

@@ -16,8 +16,16 @@ PARAMETERS = {
 
 
 def symbol(name: str) -> str:
-    """A coordinate's symbol in mathematical text."""
+    """A state variable's symbol in mathematical text; that of a velocity, of several, is its coordinate's with a dot."""
+    if name.endswith("_velocity"):
+        return rf"\dot{{{symbol(name.removesuffix('_velocity'))}}}"
     return SYMBOLS.get(name, name if len(name) == 1 else rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}")
+
+
+def peak(names: str) -> str:
+    """The amplitude of a coordinate, or of several whose names stand in one text, in mathematical text."""
+    each = [rf"|{symbol(name)}|" for name in names.split()]
+    return r"\max_\tau" + (each[0] if len(each) == 1 else rf"({', '.join(each)})" if len(each) < 4 else r"\,\max_i|q_i|")
 
 
 def unit_in_brackets(variable: Any) -> str:

@@ -10,8 +10,16 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patheffects import Normal, Stroke
 
-from saltus.plots.attractor_marks import MOST_NAMED, UNDECIDED_COLOUR, attractor_colours, attractor_legend, draw_points, steady
-from saltus.plots.axis_names import symbol, unit_in_brackets
+from saltus.plots.attractor_marks import (
+    MOST_NAMED,
+    UNDECIDED_COLOUR,
+    attractor_colours,
+    attractor_legend,
+    draw_points,
+    name_plane,
+    steady,
+)
+from saltus.plots.axis_names import unit_in_brackets
 from saltus.plots.conventions import INK, SINGLE_COLUMN, new_figure, styled
 from saltus.plots.marks import cell_edges
 
@@ -36,27 +44,25 @@ def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), *, ax: Axes | None 
     Returns:
         The axes.
     """
-    name = next(str(dim) for dim in dataset["label"].dims if dim != "velocity")
+    y, x = (str(dim) for dim in dataset["label"].dims)
     colours, left = attractor_colours([int(n) for n in dataset["attractor"].values]), float(dataset.attrs.get("undecided", 0.0))
     rows = -(-min(len(colours), MOST_NAMED) // 2)
     own, ax = ax is None, new_figure(width, 0.86 * width + 4.2 * (rows + bool(left))).subplots() if ax is None else ax
-    _paint(ax, dataset, name, colours)
-    curves = [np.stack([dataset[f"boundary_{name}"], dataset["boundary_velocity"]], 1)] if "boundary_velocity" in dataset else []
+    _paint(ax, dataset, (x, y), colours)
+    curves = [np.stack([dataset[f"boundary_{x}"], dataset[f"boundary_{y}"]], 1)] if f"boundary_{x}" in dataset else []
     for states in (*curves, *manifolds):
         ax.plot(*np.asarray(states, dtype=float).T, path_effects=HALO, **BOUNDARY)
     for i in range(len(colours)):
-        draw_points(ax, dataset, name, i)
-    when = "" if steady(dataset) else " at phase 0"
-    ax.set_xlabel(rf"${symbol(name)}${when}{unit_in_brackets(dataset[name])}")
-    ax.set_ylabel(rf"$\dot{{{symbol(name)}}}${when}")
+        draw_points(ax, dataset, i)
+    name_plane(ax, (x, y), unit_in_brackets(dataset[x]), steady(dataset))
     share, undecided = dataset["cells"].values, ("s", _percent(left)) if left else None
     attractor_legend(ax, own, dataset, colours, lambda i: f", {_percent(float(share[i]))}", undecided)
     return ax
 
 
-def _paint(ax: Any, dataset: Any, name: str, colours: dict[int, Any]) -> None:
+def _paint(ax: Any, dataset: Any, plane: tuple[str, str], colours: dict[int, Any]) -> None:
     """The cells in their colours; the grid may be uneven."""
-    label, edges = dataset["label"].values, (cell_edges(dataset[name].values), cell_edges(dataset["velocity"].values))
+    label, edges = dataset["label"].values, [cell_edges(dataset[name].values) for name in plane]
     cells = np.zeros(label.shape, dtype=int)
     for i, number in enumerate(colours):
         cells[label == number] = i + 1

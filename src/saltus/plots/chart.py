@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import Normal, Stroke
 
 from saltus.branch_lines import border_curves
-from saltus.plots.axis_names import parameter_name, symbol, unit_in_brackets
+from saltus.plots.axis_names import parameter_name, peak, unit_in_brackets
 from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, legend_of, new_figure, outside_legend, styled
 from saltus.plots.marks import cell_edges
 
@@ -53,8 +53,8 @@ def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
     ax.set_xlabel(parameter_name(path[0]))
     ax.set_ylabel(parameter_name(path[1]))
     if cells is not None:
-        peak = rf"$\max_\tau|{symbol(chart.attrs['coordinate'])}|${unit_in_brackets(chart['amplitude'])}"
-        ax.figure.colorbar(cells, ax=ax, label=f"largest amplitude {peak}", ticks=cells.norm.boundaries, format="%g")
+        amplitude = f"${peak(chart.attrs['coordinate'])}${unit_in_brackets(chart['amplitude'])}"
+        ax.figure.colorbar(cells, ax=ax, label=f"largest amplitude {amplitude}", ticks=cells.norm.boundaries, format="%g")
     handles = _cell_handles(chart)
     if chart is not data:
         dots = draw_lines(ax, data)

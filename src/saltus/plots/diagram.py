@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from saltus.plots.axis_names import parameter_name, symbol, unit_in_brackets
+from saltus.plots.axis_names import parameter_name, peak, symbol, unit_in_brackets
 from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure, styled
 from saltus.plots.response import draw_bands, draw_limits, draw_response, note_missed, response_legend
 
@@ -31,21 +31,21 @@ DRAWN_STATES = StateSettings()
 def draw_diagram(tree: Any, *, figure: Figure | None = None) -> np.ndarray:
     """Draw the DataTree of `response_spectrum` or `bifurcation_diagram` into a figure; returns its axes, (1 or 2,)."""
     low, high = (float(x) for x in tree.attrs["bounds"])
-    name, unit = symbol(tree.attrs["coordinate"]), _unit(tree)
+    names, unit = tree.attrs["coordinate"], _unit(tree)
     simulated = "stroboscopic" in tree.children
     figure = new_figure(DOUBLE_COLUMN, 150.0 if simulated else 95.0) if figure is None else figure
     axes = figure.subplots(1 + simulated, 1, sharex=True, squeeze=False, height_ratios=[3, 2][: 1 + simulated])[:, 0]
     axes[0].set_xlim(low, high)
     top = _top(tree, low, high)
     axes[0].set_ylim(-0.02 * top, 1.08 * top)  # so that marks on the axis are not cut
-    axes[0].set_ylabel(rf"$\max_\tau|{name}|${unit}")
+    axes[0].set_ylabel(f"${peak(names)}${unit}")
     limits = [float(limit) for limit in np.atleast_1d(tree.attrs["limits"])]
     draw_response(axes[0], tree)
     draw_limits(axes[0], limits)
     note_missed(axes[0], tree)
     if simulated:
         draw_stroboscopic_states(axes[1], tree)
-        axes[1].set_ylabel(rf"${name}$ at phase 0{unit}")
+        axes[1].set_ylabel(f"${symbol(names.split()[0])}$ at phase 0{unit}")
         axes[1].set_title("stroboscopic points of direct simulation", loc="left", pad=3)
     axes[-1].set_xlabel(parameter_name(tree.attrs["path"]))
     response_legend(figure, [tree], limits=min(limits, default=np.inf) < 1.08 * top)

@@ -9,7 +9,7 @@ from saltus.systems import System, check_system
 
 def check_diagram(system: System, path: str, bounds: tuple[float, float], **counts: int) -> tuple[float, float]:
     """The bounds as two numbers; raises a ParameterError, before anything is computed, for what would fail later."""
-    check_system(system, "a diagram", coordinates=1)
+    check_system(system, "a diagram", several_contacts=True)
     if system.load.frequency is None:
         raise ParameterError(
             "a load without a frequency has no periodic orbits to draw; give the Load a frequency", "load.frequency"

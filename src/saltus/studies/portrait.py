@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import Equilibrium, Separatrix, equilibria, separatrices
-from saltus.checks import Rectangle, check_count, check_number, check_states, check_window
+from saltus.checks import Box, check_count, check_number, check_states, check_window
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.orbits import EVEN
+from saltus.orbits import even_steps
 from saltus.progress import Progress, silent
 from saltus.provenance import provenance
 from saltus.public_functions import checked_by
@@ -21,7 +21,7 @@ from saltus.systems import System, VelocityReduction
 if TYPE_CHECKING:
     import xarray
 
-WINDOW: Rectangle = ((-3.0, 3.0), (-3.0, 3.0))
+WINDOW: Box = ((-3.0, 3.0), (-3.0, 3.0))
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,7 @@ class StartSettings:
 PORTRAIT_STARTS = StartSettings()
 
 
-def _check(
-    system: System, window: Rectangle, starts: Any, duration: float, samples: int, seed: int, progress: object = None
-) -> None:
+def _check(system: System, window: Box, starts: Any, duration: float, samples: int, seed: int, progress: object = None) -> None:
     check_number("duration", duration, above=0.0)
     check_count("samples", samples, 2)
     check_count("seed", seed, 0)
@@ -50,7 +48,7 @@ def _check(
 def phase_portrait(
     system: System,
     *,
-    window: Rectangle = WINDOW,
+    window: Box = WINDOW,
     starts: Iterable[tuple[float, float]] | None = None,
     duration: float = 30.0,
     samples: int = 1500,
@@ -100,16 +98,17 @@ def phase_portrait(
     return _dataset(system, rows, points, curves, starts=begun, **facts, **({"no_separatrices": why} if why else {}))
 
 
-def _spread(system: System, window: Rectangle, points: tuple[Equilibrium, ...], seed: int) -> np.ndarray:
+def _spread(system: System, window: Box, points: tuple[Equilibrium, ...], seed: int) -> np.ndarray:
     """States (n, 2) beside the stable equilibria, and spread evenly over the part of the window in which the system can be."""
-    area, shifts = check_window(window, system), np.arange(1, PORTRAIT_STARTS.tried * PORTRAIT_STARTS.spread + 1)[:, None] * EVEN
+    area, tried = check_window(window, system), PORTRAIT_STARTS.tried * PORTRAIT_STARTS.spread
+    shifts = np.arange(1, tried + 1)[:, None] * even_steps(2)
     states = area.centre + area.half * (2.0 * ((np.random.default_rng(int(seed)).random(2) + shifts) % 1.0) - 1.0)
     states = states[_possible(system, states[:, 0])][: PORTRAIT_STARTS.spread]
     if not len(states):
         raise ParameterError(
             f"window must reach to where the system can be, got {window!r}: all of it is beyond the contact", "window"
         )
-    ends = [*(point.place for point in points), *area.coordinate]
+    ends = [*(point.place for point in points), *area[0]]
     near = [(_beside(point.place, ends, share), 0.0) for point in points if point.stable for share in PORTRAIT_STARTS.beside]
     return np.concatenate([np.array(near).reshape(-1, 2), states])
 

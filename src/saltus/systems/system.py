@@ -90,6 +90,11 @@ class System:
         return node.value if type(node).__name__ == "Constant" else node
 
     @property
+    def dimension(self) -> int:
+        """The number of its state variables, coordinates and their velocities."""
+        return 2 * len(self.model.coordinates)
+
+    @property
     def parameters(self) -> dict[str, float]:
         """Every number of the system by its dotted path."""
         return dict(numbers(self))

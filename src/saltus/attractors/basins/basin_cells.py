@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,32 @@ if TYPE_CHECKING:
     from saltus.sweep import Plan
 
 FUNCTION = "saltus.attractors.basins.basin_cells:cells"
-Grid = tuple[np.ndarray, np.ndarray]  # velocities, coordinates
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A plane of initial states: two state variables vary, the others are held fixed."""
+
+    plane: tuple[str, str]  # the variables along the horizontal and the vertical axis
+    horizontal: np.ndarray  # (columns,)
+    vertical: np.ndarray  # (rows,)
+    fixed: dict[str, float]  # all state variables in their order; those of the plane count for nothing
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return len(self.vertical), len(self.horizontal)
+
+    @property
+    def states(self) -> np.ndarray:
+        """The initial states, (rows, columns, d)."""
+        return self.at(*np.meshgrid(self.horizontal, self.vertical))
+
+    def at(self, horizontal: np.ndarray, vertical: np.ndarray) -> np.ndarray:
+        """The states (..., d) at places of the plane."""
+        varied = dict(zip(self.plane, (horizontal, vertical), strict=True))
+        each = [varied.get(name, value) for name, value in self.fixed.items()]
+        return np.stack(np.broadcast_arrays(*each), axis=-1).astype(float)
 
 
 def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
@@ -29,10 +55,10 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
 
     Args:
         arguments: as `cell_arguments` makes them, plain as JSON.
-        block: {"velocity": values, the coordinate's name: values}.
+        block: values along both axes, by the names of the state variables of the plane.
 
     Returns:
-        {"label": int16 (velocities, coordinates), "time": float (velocities, coordinates)}.
+        {"label": int16 (rows, columns), "time": float (rows, columns)}.
 
     Raises:
         ParameterError: arguments that were made where the system has other equations, or saltus another version.
@@ -40,28 +66,29 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
     system = System.from_dict(arguments["system"])
     check_provenance(arguments, system, "this part of the basins")
     targets = tuple(Target.from_dict(item) for item in arguments["attractors"])
-    grid = np.asarray(block["velocity"], dtype=float), np.asarray(block[system.model.coordinates[0]], dtype=float)
+    x, y = arguments["plane"]
+    grid = Grid((x, y), np.asarray(block[x], dtype=float), np.asarray(block[y], dtype=float), arguments["fixed"])
     numbers = int(arguments["periods"]), float(arguments["within"]), float(arguments["tol"])
     label, time = _label_grid(Labelling(with_clock(system), targets, *numbers), grid)
     return {"label": label, "time": time}
 
 
 def _label_grid(labelling: Labelling, grid: Grid, progress: Progress = silent) -> tuple[np.ndarray, np.ndarray]:
-    """Labels and times over the grid, (velocities, coordinates) each."""
-    label, time = labelling.of(np.stack(np.meshgrid(grid[1], grid[0]), axis=-1).reshape(-1, 2), progress)
-    return label.reshape(len(grid[0]), len(grid[1])), time.reshape(len(grid[0]), len(grid[1]))
+    """Labels and times over the grid, (rows, columns) each."""
+    label, time = labelling.of(grid.states.reshape(-1, labelling.system.dimension), progress)
+    return label.reshape(grid.shape), time.reshape(grid.shape)
 
 
 def computed_cells(
     system: System, labelling: Labelling, grid: Grid, rows: int, progress: Progress, **where: Any
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same, as a sweep in chunks of `rows` velocities if `where` says where they are kept or who computes them.
+    """The same, as a sweep in chunks of `rows` of the grid if `where` says where they are kept or who computes them.
 
     Args:
         system: the system as it was given, whose load may be constant.
         labelling: the attractors, and how motions are labelled by them.
         grid: the initial states.
-        rows: velocities in a chunk.
+        rows: of the grid, in a chunk.
         progress: called with the share of the cells that are done.
         where: `store`, `workers` and `scheduler` of `saltus.sweep.run`, or None.
     """
@@ -73,11 +100,12 @@ def computed_cells(
     return np.array(data["label"]), np.array(data["time"])
 
 
-def cell_arguments(system: System, labelling: Labelling) -> dict[str, Any]:
+def cell_arguments(system: System, labelling: Labelling, grid: Grid) -> dict[str, Any]:
     """The arguments of `cells` that are the same for all blocks."""
     targets = [target.to_dict() for target in labelling.targets]
     numbers = {"periods": labelling.periods, "within": labelling.within, "tol": labelling.tol}
-    return {"system": system.to_dict(), "attractors": targets, **numbers, **identity(system)}
+    place = {"plane": list(grid.plane), "fixed": grid.fixed}
+    return {"system": system.to_dict(), "attractors": targets, **place, **numbers, **identity(system)}
 
 
 def _plan(system: System, labelling: Labelling, grid: Grid, rows: int) -> Plan:
@@ -89,9 +117,9 @@ def _plan(system: System, labelling: Labelling, grid: Grid, rows: int) -> Plan:
     }
     return Plan(
         function=FUNCTION,
-        arguments=cell_arguments(system, labelling),
-        axes={"velocity": grid[0], system.model.coordinates[0]: grid[1]},
-        chunk={"velocity": rows},
+        arguments=cell_arguments(system, labelling, grid),
+        axes={grid.plane[1]: grid.vertical, grid.plane[0]: grid.horizontal},
+        chunk={grid.plane[1]: rows},
         variables=variables,
         attrs=provenance(system, kind="basin_cells", title="cells of basins computed by saltus"),
     )

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors.attractor import REST, SAME_STATE, UNDECIDED, Attractor, Attractors, Target
-from saltus.attractors.attractors_dataset import about, attractor_table, coordinate, labels, variable
+from saltus.attractors.attractors_dataset import about, attractor_table, labels, state_plane, state_units, variable
 from saltus.attractors.basins.basin_cells import Grid, check_basin_store, computed_cells
 from saltus.attractors.basins.boundaries import basin_boundaries
 from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.find import find_attractors
-from saltus.attractors.kind import AttractorKind
 from saltus.attractors.stroboscopic_section import with_clock
 from saltus.checks import (
     LIMITS,
@@ -29,9 +28,11 @@ from saltus.checks import (
     check_work,
 )
 from saltus.errors import ParameterError
+from saltus.flow import state_names
+from saltus.orbits import rest_state
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
-from saltus.systems import System, reversed_system
+from saltus.systems import System, check_system, reversed_system
 
 if TYPE_CHECKING:
     import xarray
@@ -78,9 +79,10 @@ def _check(
     if curves:
         _check_curves(system, grid)
     check_count("rows", rows, 1)
-    check_work("periods", len(grid[0]) * len(grid[1]), periods)
-    at_once = len(grid[1]) * (len(grid[0]) if store is None else min(rows, len(grid[0])))
-    check_memory("velocity", float(at_once) * LIMITS.motion, f"{at_once} cells at once")
+    height, width = grid.shape
+    check_work("periods", height * width, periods)
+    at_once = width * (height if store is None else min(rows, height))
+    check_memory(grid.plane[1], float(at_once) * LIMITS.motion, f"{at_once} cells at once")
     if store is not None and Path(store).exists():
         check_basin_store(Path(store), system)
 
@@ -100,7 +102,7 @@ def basins_of_attraction(
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress = silent,
-    **coordinates: Iterable[float],
+    **coordinates: Iterable[float] | float,
 ) -> xarray.Dataset:
     """The attractor on which the motion from each state (coordinate, velocity) of a grid at phase 0 ends, and the time it takes.
 
@@ -114,19 +116,20 @@ def basins_of_attraction(
         velocity: the velocities of the grid, increasing; by default 201 over the window of `found`, or of `find_attractors`.
         found: the attractors and their labels; by default those that `find_attractors` finds, over the grid.
         periods: the most forcing periods of each motion.
-        within: that distance, in the larger of coordinate and velocity.
+        within: that distance, the largest of all coordinates and velocities.
         curves: adds the curves at which basins meet, computed by the backward flow (see `basin_boundaries`), as `boundary_...`
             over `boundary_point`, nan between curves.
         tol: the error of a step.
-        rows: velocities of the grid in one chunk of a store, or of what a worker computes.
+        rows: of the grid, in one chunk of a store, or of what a worker computes.
         store, workers, scheduler: where the cells are kept and who computes them, see `saltus.sweep.run`; the attractors are
             found first, and the curves at the end, at every run. Where none is given all cells are computed at once.
         progress: called with the fraction done and what is being done.
-        coordinates: the coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201).
+        coordinates: the coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201). With several coordinates two
+            state variables are lists, such as theta_1 and theta_1_velocity; the others are held fixed, closed or 0 if not given.
 
     Returns:
-        A Dataset over (velocity, coordinate): `label`, `time` (nan where undecided), and the table of the attractors, in which
-        `cells` is the share of the grid.
+        A Dataset over (velocity, coordinate), or the variables of the plane: `label`, `time` (nan where undecided), and the table
+        of the attractors, in which `cells` is the share of the grid.
 
     Raises:
         ParameterError: as for `find_attractors`; a grid that does not increase; attractors of another system.
@@ -160,7 +163,7 @@ def _with_new(found: Attractors, labelling: Labelling, grid: Grid, label: np.nda
         rows, columns = np.nonzero((label == UNDECIDED) & ~seen)
         if not rows.size:
             break
-        states = np.stack([grid[1][columns], grid[0][rows]], axis=1)
+        states = grid.at(grid.horizontal[columns], grid.vertical[rows])
         chosen = np.linspace(0, rows.size - 1, min(SETTINGS.new_states, rows.size)).astype(int)
         seen[rows[chosen], columns[chosen]] = True
         more = find_attractors(found.system, starts=1, also=states[chosen], tol=labelling.tol)
@@ -178,18 +181,18 @@ def _with_new(found: Attractors, labelling: Labelling, grid: Grid, label: np.nda
 
 def _curves(found: Attractors, labelling: Labelling, grid: Grid, label: np.ndarray) -> dict[str, Any]:
     """The curves at which basins meet, as variables."""
-    name, unit = coordinate(found.system)
-    points = basin_boundaries(found, lambda states: labelling.of(states)[0], label, grid[1], grid[0])
-    text = "of the stable manifolds between basins, nan between curves"
+    points = basin_boundaries(found, lambda states: labelling.of(states)[0], label, grid.horizontal, grid.vertical)
+    text, units = "of the stable manifolds between basins, nan between curves", state_units(found.system)
     return {
-        f"boundary_{key}": variable("boundary_point", points[:, i], unit, f"{key} {text}")
-        for i, key in enumerate((name, "velocity"))
+        f"boundary_{key}": variable("boundary_point", points[:, i], units[key], f"{key} {text}")
+        for i, key in enumerate(grid.plane)
     }
 
 
 def _check_curves(system: System, grid: Grid) -> None:
     """Refuse, before cells are computed, what has no curves: a grid that is a line, impacts that cannot be undone."""
-    for name, values in zip(("velocity", system.model.coordinates[0]), grid, strict=True):
+    check_system(system, "the curves between basins", coordinates=1)
+    for name, values in zip(grid.plane, (grid.horizontal, grid.vertical), strict=True):
         if len(values) < 2:
             raise ParameterError(f"{name} must be at least two numbers where the curves between basins are asked for", name)
     reversed_system(system)
@@ -207,52 +210,81 @@ def _same(one: Target, other: Target) -> bool:
 
 def _relabelled(new: list[Attractor], first: int) -> list[Attractor]:
     """New attractors with labels after the known ones, rest with its own; shares of the few states say nothing."""
-    moving = [member.label for member in new if member.kind is not AttractorKind.REST]
-    label_of = {label: first + i for i, label in enumerate(moving)} | {REST: REST}
+    label_of = {member.label: first + i for i, member in enumerate(new)}
+    if first == REST + 1:  # nothing is known that rests
+        label_of |= {member.label: REST for member in new if member.label == REST}
     return [member.labelled(label_of, starts=0, of=0) for member in new]
 
 
 def _around(system: System, grid: Grid) -> Window:
-    """The least window around the contact that holds a grid."""
-    contact = check_window(None, system).centre[0]
-    wide, fast = (float(max(np.abs(a - m).max(), SETTINGS.narrowest)) for a, m in ((grid[1], contact), (grid[0], 0.0)))
-    return Window((contact - wide, contact + wide), (-fast, fast))
+    """The least window around the contact that holds a grid; of variables that are held fixed the default one."""
+    area = check_window(None, system)
+    bounds, names = [list(pair) for pair in area], list(grid.fixed)
+    for name, values in zip(grid.plane, (grid.horizontal, grid.vertical), strict=True):
+        i = names.index(name)
+        middle = area.centre[i]
+        wide = float(max(np.abs(values - middle).max(), SETTINGS.narrowest))
+        bounds[i] = [middle - wide, middle + wide]
+    return check_window(bounds, system)
 
 
 def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: Attractors | None) -> Grid:
-    """Velocities and coordinates of the grid."""
-    name = system.model.coordinates[0]
-    for other in coordinates:
-        if other != name:
-            raise ParameterError(
-                f"{type(system.model).__name__} has no coordinate {other!r}; give {name}=... and velocity=...", other
-            )
+    """The plane of the initial states."""
+    names, given = state_names(system.model.coordinates), {n: v for n, v in coordinates.items() if v is not None}
+    if velocity is not None:
+        given["velocity"] = velocity
+    for name in given:
+        if name not in names:
+            known = ", ".join(f"{each}=..." for each in names)
+            kind = "coordinate" if len(names) == 2 else "state variable"
+            raise ParameterError(f"{type(system.model).__name__} has no {kind} {name!r}; give {known}", name)
+    fixed = dict(zip(names, map(float, rest_state(system)), strict=True))
+    varied = [name for name in names if name in given and np.ndim(given[name]) > 0] if len(names) > 2 else list(names)
+    if len(varied) not in (0, 2):
+        raise ParameterError(
+            f"two state variables of {', '.join(names)} are given as lists and the others as numbers, got lists of "
+            f"{', '.join(varied)}",
+            varied[0],
+        )
+    x, y = varied or state_plane(system)
+    for name in set(given) - {x, y}:
+        check_number(name, given[name])
+        fixed[name] = float(given[name])
     window = check_window(None if found is None else found.window, system)
-    along = window.centre[0] + window.half[0] * np.linspace(-1.0, 1.0, SETTINGS.cells)
-    if system.model.sides:
-        along = along[np.max([np.asarray(system.model.gap(along, s)) for s in system.model.sides], axis=0) >= 0.0]
-    speeds = window.centre[1] + window.half[1] * np.linspace(-1.0, 1.0, SETTINGS.cells) if velocity is None else velocity
-    places = coordinates.get(name)
-    return check_axis("velocity", speeds), check_axis(name, along if places is None else places)
+    along, up = (check_axis(n, given[n] if n in given else _over(system, window, names.index(n))) for n in (x, y))
+    return Grid((x, y), along, up, fixed)
+
+
+def _over(system: System, window: Window, place: int) -> np.ndarray:
+    """Evenly spaced values of a state variable over a window, where the contact lets the system be."""
+    values = window.centre[place] + window.half[place] * np.linspace(-1.0, 1.0, SETTINGS.cells)
+    model = system.model
+    if model.sides and place == 0:
+        return np.asarray(values[np.max([np.asarray(model.gap(values, s)) for s in model.sides], axis=0) >= 0.0])
+    for contact in model.contacts:
+        if place < len(model.coordinates) and contact.coordinate == model.coordinates[place]:
+            values = values[np.asarray(contact.gap(values)) >= 0.0]
+    return values
 
 
 def _dataset(found: Attractors, grid: Grid, label: np.ndarray, time: np.ndarray, numbers: dict[str, Any]) -> xarray.Dataset:
     import xarray
 
-    name, unit = coordinate(found.system)
+    (x, y), units = grid.plane, state_units(found.system)
     share = [float((label == member.label).mean()) for member in found]
     period = with_clock(found.system).load.period or math.nan
     variables: dict[str, Any] = attractor_table(found.members, found.system)
     variables |= {
-        "label": variable(("velocity", name), label, "1", "attractor on which the motion ends, -1 for undecided"),
-        "time": variable(("velocity", name), time, f"2 pi / Omega = {period:.9g}", "forcing periods to reach the attractor"),
+        "label": variable((y, x), label, "1", "attractor on which the motion ends, -1 for undecided"),
+        "time": variable((y, x), time, f"2 pi / Omega = {period:.9g}", "forcing periods to reach the attractor"),
         "cells": variable("attractor", np.array(share), "1", "share of the grid"),
     }
     axes = {
-        "velocity": variable("velocity", grid[0], unit, f"d {name} / d tau at phase 0"),
-        name: variable(name, grid[1], unit, f"{name} at phase 0"),
+        y: variable(y, grid.vertical, units[y], f"{y} at phase 0"),
+        x: variable(x, grid.horizontal, units[x], f"{x} at phase 0"),
         "attractor": labels(found.members),
     }
     undecided = float((label == UNDECIDED).mean())
-    attributes = about(found.system, "basins", **numbers, reasons=list(found.reasons), undecided=undecided)
+    held = {f"held_{name}": value for name, value in grid.fixed.items() if name not in grid.plane}
+    attributes = about(found.system, "basins", **numbers, plane=[x, y], **held, reasons=list(found.reasons), undecided=undecided)
     return xarray.Dataset(variables, axes, attributes)

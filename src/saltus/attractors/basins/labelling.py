@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.attractors.attractor import REST, SAME_STATE, UNDECIDED, Target
+from saltus.attractors.attractor import SAME_STATE, UNDECIDED, Target
 from saltus.attractors.kind import AttractorKind
 from saltus.flow import Recurrence, find_recurrence
 from saltus.progress import Progress, silent
@@ -67,7 +67,7 @@ class Labelling:
         label = np.full(len(ends), UNDECIDED, dtype=np.int16)
         for target in self.targets:
             if target.kind is AttractorKind.REST:
-                label[ends.rest] = REST
+                label[self._rests(target, ends)] = target.label
             elif target.kind is AttractorKind.PERIODIC:
                 label[_on_orbit(target, ends)] = target.label
             elif at_the_end:
@@ -76,6 +76,11 @@ class Labelling:
                     apart = np.median(target.distance(ends.states[rows, -SETTINGS.last :]), axis=1)
                     label[rows[apart < target.grain]] = target.label
         return label
+
+    def _rests(self, target: Target, ends: Recurrence) -> np.ndarray:
+        """Which motions are at rest for good in the state of an attractor; one contact leaves no choice, (n,)."""
+        here = target.distance(ends.last) < SAME_STATE * max(1.0, float(np.abs(target.states).max()))
+        return np.asarray(here & (ends.rest | (ends.period == 1)) if self.system.model.contacts else ends.rest)
 
     def _times(self, label: np.ndarray, ends: Recurrence) -> np.ndarray:
         """Forcing periods after which each motion stays near its attractor, up to its end; nan where undecided.

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.attractors.manifolds.saddle_manifolds import PLANE
-from saltus.attractors.stroboscopic_section import with_clock
-from saltus.checks import Rectangle, check_window
+from saltus.attractors.stroboscopic_section import check_periodic
+from saltus.checks import Box, check_window
 from saltus.errors import ParameterError
-from saltus.systems import Constant, System
+from saltus.systems import Constant, System, check_system
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Equilibrium:
         return self.eigenvalues is not None and self.eigenvalues[0].real > 0.0 > self.eigenvalues[1].real
 
 
-def equilibria(system: System, window: Rectangle = PLANE) -> tuple[Equilibrium, ...]:
+def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
     """The equilibria in a window of the phase plane, by their coordinate, the contact among them where it is one.
 
     They are the zeros of the acceleration at rest between 2001 points of the window: two that are nearer to one another than a
@@ -70,7 +70,7 @@ def equilibria(system: System, window: Rectangle = PLANE) -> tuple[Equilibrium, 
     """
     area = check_window(window, system)
     check_constant(system)
-    model, low, high = system.model, *area.coordinate
+    model, low, high = system.model, *area[0]
     found = []
     for side in model.sides or (1,):
         grid = np.linspace(low, high, SETTINGS.grid)
@@ -87,7 +87,8 @@ def equilibria(system: System, window: Rectangle = PLANE) -> tuple[Equilibrium, 
 
 def check_constant(system: System) -> None:
     """Refuse what has no phase plane."""
-    with_clock(system)
+    check_system(system, "a phase plane", coordinates=1)
+    check_periodic(system)
     for name, signal in system.load.channels.items():
         if not isinstance(signal, Constant):
             raise ParameterError(

@@ -14,7 +14,7 @@ import numpy as np
 from saltus.attractors.manifolds.equilibria import Equilibrium, equilibria
 from saltus.attractors.manifolds.manifold_growth import has_left
 from saltus.attractors.manifolds.saddle_manifolds import PLANE
-from saltus.checks import Rectangle, Window, check_number, check_window
+from saltus.checks import Box, Window, check_number, check_window
 from saltus.flow import Motion, simulate
 from saltus.systems import System, VelocityReduction, reversed_system
 
@@ -59,7 +59,7 @@ class Separatrix:
     end: SeparatrixEnd
 
 
-def saddles(system: System, window: Rectangle = PLANE) -> tuple[Equilibrium, ...]:
+def saddles(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
     """The saddle equilibria in a window of the phase plane, by their coordinate.
 
     Raises:
@@ -68,7 +68,7 @@ def saddles(system: System, window: Rectangle = PLANE) -> tuple[Equilibrium, ...
     return tuple(point for point in equilibria(system, window) if point.saddle)
 
 
-def separatrices(system: System, window: Rectangle = PLANE, *, span: float = 60.0, step: float = 0.02) -> tuple[Separatrix, ...]:
+def separatrices(system: System, window: Box = PLANE, *, span: float = 60.0, step: float = 0.02) -> tuple[Separatrix, ...]:
     """The stable manifolds of all saddles in a window: the curves that separate the basins under a constant load.
 
     Each branch is followed back for at most `span` of time, until it leaves the window for good (three half widths) or comes to

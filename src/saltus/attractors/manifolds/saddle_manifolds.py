@@ -20,7 +20,7 @@ import numpy as np
 from saltus.attractors.manifolds.manifold_growth import Growth, GrowthEnd, Level, Segment
 from saltus.attractors.orbit_certificate import start_at
 from saltus.attractors.stroboscopic_section import section_states
-from saltus.checks import Rectangle, check_count, check_number, check_window
+from saltus.checks import Box, check_count, check_number, check_window
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import last_states, motions_from, sensitivities
 from saltus.orbits import PeriodicOrbit
@@ -90,7 +90,7 @@ class Manifold:
 def stable_manifold(
     orbit: PeriodicOrbit,
     *,
-    window: Rectangle = PLANE,
+    window: Box = PLANE,
     periods: int = 40,
     step: float = 0.01,
     points: int = 100_000,
@@ -122,7 +122,7 @@ def stable_manifold(
 def unstable_manifold(
     orbit: PeriodicOrbit,
     *,
-    window: Rectangle = PLANE,
+    window: Box = PLANE,
     periods: int = 40,
     step: float = 0.01,
     points: int = 100_000,

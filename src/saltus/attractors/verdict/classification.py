@@ -61,7 +61,7 @@ def classify(
         >>> str(saltus.classify(system, theta=0.3).kind)
         'periodic'
     """
-    clock, start = with_clock(system, "classify", any_model=True), _start(system, velocity, coordinates)
+    clock, start = with_clock(system), _start(system, velocity, coordinates)
     check_count("periods", periods, SETTINGS.thirds * 2 * LYAPUNOV.batches)
     check_count("transient", transient, 0)
     check_count("max_period", max_period, RECURRENCE.compiled_max_period)

@@ -9,14 +9,14 @@ import numpy as np
 
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.lyapunov.spectrum import Exponents, lyapunov_spectrum
-from saltus.attractors.orbit_certificate import certify, start_at
+from saltus.attractors.orbit_certificate import certify, start_at, state_vector
 from saltus.attractors.verdict.reason import Reason
 from saltus.attractors.verdict.tori import excludes_tori
 from saltus.attractors.verdict.verdict import Verdict, VerdictRequest, on_orbit, settled
 from saltus.attractors.verdict.zero_one_test import FEWEST_ENTRIES, ZeroOne, zero_one_test
 from saltus.flow import Recurrence
+from saltus.orbits import states_beside
 from saltus.progress import part_of
-from saltus.systems import System
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def unsettled(case: VerdictRequest, ends: Recurrence) -> Verdict:
     later = _beside(case, runs[-1].state)
     evidence = _evidence(runs, opinion) | {"companions_settled": int((~later.unsettled[1:]).sum())}
     judged = _Judged(case, ends, runs[-1], opinion, periods, evidence)
-    verdict = settled(case, later.only(slice(1)), _row(case, runs[-1].state))
+    verdict = settled(case, later.only(slice(1)), state_vector(case.system, runs[-1].state))
     if verdict is not None:
         return _after_all(verdict, judged)
     if runs[-1].note is not None:
@@ -132,25 +132,10 @@ def _evidence(runs: list[Exponents], opinion: ZeroOne | None) -> dict[str, Any]:
 
 def _beside(case: VerdictRequest, state: dict[str, Any]) -> Recurrence:
     """How motions end that begin at a state, the first, and beside it."""
-    row = _row(case, state)
+    row = state_vector(case.system, state)
     around = np.random.default_rng(int(case.seed)).uniform(-SETTINGS.aside, SETTINGS.aside, (SETTINGS.companions, row.size))
-    states = _on_this_side(case.system, row, row + np.concatenate([np.zeros((1, row.size)), around]))
+    states = states_beside(case.system, row, np.concatenate([np.zeros((1, row.size)), around]))
     return case.follow(states, max(case.periods, SETTINGS.least), 4 * case.max_period, (0.9, 1.0))
-
-
-def _on_this_side(system: System, row: np.ndarray, states: np.ndarray) -> np.ndarray:
-    """States (n, d) beside one (d,) with its closed contacts closed, and those beyond a contact at its mirror image."""
-    names = system.model.coordinates
-    for contact in system.model.contacts:
-        place, position = names.index(contact.coordinate), float(contact.position)
-        states[:, place] = position + contact.sign * np.abs(states[:, place] - position)
-        if contact.gap(row[place]) == 0.0 and row[len(names) + place] == 0.0:
-            states[:, [place, len(names) + place]] = position, 0.0
-    return states
-
-
-def _row(case: VerdictRequest, state: dict[str, Any]) -> np.ndarray:
-    return np.append([state[name] for name in case.system.model.coordinates], state["velocity"])
 
 
 def _after_all(verdict: Verdict, judged: _Judged) -> Verdict:
@@ -185,7 +170,7 @@ def _regular(judged: _Judged) -> Verdict:
     against = excludes_tori(case.system)
     if against is None and judged.ordered and abs(last.values[0]) <= float(last.errors[0] + last.resolution):
         return case.verdict(AttractorKind.QUASI_PERIODIC, Reason.TORUS, judged.ends, judged.numbers, **given)
-    found = certify(case.clock, _row(case, last.state), None, max_period=case.max_period)
+    found = certify(case.clock, state_vector(case.system, last.state), None, max_period=case.max_period)
     if found.sound:
         return on_orbit(case, judged.ends, found, "it approaches slowly", **given)
     given["evidence"] |= {} if against is None else {"no_tori": against}

@@ -14,6 +14,7 @@ import numpy as np
 
 from saltus.attractors.lyapunov.largest_exponent import largest_exponents
 from saltus.flow import RECURRENCE, Outcome, Recurrence, find_recurrence, return_period
+from saltus.orbits import states_beside
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
 
@@ -100,7 +101,7 @@ class Judged:
     gone: np.ndarray  # (n,): how many companions have settled
     life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the one that is excluded with 95 %
     period: np.ndarray  # (n,): forcing periods after which a periodic motion repeats itself, 0 where that is not known
-    states: np.ndarray  # (n, companions, 2): the last stroboscopic states, of survivors where there are any
+    states: np.ndarray  # (n, companions, d): the last stroboscopic states, of survivors where there are any
     settled: SettledLater  # what companions settled on
 
     def __len__(self) -> int:
@@ -112,11 +113,13 @@ class SettledLater:
     """Periodic motions on which companions settled."""
 
     question: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))  # (k,): the number of the question
-    state: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # (k, 2): at phase 0
+    state: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # (k, d): at phase 0
     period: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))  # (k,): in forcing periods
 
     def joined(self, other: SettledLater) -> SettledLater:
         """These and others."""
+        if not len(self.question):  # of as many state variables as the others
+            return other
         return SettledLater(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in ("question", "state", "period")))
 
 
@@ -138,8 +141,8 @@ def judge_unsettled(
     transient becomes an ever larger share of the companions, and shows itself by three mean lives in which none settles.
 
     Args:
-        system: what moves, with one coordinate, under a load with a frequency.
-        states: (n, m, 2), coordinate and velocity at phase 0; rows of nan are left out, a question needs one other.
+        system: what moves, under a load with a frequency.
+        states: (n, m, d), coordinates and velocities at phase 0; rows of nan are left out, a question needs one other.
         parameters: numbers by dotted path, (n,) each, in place of the system's.
         settings: how long is looked, and how surely.
         progress: called with the fraction done.
@@ -162,7 +165,7 @@ class _Judgement:
     system: System
     parameters: dict[str, np.ndarray]
     settings: JudgementSettings
-    states: np.ndarray  # (n, companions, 2)
+    states: np.ndarray  # (n, companions, d)
     open: np.ndarray  # (n,): still to be followed
     positive: np.ndarray  # (n,): whether the exponent is surely above 0
     negative: np.ndarray  # (n,): surely below
@@ -181,9 +184,9 @@ class _Judgement:
     ) -> _Judgement:
         """Companions at the states of each question."""
         n = len(states)
-        chosen = np.full((n, settings.companions, 2), np.nan)
+        chosen = np.full((n, settings.companions, system.dimension), np.nan)
         for row, given in enumerate(states):
-            chosen[row] = _companions(given[np.isfinite(given).all(axis=-1)], settings)
+            chosen[row] = _companions(system, given[np.isfinite(given).all(axis=-1)], settings)
         columns = {path: np.broadcast_to(np.asarray(values, dtype=float), n) for path, values in parameters.items()}
         flags = (np.zeros(n, dtype=bool) for _ in range(3))
         zeros = (np.zeros(n, dtype=int) for _ in range(4))
@@ -200,7 +203,13 @@ class _Judgement:
         columns = {path: np.repeat(values[rows], states.shape[1]) for path, values in self.parameters.items()}
         options = {"kept": 1} | options
         return find_recurrence(
-            self.system, states.reshape(-1, 2), periods, parameters=columns, tol=self.settings.tol, progress=progress, **options
+            self.system,
+            states.reshape(-1, states.shape[-1]),
+            periods,
+            parameters=columns,
+            tol=self.settings.tol,
+            progress=progress,
+            **options,
         )
 
     def follow(self, periods: int, progress: Progress) -> None:
@@ -210,7 +219,7 @@ class _Judgement:
             return
         ends = self._ends(rows, self.states[rows], periods, progress)
         shape = (rows.size, self.settings.companions)
-        moving, last = (ends.outcome == Outcome.MOVING).reshape(shape), ends.last.reshape(*shape, 2)
+        moving, last = (ends.outcome == Outcome.MOVING).reshape(shape), ends.last.reshape(*shape, -1)
         self._keep_settled(rows, ends)
         left = (~moving).sum(axis=1)
         self.exposure[rows] += np.ceil(ends.periods).astype(int).reshape(shape).sum(axis=1)
@@ -219,7 +228,7 @@ class _Judgement:
         for i, row in enumerate(rows):
             survivors = last[i][moving[i]]
             self.all_gone[row] = not len(survivors)
-            self.states[row] = _companions(survivors, self.settings) if len(survivors) else last[i]
+            self.states[row] = _companions(self.system, survivors, self.settings) if len(survivors) else last[i]
         self.open[rows] = ~self.all_gone[rows]
 
     @property
@@ -276,8 +285,7 @@ class _Judgement:
         return Judged(verdict, doubt, self.exponent, self.error, self.gone, life, self.period, self.states, self.settled)
 
 
-def _companions(states: np.ndarray, settings: JudgementSettings) -> np.ndarray:
-    """So many states, beside these (m, 2), spread evenly over them."""
+def _companions(system: System, states: np.ndarray, settings: JudgementSettings) -> np.ndarray:
+    """So many states, beside these (m, d), spread evenly over them."""
     chosen = states[np.linspace(0, len(states) - 1, settings.companions).astype(int)]
-    beside: np.ndarray = chosen + settings.apart * np.arange(settings.companions)[:, None]
-    return beside
+    return states_beside(system, chosen, settings.apart * np.arange(settings.companions)[:, None])

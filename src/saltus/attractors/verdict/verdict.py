@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.lyapunov.spectrum import Exponents
-from saltus.attractors.orbit_certificate import Certificate, certify, start_at
+from saltus.attractors.orbit_certificate import Certificate, certify, start_at, stays_at_rest
 from saltus.attractors.verdict.reason import Reason
 from saltus.attractors.verdict.zero_one_test import ZeroOne
 from saltus.errors import MotionError
@@ -98,7 +98,7 @@ class VerdictRequest:
 
 def settled(case: VerdictRequest, ends: Recurrence, start: np.ndarray) -> Verdict | None:
     """The verdict on a motion from a state (2,) that has come to rest, ended or repeats itself; None where it goes on."""
-    if ends.rest[0]:
+    if ends.rest[0] or (ends.period[0] == 1 and stays_at_rest(case.clock, ends.last[0])):
         contacts, numbers = case.system.model.contacts, {"periods": round(float(ends.periods[0]))}
         point = ends.last[0] if contacts else np.array([float(case.system.model.contact), 0.0])
         return case.verdict(AttractorKind.REST, Reason.CAPTURED, ends, numbers, state=start_at(case.system, point))

@@ -65,6 +65,8 @@ from saltus.taylor import not_here as cached_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
+TIED = 1e-12  # A smaller reaction vanishes together with that of another contact: rounding of the loads that hold them.
+
 
 @lean_jit
 def contact_impact(where, state, env, model, contacts, work, solver, events, t, origin, hit):
@@ -142,6 +144,22 @@ def choose_closed(where, state, env, model, contacts, work, solver, candidates, 
 
 
 @lean_jit
+def note_ties(where, state, env, model, contacts, work, candidates, t, origin):
+    """Note that the reactions vanish of all candidates of which they do to within rounding, as they do of one that is released.
+
+    Cells of a chain that move alike let go at one instant, of which each has its own rounding.
+    """
+    for i in range(contacts.shape[0]):
+        if candidates >> i & 1:
+            contacts[i, ContactColumn.CLOSED] = 1
+    hold_coordinates(where, env, contacts)
+    expand(where, state, env, model, work, t, origin, 1.0, 2)
+    for i in range(contacts.shape[0]):
+        if candidates >> i & 1 and abs(work[Work.MARGINS][i, 0]) <= TIED:
+            contacts[i, ContactColumn.RELEASED] = 1
+
+
+@lean_jit
 def free_pulls(where, state, env, model, contacts, work, solver, t, origin):
     """Fill the second derivatives of the gaps with no contact closed; returns by how much they change, relatively, in time."""
     own, change = where[Where.OWN], 0.0
@@ -207,7 +225,9 @@ def decide_contacts(where, state, settings, env, model, contacts, work, solver, 
     candidates = closed_bits(contacts)
     couple(where, state, env, model, contacts, solver)
     if candidates and not choose_closed(where, state, env, model, contacts, work, solver, candidates, t, origin):
-        return Status.NOT_UNIQUE
+        note_ties(where, state, env, model, contacts, work, candidates, t, origin)
+        if not choose_closed(where, state, env, model, contacts, work, solver, candidates, t, origin):
+            return Status.NOT_UNIQUE
     hold_coordinates(where, env, contacts)
     opened = candidates & ~closed_bits(contacts)
     if opened and where[Where.LEAVE_BY] == 0:

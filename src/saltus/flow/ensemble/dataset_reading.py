@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import check_dataset
-from saltus.flow.motion_dataset import rate_name
+from saltus.flow.motion_dataset import state_names
 from saltus.public_functions import answered
 
 if TYPE_CHECKING:
@@ -41,7 +41,6 @@ def stroboscopic(system: System, dataset: xarray.Dataset) -> np.ndarray[Any, Any
         >>> saltus.flow.stroboscopic(system, ends).shape
         (2, 3, 2)
     """
-    names = system.model.coordinates
-    states = [*names, *(rate_name(name, names) for name in names)]
+    states = state_names(system.model.coordinates)
     check_dataset(dataset, "simulate_many with sample", [f"sampled_{name}" for name in states])
     return np.stack([dataset[f"sampled_{name}"].values for name in states], axis=-1)

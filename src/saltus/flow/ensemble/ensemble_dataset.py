@@ -9,7 +9,7 @@ import numpy as np
 from saltus.flow.ensemble.lane_layout import EndLabel, EndNumber, JobLabel, JobNumber
 from saltus.flow.ensemble.wanted import Sample, Until, Wanted
 from saltus.flow.kernel_layout import Mode, Status
-from saltus.flow.motion_dataset import rate_name
+from saltus.flow.motion_dataset import rate_name, state_names
 from saltus.flow.stops import Stop
 from saltus.flow.validity import ROUNDING
 from saltus.provenance import provenance
@@ -70,8 +70,7 @@ def extrema_names(names: tuple[str, ...]) -> tuple[str, str]:
 
 def result_names(names: tuple[str, ...]) -> set[str]:
     """Every name that a dataset may need for itself, of a model with these coordinates."""
-    states = [*names, *(rate_name(name, names) for name in names)]
-    extrema = extrema_names(names)
+    states, extrema = state_names(names), extrema_names(names)
     further = [*(f"{kind}_{name}" for kind in ("sampled", "start") for name in states), *(f"overall_{name}" for name in extrema)]
     return {*FIXED, *DIMENSIONS, *states, *extrema, *further}
 

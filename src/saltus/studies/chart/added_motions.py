@@ -28,7 +28,7 @@ def with_motions(chart: xarray.Dataset, request: ChartRequest, cells: np.ndarray
     if not len(new):
         return made
     motions = by_cell(spread(request, new, distinct(np.concatenate([known, new]))))
-    columns = table(motions, made["count"].size, chart.attrs["coordinate"])
+    columns = table(motions, made["count"].size, request.variables)
     complete = made["count"].values <= KEPT  # of other cells not all motions are kept, and none are added
     before = int(made["count"].sum())
     for name, values in columns.items():

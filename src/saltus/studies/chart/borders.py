@@ -23,7 +23,7 @@ from saltus.studies.chart.cell_outcomes import flags
 from saltus.studies.chart.changes import Changes, ChartMotions, changes_of, keys_of, read_chart
 from saltus.studies.chart.endings import ENDING, ChangeOutcome
 from saltus.studies.chart.request import ChartRequest
-from saltus.systems import System
+from saltus.systems import System, check_system
 
 if TYPE_CHECKING:
     import xarray
@@ -119,6 +119,7 @@ def with_borders(
         >>> len(borders.curves)  # no border passes between these cells
         0
     """
+    check_system(system, "the borders of a chart", coordinates=1)
     check_count("curves", curves, 0)
     request = ChartRequest.of_chart(system, chart)
     numbers = {"periods": request.periods, "max_period": request.max_period, "tol": request.tol}

@@ -12,14 +12,14 @@ COMPANIONS = 6  # motions that are followed for each cell that is judged
 
 
 class CellVerdicts:
-    """The judgement of the motions that have not settled, an entry for each of `cell`; of `later`, cells (k,) and states (k, 2),
+    """The judgement of the motions that have not settled, an entry for each of `cell`; of `later`, cells (k,) and states (k, d),
     on which such motions have settled after all."""
 
     def __init__(self, request: ChartRequest, motions: np.ndarray) -> None:
         motions = motions[np.argsort(motions["cell"], kind="stable")]
         self.cell, first = np.unique(motions["cell"], return_index=True)
         last = np.append(first[1:], len(motions))
-        states = np.full((len(self.cell), ASKED, 2), np.nan)
+        states = np.full((len(self.cell), ASKED, request.system.dimension), np.nan)
         for i in range(ASKED):
             there = first + i < last
             states[there, i] = motions["state"][(first + i)[there]]

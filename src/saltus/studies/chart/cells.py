@@ -15,10 +15,10 @@ import numpy as np
 
 from saltus.checks import Window
 from saltus.flow import approached, find_recurrence
-from saltus.orbits import initial_states
+from saltus.orbits import initial_states, rest_state
 from saltus.studies.chart.cell_outcomes import outcomes
 from saltus.studies.chart.cell_verdicts import CellVerdicts
-from saltus.studies.chart.motions import ALIKE, MOTION, SIDES, distinct, has_alike, is_alike, motions_in, table
+from saltus.studies.chart.motions import ALIKE, SIDES, distinct, has_alike, is_alike, motion_type, motions_in, table
 from saltus.studies.chart.request import ChartRequest
 from saltus.systems import System
 from saltus.theory import amplitude_limits
@@ -51,11 +51,11 @@ SETTINGS = CellSettings()
 class CellOutcomes:
     """The stable motions, each once, by cell and falling amplitude, and for each cell how many of the other starts ended how."""
 
-    motions: np.ndarray  # of dtype MOTION
+    motions: np.ndarray  # of dtype `motion_type`
     captured: np.ndarray  # at rest, for all later loads
     tiny: np.ndarray  # on motions smaller than those that count
     unsettled: np.ndarray  # chaotic, slow, or of a longer period
-    moving: np.ndarray  # of dtype MOTION: these motions, where they are at the end
+    moving: np.ndarray  # of dtype `motion_type`: these motions, where they are at the end
 
 
 def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
@@ -69,9 +69,9 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
 
 
 def computed(request: ChartRequest) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """The variables of a chart with a row for each of its cells, and its motions, of dtype MOTION."""
+    """The variables of a chart with a row for each of its cells, and its motions, of dtype `motion_type`."""
     settled, judged, motions = stable_motions(request)
-    columns = table(motions, len(settled.captured), request.coordinate) | {
+    columns = table(motions, len(settled.captured), request.variables, bool(request.system.model.contacts)) | {
         "rest": settled.captured > 0,
         "tiny": settled.tiny,
         **_verdicts(settled, judged),
@@ -123,19 +123,19 @@ def spread(request: ChartRequest, new: np.ndarray, known: np.ndarray) -> np.ndar
 
 
 def starts(system: System, count: int, window: Window, seed: int) -> np.ndarray:
-    """(count, 2): states spread over the window, every other one drawn in towards the contact, the last of them to 1 %."""
+    """(count, d): states spread over the window, every other one drawn in towards the contact, the last of them to 1 %."""
     states = initial_states(system, count, window, seed)
-    contact = np.array([float(system.model.contact) if system.model.sides else 0.0, 0.0])
-    inner = states[1::2]
+    contact, inner = rest_state(system), states[1::2]
     inner[:] = contact + (inner - contact) * np.geomspace(1.0, SETTINGS.innermost, len(inner) + 1)[1:, None]
     return states
 
 
 def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: np.ndarray | None = None) -> CellOutcomes:
-    """Follow motions from states (n, 2) at phase 0 in the cells of these numbers until they settle, or come to a known one."""
+    """Follow motions from states (n, d) at phase 0 in the cells of these numbers until they settle, or come to a known one."""
     size, least = math.prod(request.shape), request.least
     captured, tiny, unsettled = (np.zeros(size, dtype=np.int64) for _ in range(3))
-    moving, found, left = np.zeros(len(cell), MOTION), [np.empty(0, MOTION)], []
+    record = motion_type(request.system.dimension)
+    moving, found, left = np.zeros(len(cell), record), [np.empty(0, record)], []
     moving["cell"], moving["state"], moving["starts"], moving["amplitude"] = cell, states, 1, np.inf
     for share in (*(SETTINGS.stages if len(cell) > SETTINGS.few_motions else SETTINGS.few_stages), SETTINGS.patience):
         if share == SETTINGS.patience:
@@ -180,13 +180,17 @@ def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple
         kept=SETTINGS.kept,
         extrema=True,
         impact_count=True,
+        speed=bool(request.system.model.contacts),
         tol=request.tol,
     )
-    ahead, period = approached(ends.states, request.max_period)
-    going = replace(ends, period=np.where(ends.unsettled, period, ends.period))  # its extrema are those of where it is going
+    going, state = ends, ends.last
+    if not request.system.model.contacts:  # what lies ahead in a straight line may lie beyond a contact
+        ahead, period = approached(ends.states, request.max_period)
+        going = replace(ends, period=np.where(ends.unsettled, period, ends.period))  # its extrema are those of where it is going
+        state = np.where(ends.unsettled[:, None], ahead, ends.last)
     high, low = going.highest, -going.lowest
-    motions["state"] = np.where(ends.unsettled[:, None], ahead, ends.last)
-    motions["period"], motions["impact_count"] = ends.period, ends.impact_count
+    motions["slowest"] = 0.0 if ends.speeds is None else ends.slowest
+    motions["state"], motions["period"], motions["impact_count"] = state, ends.period, ends.impact_count
     motions["amplitude"], motions["other"] = np.maximum(high, low), np.minimum(high, low)
     return motions, ends.rest
 

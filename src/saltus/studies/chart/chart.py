@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Rectangle, check_count
+from saltus.checks import Box, check_count
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.chart.borders import with_borders
 from saltus.studies.chart.changes import read_chart
 from saltus.studies.chart.disagreements import disagreements
 from saltus.studies.chart.request import ChartRequest
-from saltus.systems import System
+from saltus.systems import System, check_system
 from saltus.theory import quasi_static_border
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def stability_chart(
     paths: tuple[str, str] = ("load.horizontal.amplitude", "load.vertical"),
     max_period: int = 6,
     starts: int = 12,
-    window: Rectangle | None = None,
+    window: Box | None = None,
     least: float = 1e-3,
     periods: int | None = None,
     tol: float = 1e-10,
@@ -98,6 +98,7 @@ def stability_chart(
 
 
 def _check_bordered(system: System, curves: int, progress: object, **options: Any) -> None:
+    check_system(system, "the borders of a chart", coordinates=1)
     check_count("curves", curves, 0)
     stability_chart.check(system, **options)
 

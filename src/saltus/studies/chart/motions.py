@@ -2,28 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from saltus.flow import state_names
 
 if TYPE_CHECKING:
     import xarray
 
 KEPT = 8  # motions of each cell that a chart keeps, the largest ones
 SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))  # rows and columns to the neighbours of a cell
-MOTION = np.dtype(
-    [
-        ("cell", np.int64),  # the cell's number, row by row
-        ("starts", np.int64),  # how many initial states have led to it
-        ("period", np.int64),  # forcing periods after which it repeats itself; 0 while it has not settled
-        ("impact_count", np.int64),  # impacts in them
-        ("amplitude", float),  # max abs of the coordinate
-        ("other", float),  # the extremum on the other side, counted positive there; the amplitude if the motion is symmetric
-        ("state", float, (2,)),  # coordinate and velocity at phase 0
-    ]
-)
+
+
+@cache
+def motion_type(dimension: int) -> np.dtype[Any]:
+    """The record of a motion with so many state variables."""
+    return np.dtype(
+        [
+            ("cell", np.int64),  # the cell's number, row by row
+            ("starts", np.int64),  # how many initial states have led to it
+            ("period", np.int64),  # forcing periods after which it repeats itself; 0 while it has not settled
+            ("impact_count", np.int64),  # impacts in them
+            ("amplitude", float),  # max abs of the coordinate, or of all of several
+            ("other", float),  # the extremum on the other side, counted positive there; the amplitude if the motion is symmetric
+            # The least speed of an impact, of models with several contacts: between two stops all extrema are the same. Else 0.
+            ("slowest", float),
+            ("state", float, (dimension,)),  # coordinates and velocities at phase 0
+        ]
+    )
+
+
+MOTION = motion_type(2)  # with one coordinate
 
 
 @dataclass(frozen=True)
@@ -55,6 +68,7 @@ def is_same(one: np.ndarray, other: np.ndarray, tolerance: float = ALIKE.same) -
     same = one["period"] == other["period"]
     for name in ("amplitude", "other"):
         same &= np.abs(one[name] - other[name]) <= tolerance * other["amplitude"]
+    same &= np.abs(one["slowest"] - other["slowest"]) <= tolerance * (other["amplitude"] + other["slowest"])
     return np.asarray(same)
 
 
@@ -86,17 +100,21 @@ def by_cell(motions: np.ndarray) -> np.ndarray:
     return motions[np.lexsort((-motions["amplitude"], motions["cell"]))]
 
 
-def table(motions: np.ndarray, size: int, coordinate: str) -> dict[str, np.ndarray]:
-    """The variables of a chart of `size` cells that follow from its motions, which are given by cell and falling amplitude."""
+def table(motions: np.ndarray, size: int, names: Sequence[str], speeds: bool = False) -> dict[str, np.ndarray]:
+    """The variables of a chart of `size` cells that follow from its motions, which are given by cell and falling amplitude.
+
+    `names` are those of the state variables; `speeds` says whether there is a variable for the least speed of an impact.
+    """
     number = np.bincount(motions["cell"], minlength=size)
     rank = np.arange(len(motions)) - np.repeat(np.cumsum(number) - number, number)
     kept = rank < KEPT
     place = motions["cell"][kept], rank[kept]
     fields = {"amplitude": np.nan, "other": np.nan, "period": 0, "impact_count": 0}
-    columns = {name: np.full((size, KEPT), empty) for name, empty in (fields | {coordinate: np.nan, "velocity": np.nan}).items()}
+    fields |= {"slowest": np.nan} if speeds else {}
+    columns = {name: np.full((size, KEPT), empty) for name, empty in (fields | dict.fromkeys(names, np.nan)).items()}
     for name in fields:
         columns[name][place] = motions[name][kept]
-    for i, name in enumerate((coordinate, "velocity")):
+    for i, name in enumerate(names):
         columns[name][place] = motions["state"][kept, i]
     smallest = np.full(size, np.nan)
     np.fmin.at(smallest, motions["cell"], motions["amplitude"])
@@ -107,13 +125,14 @@ def table(motions: np.ndarray, size: int, coordinate: str) -> dict[str, np.ndarr
 def read_motions(chart: xarray.Dataset) -> np.ndarray:
     """The motions that a chart keeps, by cell and falling amplitude."""
     chart = chart.transpose("vertical", "horizontal", ...)
-    names = ("amplitude", "other", "period", "impact_count")
-    columns: dict[str, Any] = {name: chart[f"motion_{name}"].values for name in (*names, chart.attrs["coordinate"], "velocity")}
+    names = ["amplitude", "other", "period", "impact_count", *(["slowest"] if "motion_slowest" in chart else [])]
+    variables = state_names(tuple(str(chart.attrs["coordinate"]).split()))
+    columns: dict[str, Any] = {name: chart[f"motion_{name}"].values for name in (*names, *variables)}
     shape = columns["amplitude"].shape
     at = np.nonzero(np.isfinite(columns["amplitude"]))
-    motions = np.zeros(len(at[0]), MOTION)
+    motions = np.zeros(len(at[0]), motion_type(len(variables)))
     motions["cell"] = np.ravel_multi_index(at[:2], shape[:2]) if len(at[0]) else 0
     for name in names:
         motions[name] = columns[name][at]
-    motions["state"] = np.stack([columns[name][at] for name in (chart.attrs["coordinate"], "velocity")], axis=1)
+    motions["state"] = np.stack([columns[name][at] for name in variables], axis=1)
     return motions

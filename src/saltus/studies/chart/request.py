@@ -23,6 +23,7 @@ from saltus.checks import (
     check_work,
 )
 from saltus.errors import ParameterError, shown
+from saltus.flow import state_names
 from saltus.provenance import check_provenance, identity, provenance
 from saltus.studies.chart.cell_outcomes import CellOutcome, flags
 from saltus.studies.chart.motions import KEPT
@@ -91,8 +92,13 @@ class ChartRequest:
 
     @property
     def coordinate(self) -> str:
-        """The name of the system's coordinate."""
-        return self.system.model.coordinates[0]
+        """The name of the system's coordinate, or the names of all of several."""
+        return " ".join(self.system.model.coordinates)
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """The names of the state variables."""
+        return state_names(self.system.model.coordinates)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -129,10 +135,9 @@ class ChartRequest:
         needed = ("vertical", "horizontal", "count", "amplitude"), ("window", "path", *NUMBERS)
         check_dataset(chart, "stability_chart", *needed, name="chart")
         attrs = chart.attrs
-        low_x, high_x, low_v, high_v = (float(value) for value in attrs["window"])
         numbers = {name: attrs[name].item() if isinstance(attrs[name], np.generic) else attrs[name] for name in NUMBERS}
         axes = {name: chart[name].values for name in ("horizontal", "vertical")}
-        window, paths = ((low_x, high_x), (low_v, high_v)), (str(attrs["path"][0]), str(attrs["path"][1]))
+        window, paths = np.asarray(attrs["window"], dtype=float).reshape(-1, 2), (str(attrs["path"][0]), str(attrs["path"][1]))
         return cls(system=system, paths=paths, window=window, **axes, **numbers)
 
     def plan(self) -> Plan:
@@ -159,7 +164,8 @@ class ChartRequest:
         """The arrays of a chart, with their units and what they mean."""
         from saltus.sweep import Variable
 
-        unit, name, each = self.system.model.unit_of(self.coordinate), self.coordinate, (("motion", KEPT),)
+        model, each = self.system.model, (("motion", KEPT),)
+        unit = model.unit_of(model.coordinates[0])
         rows: list[tuple[str, str, str, Any, str]] = [
             ("amplitude", "f8", unit, (), "the largest amplitude of the stable motions beside rest"),
             ("period", "i2", "1", (), "forcing periods of the largest motion, 0 where there is none"),
@@ -176,9 +182,10 @@ class ChartRequest:
             ("motion_other", "f8", unit, each, "extremum of each motion on the other side, as its amplitude if symmetric"),
             ("motion_period", "i2", "1", each, "forcing periods of each motion"),
             ("motion_impact_count", "i4", "1", each, "impacts in a period of each motion"),
-            (f"motion_{name}", "f8", unit, each, f"{name} of each motion at phase 0"),
-            ("motion_velocity", "f8", unit, each, f"d {name} / d tau of each motion at phase 0"),
+            *((f"motion_{name}", "f8", unit, each, f"{name} of each motion at phase 0") for name in self.variables),
         ]
+        if model.contacts:
+            rows.append(("motion_slowest", "f8", unit, each, "least speed of an impact of each motion, 0 without impacts"))
         limits = amplitude_limits(self.system)
         rows += [(f"beyond_{limit.name}", "?", "1", (), f"the largest motion passes {limit.meaning}") for limit in limits]
         meanings = {"outcome": flags(CellOutcome), "verdict": flags(Unsettled)}
@@ -190,7 +197,7 @@ class ChartRequest:
 
 def _check_driven(system: Any) -> None:
     """Refuse what has no chart."""
-    check_system(system, "stability_chart", coordinates=1)
+    check_system(system, "stability_chart", several_contacts=True)
     if system.load.frequency is None:
         raise ParameterError("a stability chart needs a load with a frequency, Load(frequency=..., ...)", "load.frequency")
 

@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from saltus.studies.chart.cells import seeds
-from saltus.studies.chart.motions import ALIKE, MOTION, by_cell, is_alike, is_same
+from saltus.studies.chart.motions import ALIKE, by_cell, is_alike, is_same, motion_type
 from saltus.studies.diagram.simulated import SimulatedMotions
 
 
@@ -65,7 +65,8 @@ class AttractorsFound:
         """Find the attractors: motions at one value of one period and with the same extrema, or those of the mirror image."""
         rows = np.flatnonzero(self.motions.periodic)
         table = as_chart_motions(self.motions.only(rows))
-        order = np.lexsort((rows, table["other"], table["amplitude"], table["period"], self.motions.value[rows]))
+        seen = (table[name] for name in ("other", "amplitude", "slowest", "period"))
+        order = np.lexsort((rows, *seen, self.motions.value[rows]))
         rows, table = rows[order], table[order]
         fresh = np.ones(len(rows), dtype=bool)
         fresh[1:] = (self.motions.value[rows[1:]] != self.motions.value[rows[:-1]]) | ~is_same(table[1:], table[:-1])
@@ -96,7 +97,7 @@ class AttractorsFound:
         return sorted(runs, key=lambda run: -len(run))
 
     def seeds(self, grid: np.ndarray, known: np.ndarray, since: int) -> tuple[np.ndarray, np.ndarray]:
-        """Further starts, values (n,) and states (n, 2): attractors, at neighbours of their value that have none alike.
+        """Further starts, values (n,) and states (n, d): attractors, at neighbours of their value that have none alike.
 
         Args:
             grid: the values whose neighbours are meant.
@@ -112,8 +113,8 @@ class AttractorsFound:
 
 def as_chart_motions(motions: SimulatedMotions) -> np.ndarray:
     """The motions as records of a chart, whose comparisons they share; all in the cell 0."""
-    table = np.zeros(len(motions), MOTION)
-    for name in ("period", "impact_count", "amplitude"):
+    table = np.zeros(len(motions), motion_type(motions.last.shape[1]))
+    for name in ("period", "impact_count", "amplitude", "slowest"):
         table[name] = getattr(motions, name)
     table["other"], table["state"] = np.minimum(motions.highest, -motions.lowest), motions.last
     return table

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from saltus.attractors import Unsettled
-from saltus.flow import find_recurrence
+from saltus.flow import Motion, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, is_symmetric
 from saltus.studies.diagram.bands import Band, Bands, Edge, EdgeKind
 from saltus.studies.diagram.chaos_search import Seed
@@ -115,13 +115,13 @@ class _Evidence:
         return best
 
     def _attractor(self, value: float) -> np.ndarray:
-        """States of the chaos at a value that was tried, at phase 0, (n, 2)."""
+        """States of the chaos at a value that was tried, at phase 0, (n, d)."""
         tried = self.chaos.tried
         begin = tried.states[np.searchsorted(tried.values, value)]
         begin = begin[np.isfinite(begin).all(axis=1)]
         parameters = {self.chaos.path: np.full(len(begin), value)}
-        states = find_recurrence(self.system, begin, SETTINGS.periods, parameters=parameters).states.reshape(-1, 2)
-        return np.asarray(states[np.isfinite(states).all(axis=1)])
+        states = find_recurrence(self.system, begin, SETTINGS.periods, parameters=parameters).states
+        return np.asarray(states[np.isfinite(states).all(axis=-1)])
 
 
 def _distance(states: np.ndarray, branch: Branch, value: float) -> float:
@@ -153,7 +153,10 @@ def _turns(branch: Branch, special: SpecialPoint) -> bool:
 
 def seeds_of(branches: Sequence[Branch]) -> list[Seed]:
     """The special points of branches at which narrow bands may begin, as `resolve_bands` takes them."""
-    return [Seed(str(special.kind), special.parameter, special.orbit.state) for special in turning_points(branches)]
+    return [
+        Seed(str(special.kind), special.parameter, tuple(special.orbit.section_state.tolist()))
+        for special in turning_points(branches)
+    ]
 
 
 def _is_doubled(period: int, base: int) -> bool:
@@ -171,11 +174,17 @@ def _unstable_at(branch: Branch, value: float) -> list[PeriodicOrbit]:
 
 
 def _section(orbit: PeriodicOrbit) -> np.ndarray:
-    """The states of an orbit at phase 0, and those of its mirror image, (n, 2)."""
+    """The states of an orbit at phase 0, and those of its mirror image, (n, d)."""
     motion, forcing = orbit.motion(orbit.period + 2), orbit.duration / orbit.period
     first = forcing * np.ceil(motion.start / forcing)
     times = first + forcing * np.arange(orbit.period)
-    states = np.stack(motion.at(times), axis=1)
+    states = _at(motion, times)
     if not is_symmetric(orbit.system):
         return states
-    return np.concatenate([states, -np.stack(motion.at(times + 0.5 * forcing), axis=1)])
+    return np.concatenate([states, -_at(motion, times + 0.5 * forcing)])
+
+
+def _at(motion: Motion, times: np.ndarray) -> np.ndarray:
+    """The states of a motion at some times, (n, d)."""
+    position, velocity = motion.at(times)
+    return np.concatenate([np.atleast_2d(position), np.atleast_2d(velocity)]).T

@@ -45,7 +45,7 @@ class Tried:
     error: np.ndarray  # (n,): half width of its 95 % interval
     life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the one that is excluded with 95 %
     period: np.ndarray  # (n,): the longest one of what settles, in forcing periods; 0 where nothing does
-    states: np.ndarray  # (n, k, 2): stroboscopic states of what has not settled, else nan
+    states: np.ndarray  # (n, k, d): stroboscopic states of what has not settled, else nan
 
     @property
     def chaotic(self) -> np.ndarray:
@@ -131,7 +131,7 @@ class Bands:
         value = np.broadcast_to(motions.value[:, None], shown.shape)
         columns = {
             "position": (motions.states[..., 0], "first coordinate at phase 0, in the last forcing periods"),
-            "velocity": (motions.states[..., 1], "its velocity there"),
+            "velocity": (motions.states[..., motions.states.shape[-1] // 2], "its velocity there"),
             "peak": (motions.peaks, "its largest absolute value in each of these periods"),
             "value": (value, self.path),
         }

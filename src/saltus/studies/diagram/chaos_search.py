@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from saltus.attractors import Judged, SettledLater, Unsettled
-from saltus.checks import Rectangle, check_count, check_window
+from saltus.checks import Box, check_count, check_window
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.checks import check_diagram
@@ -27,7 +27,7 @@ class Seed(NamedTuple):
 
     kind: str
     value: float  # of the parameter
-    state: tuple[float, float]  # of its orbit at phase 0
+    state: tuple[float, ...]  # of its orbit at phase 0
 
 
 def _check(
@@ -54,7 +54,7 @@ def chaotic_bands(
     *,
     count: int = 121,
     starts: int = 8,
-    window: Rectangle | None = None,
+    window: Box | None = None,
     seed: int = 0,
     special: Iterable[Seed] = (),
     progress: Progress = silent,
@@ -69,7 +69,7 @@ def chaotic_bands(
     the next value, are not.
 
     Args:
-        system: what moves, with one coordinate, under a load with a frequency.
+        system: what moves, under a load with a frequency.
         path, bounds: dotted path of the parameter, and its range.
         count: of values, evenly from the first bound to the last, at least 2.
         starts, window, seed: initial states, as `search_orbits` takes them.
@@ -85,7 +85,7 @@ def chaotic_bands(
         0
     """
     values, area = np.linspace(*bounds, count), check_window(window, system)
-    states = starts_at(system, values, starts, area, seed).reshape(-1, 2)
+    states = starts_at(system, values, starts, area, seed).reshape(-1, system.dimension)
     first = part_of(progress, 0.0, 0.2, "looking for chaos")
     begun = DiagramWork(system, path).simulate(np.repeat(values, starts), states, SETTINGS.settling, first)
     return resolve_bands(system, path, bounds, begun, special, progress=part_of(progress, 0.2, 1.0))[0]
@@ -136,7 +136,7 @@ class _Place:
     period: int = field(default=0, compare=False)  # of what settles slowly, or on a long period
     care: int = field(default=0, compare=False)  # number of the judgement that the verdict is of
     settled: int = field(default=0, compare=False)  # companions that settled in it
-    chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 2)), compare=False)  # (n, 2): states of what is unsettled
+    chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 2)), compare=False)  # (n, d): states of what is unsettled
     orbits: list[tuple[int, int, float, np.ndarray]] = field(default_factory=list, compare=False)
 
     @property
@@ -172,10 +172,11 @@ class _Place:
         self.orbits.append((period, impacts, amplitude, state))
 
     def starts(self, seeds: int, orbits: int) -> np.ndarray:
-        """States from which motions at neighbouring values are begun, (n, 2)."""
+        """States from which motions at neighbouring values are begun, (n, d)."""
         unsettled = len(self.chaos) > 0 and (self.chaotic or not self.orbits)
         chosen = self.chaos[np.linspace(0, len(self.chaos) - 1, seeds).astype(int)] if unsettled else self.chaos[:0]
-        return np.concatenate([chosen, *(orbit[3][None] for orbit in self.orbits[:orbits])])
+        settled = [orbit[3][None] for orbit in self.orbits[:orbits]]
+        return np.concatenate([*([chosen] if len(chosen) or not settled else []), *settled])
 
 
 @dataclass
@@ -199,10 +200,10 @@ class _BandSearch:
         return self.places[at]
 
     def look(self, values: Sequence[float], starts: Sequence[np.ndarray], care: int = 0) -> None:
-        """Follow motions from states (n, 2) of each value's own, and judge those that do not settle."""
+        """Follow motions from states (n, d) of each value's own, and judge those that do not settle."""
         column = np.repeat(np.asarray(values, dtype=float), [len(states) for states in starts])
         if len(column):
-            states = np.concatenate(starts)
+            states = np.concatenate([some for some in starts if len(some)])
             self.take(self.work.simulate(column, states, self.settings.settling), care)
 
     def take(self, motions: SimulatedMotions, care: int = 0) -> None:
@@ -218,10 +219,10 @@ class _BandSearch:
         states = np.full((len(values), most, *last.shape[1:]), np.nan)
         for i in range(len(values)):
             states[i, : np.count_nonzero(row == i)] = last[row == i]
-        self._judge(values, states.reshape(len(values), -1, 2), care)
+        self._judge(values, states.reshape(len(values), -1, states.shape[-1]), care)
 
     def _judge(self, values: np.ndarray, states: np.ndarray, care: int) -> None:
-        """Judge what has not settled at these values, of which states (n, m, 2) are given, and follow what then settles."""
+        """Judge what has not settled at these values, of which states (n, m, d) are given, and follow what then settles."""
         judged = self.work.judge(values, states, self.settings.judgements[care])
         for row, value in enumerate(values):
             self.place(float(value)).judge(judged, row, care)
@@ -272,7 +273,8 @@ class _BandSearch:
         """Motions at the middles of intervals, begun on those at both ends."""
         middles = [0.5 * (a.value + b.value) for a, b in pairs]
         few = (self.settings.seeds, self.settings.neighbours)
-        self.look(middles, [np.concatenate([a.starts(*few), b.starts(*few)]) for a, b in pairs], care)
+        begun = [[some for some in (a.starts(*few), b.starts(*few)) if len(some)] for a, b in pairs]
+        self.look(middles, [np.concatenate(some) if some else np.empty((0, 2)) for some in begun], care)
         for (a, b), middle in zip(pairs, middles, strict=True):
             self.place(middle)  # also where there is nothing to begin with: all that moves at both ends comes to rest
             self.carried.update(((a.value, middle), (b.value, middle)))
@@ -345,7 +347,7 @@ class _BandSearch:
     def tried(self) -> Tried:
         """What became of motions at all values."""
         most = max(judgement.companions for judgement in self.settings.judgements)
-        states = np.full((len(self.places), most, 2), np.nan)
+        states = np.full((len(self.places), most, self.work.system.dimension), np.nan)
         for row, place in enumerate(self.places):
             states[row, : len(place.chaos)] = place.chaos
         return Tried(

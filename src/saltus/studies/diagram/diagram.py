@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Rectangle, check_bounds, check_count, check_step, check_window
+from saltus.checks import Box, check_bounds, check_count, check_step, check_window
 from saltus.errors import ParameterError
 from saltus.orbits import STEP
 from saltus.progress import Progress, part_of, silent
@@ -79,7 +79,7 @@ def bifurcation_diagram(
     max_period: int = 6,
     values: Iterable[float] | None = None,
     starts: int | None = None,
-    window: Rectangle | None = None,
+    window: Box | None = None,
     seed: int = 0,
     repelling: int = 1,
     switch: bool = True,

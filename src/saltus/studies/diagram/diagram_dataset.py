@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.branch_tables import branch_tables
+from saltus.flow import state_names
 from saltus.orbits import Branch, PeriodicOrbit, RestingOrbit, closing_rows
 from saltus.provenance import provenance
 from saltus.studies.diagram.attractors_found import Place
@@ -44,7 +45,7 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
         system,
         seed=search.seed,
         path=path,
-        coordinate=system.model.coordinates[0],
+        coordinate=" ".join(system.model.coordinates),
         bounds=list(bounds),
         limits=_limits(system, path, bounds),
         window=np.ravel(search.window).tolist(),
@@ -144,8 +145,7 @@ def _dots(search: DiagramSearch, rows: np.ndarray) -> xarray.Dataset:
     import xarray
 
     motions, model = search.found.motions.only(rows), search.system.model
-    coordinate = model.coordinates[0]
-    angle = {"units": model.unit_of(coordinate)}
+    angle = {"units": model.unit_of(model.coordinates[0])}
     columns: dict[str, tuple[np.ndarray, dict[str, str]]] = {
         "parameter": (motions.value, {"long_name": search.path}),
         "amplitude": (motions.amplitude, angle),
@@ -153,9 +153,9 @@ def _dots(search: DiagramSearch, rows: np.ndarray) -> xarray.Dataset:
         "lowest": (motions.lowest, angle),
         "period": (motions.period, {"long_name": "forcing periods after which it repeats"}),
         "impact_count": (motions.impact_count, {"long_name": "impacts in them"}),
-        coordinate: (motions.last[:, 0], angle | {"long_name": f"{coordinate} at phase 0"}),
-        "velocity": (motions.last[:, 1], angle | {"long_name": f"d {coordinate} / d tau at phase 0"}),
     }
+    for i, name in enumerate(state_names(model.coordinates)):
+        columns[name] = motions.last[:, i], angle | {"long_name": f"{name} at phase 0"}
     return xarray.Dataset({name: ("dot", *column) for name, column in columns.items()})
 
 

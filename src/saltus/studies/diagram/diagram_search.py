@@ -80,11 +80,11 @@ class DiagramSearch:
     def simulate(self, progress: Progress = silent) -> None:
         """The simulation of the diagram: motions from the starts at every value of the grid."""
         states = starts_at(self.system, self.grid, self.effort.starts, self.window, self.seed)
-        motions = self.simulated(np.repeat(self.grid, self.effort.starts), states.reshape(-1, 2), progress)
+        motions = self.simulated(np.repeat(self.grid, self.effort.starts), states.reshape(-1, self.system.dimension), progress)
         self.found = AttractorsFound(motions, self.branches.max_period)
 
     def simulated(self, values: np.ndarray, states: np.ndarray, progress: Progress = silent) -> SimulatedMotions:
-        """Motions from states (n, 2) at values (n,), as long as the effort says."""
+        """Motions from states (n, d) at values (n,), as long as the effort says."""
         return self.work.simulate(values, states, self.effort.periods, progress)
 
     @property
@@ -177,11 +177,12 @@ class DiagramSearch:
         begin = starts_at(self.system, grid, self.effort.starts, self.window, self.seed)
         columns = {self.path: np.repeat(grid, self.effort.starts)}
         options = {"periods": SETTINGS.transient, "last": "all", "tol": 1e-10}
-        early = stroboscopic(self.system, motions_from(self.system, begin.reshape(-1, 2), parameters=columns, **options))
-        motions, shape = self.found.motions, (len(grid), self.effort.starts, -1, 2)
+        d, motions = self.system.dimension, self.found.motions
+        early = stroboscopic(self.system, motions_from(self.system, begin.reshape(-1, d), parameters=columns, **options))
+        shape = (len(grid), self.effort.starts, -1, d)
         late = [motions.only((motions.value == value) & motions.unsettled).states for value in grid]
         states = np.concatenate([early.reshape(shape), _filled(late, self.effort.starts, SETTINGS.transient)], axis=1)
-        known = [motions.only((motions.value == value) & motions.periodic).states.reshape(-1, 2) for value in grid]
+        known = [motions.only((motions.value == value) & motions.periodic).states.reshape(-1, d) for value in grid]
         known = [states[np.isfinite(states).all(axis=1)] for states in known]
         orbits = orbits_near_returns(self.system, self.path, grid, states, known, max_period)
         for orbit in sorted(orbits, key=lambda orbit: orbit.period):
@@ -191,7 +192,7 @@ class DiagramSearch:
         """Start motions from those of neighbouring values and from the ends of stable parts of branches until nothing is new."""
         since, ended = 0, 0
         for number in range(SETTINGS.rounds):
-            known = stable_motions(self.branches.placed, self.grid)
+            known = stable_motions(self.branches.placed, self.grid, self.system.dimension)
             values, states = self.found.seeds(self.grid, known, since)
             more_values, more_states = self._beyond_ends(self.branches.placed[ended:] if number < self.effort.jumps else [])
             since, ended = len(self.found.motions), len(self.branches.placed)
@@ -202,16 +203,16 @@ class DiagramSearch:
 
     def _beyond_ends(self, branches: list[PlacedBranch]) -> tuple[np.ndarray, np.ndarray]:
         """Values and states of starts beyond the ends of stable parts of branches."""
-        found: list[tuple[float, tuple[float, float]]] = []
+        found: list[tuple[float, np.ndarray]] = []
         low, high = self.bounds
         for branch in branches:
             stable = branch.columns[3] > 0
             for last in np.flatnonzero(stable & ~(np.append(stable[1:], True) & np.append(True, stable[:-1]))):
                 value, orbit = float(branch.columns[0, last]), branch.branch.points[last].orbit
                 steps = [side * share * (high - low) for share in SETTINGS.beyond for side in (-1.0, 1.0)]
-                found += [(value + step, orbit.state) for step in steps if low <= value + step <= high]
+                found += [(value + step, orbit.section_state) for step in steps if low <= value + step <= high]
         values = np.array([value for value, _ in found], dtype=float)
-        return values, np.array([state for _, state in found], dtype=float).reshape(-1, 2)
+        return values, np.array([state for _, state in found], dtype=float).reshape(-1, self.system.dimension)
 
     def look_for_chaos(self, progress: Progress) -> None:
         """Find the bands of chaos, and follow what settles in windows within them."""
@@ -245,7 +246,7 @@ class DiagramSearch:
         """Motions from random states of the window at random values, from a seed of their own."""
         rng = np.random.default_rng([self.seed, number, self.effort.sample])
         values = rng.uniform(*self.bounds, self.effort.sample)
-        points = rng.uniform(-1.0, 1.0, (self.effort.sample, 2))
+        points = rng.uniform(-1.0, 1.0, (self.effort.sample, len(self.window)))
         return self.simulated(values, within_window(self.system, points, self.window))
 
     def _in_bands(self, values: np.ndarray) -> np.ndarray:
@@ -260,8 +261,8 @@ def _middle(run: np.ndarray) -> int:
 
 
 def _filled(groups: list[np.ndarray], count: int, kept: int) -> np.ndarray:
-    """The last states (k, kept, 2) of up to `count` motions of each group, filled up with nan, (groups, count, kept, 2)."""
-    result = np.full((len(groups), count, kept, 2), np.nan)
+    """The last states (k, kept, d) of up to `count` motions of each group, filled up with nan, (groups, count, kept, d)."""
+    result = np.full((len(groups), count, kept, groups[0].shape[-1]), np.nan)
     for row, states in enumerate(groups):
         chosen = states[:count, -kept:]
         result[row, : len(chosen)] = chosen

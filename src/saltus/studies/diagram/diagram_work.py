@@ -38,7 +38,15 @@ if TYPE_CHECKING:
 
 HERE = "saltus.studies.diagram.diagram_work"
 KEPT = SETTINGS.kept
-NUMBERS = ("periods", "outcome", "period", "impact_count", "highest", "lowest")  # of a motion, one each, before its states
+NUMBERS = (
+    "periods",
+    "outcome",
+    "period",
+    "impact_count",
+    "highest",
+    "lowest",
+    "slowest",
+)  # of a motion, one each, before its states
 JUDGED = ("verdict", "doubt", "exponent", "error", "gone", "life", "period")  # of a judgement
 WHOLE = (*NUMBERS[1:4], "verdict", "doubt", "gone")  # which of these are whole numbers
 COMPANIONS = JUDGEMENT.companions  # the most states that are kept of a judgement
@@ -79,8 +87,12 @@ class DiagramWork:
     ended: dict[tuple[float, ...], tuple[int, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for given, row in () if self.parts is None else self.parts.remembered(_parts()["motions"]):
+        for given, row in () if self.parts is None else self.parts.remembered(self._kinds["motions"]):
             self._note(given, row)
+
+    @property
+    def _kinds(self) -> dict[str, Any]:
+        return _parts(self.system.dimension)
 
     def simulate(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent) -> SimulatedMotions:
         """`simulate_from` states at values of the parameter."""
@@ -91,10 +103,10 @@ class DiagramWork:
             return followed(self.system, self.path, values, states, periods, progress)
         begun = np.column_stack([values, states]).tolist()
         inputs = [[*row, self._time(tuple(row), periods)] for row in begun]
-        rows = self.parts.rows(_parts()["motions"], inputs, progress)
+        rows = self.parts.rows(self._kinds["motions"], inputs, progress)
         for given, row in zip(inputs, rows, strict=True):
             self._note(given, row)
-        return _motions(values, np.array(rows))
+        return _motions(values, np.array(rows), self.system.dimension)
 
     def _time(self, begun: tuple[float, ...], periods: int) -> int:
         """The time that a motion was given that is known to end within `periods`, as it does so however much it is given."""
@@ -103,42 +115,43 @@ class DiagramWork:
 
     def _note(self, given: list[float], row: np.ndarray) -> None:
         if row[1] in (Outcome.REST, Outcome.PERIODIC, Outcome.ENDED):
-            self.ended.setdefault(tuple(given[:3]), (int(given[3]), float(row[0])))
+            self.ended.setdefault(tuple(given[:-1]), (int(given[-1]), float(row[0])))
 
     def judge(self, values: np.ndarray, states: np.ndarray, settings: JudgementSettings) -> Judged:
-        """`judge_unsettled` of states (n, m, 2) at values (n,) of the parameter."""
+        """`judge_unsettled` of states (n, m, d) at values (n,) of the parameter."""
         if self.parts is None:
             found = judge_unsettled(self.system, states, {self.path: values}, settings=settings)
             return replace(found, settled=_some(found.settled))
         numbers = asdict(settings)
         given = [of_one[np.isfinite(of_one).all(axis=-1)].tolist() for of_one in states]
         inputs = [{"value": v, "states": s, "settings": numbers} for v, s in zip(values.tolist(), given, strict=True)]
-        return _judged(np.array(self.parts.rows(_parts()["judgements"], inputs)), settings.companions)
+        return _judged(np.array(self.parts.rows(self._kinds["judgements"], inputs)), settings.companions, self.system.dimension)
 
     def follow(self, requests: Sequence[Request]) -> list[list[Branch]]:
         """The branches of each request, those that are not known `at_once`."""
         if self.parts is None:
             return [request.branches(self.path) for request in requests]
-        texts = self.parts.texts(_parts()["branches"], [request.to_json() for request in requests])
+        texts = self.parts.texts(self._kinds["branches"], [request.to_json() for request in requests])
         return [from_bytes(text) if text else request.branches(self.path) for request, text in zip(requests, texts, strict=True)]
 
     def prepare(self, requests: Sequence[Request]) -> None:
         """Compute branches that may be asked for, at once, if there is somebody to do so."""
         if self.at_once > 1 and self.parts is not None:
-            self.parts.rows(_parts()["branches"], [request.to_json() for request in requests])
+            self.parts.rows(self._kinds["branches"], [request.to_json() for request in requests])
 
     def distances(self, starts: np.ndarray) -> np.ndarray:
         """`closing_distances` of orbits, (n,), of rows as `closing_rows` gives them."""
         if self.parts is None or not len(starts):
             return closing_distances(self.system, self.path, starts)
-        return np.array(self.parts.rows(_parts()["distances"], starts.tolist()))[:, 0]
+        return np.array(self.parts.rows(self._kinds["distances"], starts.tolist()))[:, 0]
 
 
-def _parts() -> dict[str, Any]:
-    """The kinds of parts."""
+def _parts(dimension: int) -> dict[str, Any]:
+    """The kinds of parts, for states of so many variables."""
     from saltus.sweep import Part
 
-    numbers, judged = len(NUMBERS) + 2 + 3 * KEPT, len(JUDGED) + 2 * COMPANIONS + 3 * SETTLED
+    numbers = len(NUMBERS) + dimension + (dimension + 1) * KEPT
+    judged = len(JUDGED) + dimension * COMPANIONS + (dimension + 1) * SETTLED
     kinds = [
         Part("motions", f"{HERE}:motions", numbers, chunk=1000),
         Part("judgements", f"{HERE}:judgements", judged, chunk=64),
@@ -210,47 +223,49 @@ def _given(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> tuple[Syst
 
 
 def motions(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """How motions from [value, coordinate, velocity] end within so many forcing periods, the fourth number."""
+    """How motions from [value, coordinates, velocities] end within so many forcing periods, the last number."""
     system, inputs = _given(arguments, block)
     begun = np.array(inputs, dtype=float)
-    result = np.empty((len(begun), len(NUMBERS) + 2 + 3 * KEPT))
-    for periods in np.unique(begun[:, 3]):
-        rows = begun[:, 3] == periods
-        found = followed(system, arguments["path"], begun[rows, 0], begun[rows, 1:3], int(periods))
+    d = system.dimension
+    result = np.empty((len(begun), len(NUMBERS) + d + (d + 1) * KEPT))
+    for periods in np.unique(begun[:, -1]):
+        rows = begun[:, -1] == periods
+        found = followed(system, arguments["path"], begun[rows, 0], begun[rows, 1:-1], int(periods))
         columns = [getattr(found, name)[:, None] for name in NUMBERS]
         result[rows] = np.concatenate([*columns, found.last, found.states.reshape(len(found), -1), found.peaks], axis=1)
     return {"result": result}
 
 
-def _motions(values: np.ndarray, rows: np.ndarray) -> SimulatedMotions:
+def _motions(values: np.ndarray, rows: np.ndarray, d: int) -> SimulatedMotions:
     """Motions as they were kept."""
     rows = rows.reshape(len(values), -1)
     n, columns = len(NUMBERS), dict(zip(NUMBERS, rows.T, strict=False))
     columns |= {name: columns[name].astype(int) for name in NUMBERS if name in WHOLE}
     columns["outcome"] = columns["outcome"].astype(np.int8)
-    columns |= {"value": np.array(values, dtype=float), "last": rows[:, n : n + 2].copy()}
-    states, peaks = np.split(rows[:, n + 2 :], [2 * KEPT], axis=1)
-    return SimulatedMotions(states=states.reshape(-1, KEPT, 2), peaks=peaks, **columns)
+    columns |= {"value": np.array(values, dtype=float), "last": rows[:, n : n + d].copy()}
+    states, peaks = np.split(rows[:, n + d :], [d * KEPT], axis=1)
+    return SimulatedMotions(states=states.reshape(-1, KEPT, d), peaks=peaks, **columns)
 
 
 def judgements(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """The judgements of what has not settled at values of the parameter, all by the same settings."""
     system, inputs = _given(arguments, block)
-    result = np.full((len(inputs), len(JUDGED) + 2 * COMPANIONS + 3 * SETTLED), np.nan)
+    d = system.dimension
+    result = np.full((len(inputs), len(JUDGED) + d * COMPANIONS + (d + 1) * SETTLED), np.nan)
     numbers = inputs[0]["settings"]
     settings = JudgementSettings(**numbers | {"runs": tuple(numbers["runs"])})
     assert settings.companions <= COMPANIONS, "rows have room for so many"
-    states = np.full((len(inputs), max(len(given["states"]) for given in inputs), 2), np.nan)
+    states = np.full((len(inputs), max(len(given["states"]) for given in inputs), d), np.nan)
     for to_fill, given in zip(states, inputs, strict=True):
         to_fill[: len(given["states"])] = given["states"]
     found = judge_unsettled(system, states, {arguments["path"]: np.array([g["value"] for g in inputs])}, settings=settings)
     n, later = len(JUDGED), _some(found.settled)
     result[:, :n] = np.stack([getattr(found, name) for name in JUDGED], axis=1)
-    result[:, n : n + 2 * settings.companions] = found.states.reshape(len(inputs), -1)
+    result[:, n : n + d * settings.companions] = found.states.reshape(len(inputs), -1)
     for row in range(len(inputs)):
         own = later.question == row
         settled = np.column_stack([later.period[own], later.state[own]])
-        result[row, n + 2 * COMPANIONS :][: settled.size] = settled.ravel()
+        result[row, n + d * COMPANIONS :][: settled.size] = settled.ravel()
     return {"result": result}
 
 
@@ -270,14 +285,14 @@ def _pairs(question: np.ndarray, period: np.ndarray) -> np.ndarray:
     return np.asarray(question * (1 + period.max(initial=0)) + period)
 
 
-def _judged(rows: np.ndarray, companions: int) -> Judged:
+def _judged(rows: np.ndarray, companions: int, d: int) -> Judged:
     """Judgements as they were kept."""
     n, columns = len(JUDGED), dict(zip(JUDGED, rows.T, strict=False))
     columns |= {name: columns[name].astype(int) for name in JUDGED if name in WHOLE}
-    settled = rows[:, n + 2 * COMPANIONS :].reshape(len(rows), SETTLED, 3)
+    settled = rows[:, n + d * COMPANIONS :].reshape(len(rows), SETTLED, d + 1)
     question, place = np.nonzero(np.isfinite(settled[..., 0]))
     later = SettledLater(question, settled[question, place, 1:], settled[question, place, 0].astype(int))
-    return Judged(states=rows[:, n : n + 2 * companions].reshape(len(rows), -1, 2), settled=later, **columns)
+    return Judged(states=rows[:, n : n + d * companions].reshape(len(rows), -1, d), settled=later, **columns)
 
 
 def branches(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:

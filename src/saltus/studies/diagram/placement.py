@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from saltus.orbits import Branch, PeriodicOrbit, same_orbit
-from saltus.studies.chart.motions import MOTION
+from saltus.studies.chart.motions import motion_type
 from saltus.studies.diagram.simulated import SimulatedMotions
 
 
@@ -27,6 +27,7 @@ class PlacementSettings:
 
 
 SETTINGS = PlacementSettings()
+SEEN = [1, 2, 6]  # the columns of a branch by which motions are compared with it
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +38,12 @@ class PlacedBranch:
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """Parameter, highest, lowest, stability, period and impacts of each point, (6, n)."""
+        """Parameter, highest, lowest, stability, period, impacts and slowest impact of each point, (7, n)."""
         rows = [
-            (value, o.highest, o.lowest, o.stable, o.period, o.signature.impact_count)
+            (value, o.highest, o.lowest, o.stable, o.period, o.signature.impact_count, _slowest(o))
             for value, o in zip(self.branch.parameters.tolist(), self.branch.orbits, strict=True)
         ]
-        return np.array(rows, dtype=float).reshape(-1, 6).T
+        return np.array(rows, dtype=float).reshape(-1, 7).T
 
     @cached_property
     def joined(self) -> np.ndarray:
@@ -62,13 +63,13 @@ class PlacedBranch:
         return rows, before
 
     def extrema(self, value: float, before: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Highest and lowest coordinate at a value after the point of this number: read off, uncertainty, change to the next.
+        """Extrema and slowest impact at a value after the point of this number: read off, uncertainty, change to the next.
 
         The uncertainty is inf where the parameter turns, or where too few points are joined.
         """
         first = max(0, before - 1)
         last = min(before + 2, len(self.columns[0]) - 1)
-        parameter, extrema = self.columns[0, first : last + 1], self.columns[1:3, first : last + 1]
+        parameter, extrema = self.columns[0, first : last + 1], self.columns[SEEN, first : last + 1]
         a, b = before - first, before - first + 1
         change = np.abs(extrema[:, b] - extrema[:, a])
         width = parameter[b] - parameter[a]
@@ -76,13 +77,13 @@ class PlacedBranch:
         straight = extrema[:, a] + share * (extrema[:, b] - extrema[:, a])
         steps = np.diff(parameter)
         if last - first < 3 or not self.joined[first:last].all() or not ((steps > 0).all() or (steps < 0).all()):
-            return straight, np.full(2, np.inf), change
+            return straight, np.full(len(SEEN), np.inf), change
         cubic, quadratic = _lagrange(parameter, extrema, value), _lagrange(parameter[:3], extrema[:, :3], value)
         return cubic, np.abs(cubic - quadratic), change
 
     def holds(self, orbit: PeriodicOrbit, value: float) -> bool:
         """Whether an orbit at a value, stable or not, or its mirror image, lies on the branch."""
-        seen = np.array([orbit.highest, orbit.lowest])
+        seen = _seen(orbit)
         for before in self.crossings(np.array([value]), stable=False)[1].tolist():
             expected, _, change = self.extrema(value, before)
             near = SETTINGS.near * max(orbit.amplitude, SETTINGS.least) + 2.0 * change.max()
@@ -102,24 +103,35 @@ class PlacedBranch:
 
 
 def _lagrange(nodes: np.ndarray, values: np.ndarray, at: float) -> np.ndarray:
-    """The polynomial through values (2, n) at nodes (n,)."""
+    """The polynomial through values (k, n) at nodes (n,)."""
     others = [np.delete(nodes, i) for i in range(len(nodes))]
     return np.asarray(
         values @ np.array([np.prod((at - other) / (node - other)) for node, other in zip(nodes, others, strict=True)])
     )
 
 
-def stable_motions(branches: list[PlacedBranch], grid: np.ndarray) -> np.ndarray:
+def _slowest(orbit: PeriodicOrbit) -> float:
+    """The least speed of an impact of an orbit with several contacts, 0 without impacts; else 0, as motions have it."""
+    return orbit.slowest if orbit.system.model.contacts and np.isfinite(orbit.slowest) else 0.0
+
+
+def _seen(orbit: PeriodicOrbit) -> np.ndarray:
+    """What motions and orbits are compared by: the extrema and the slowest impact."""
+    return np.array([orbit.highest, orbit.lowest, _slowest(orbit)])
+
+
+def stable_motions(branches: list[PlacedBranch], grid: np.ndarray, dimension: int) -> np.ndarray:
     """The stable orbits of branches at the values of a grid, roughly, as records of a chart; their states are nan."""
-    parts = [np.zeros(0, MOTION)]
+    record = motion_type(dimension)
+    parts = [np.zeros(0, record)]
     for branch in branches:
         cells, before = branch.crossings(grid)
-        part = np.zeros(len(cells), MOTION)
-        extrema = np.array([branch.extrema(grid[c], b)[0] for c, b in zip(cells, before, strict=True)]).reshape(-1, 2)
+        part = np.zeros(len(cells), record)
+        extrema = np.array([branch.extrema(grid[c], b)[0] for c, b in zip(cells, before, strict=True)]).reshape(-1, len(SEEN))
         part["cell"], part["state"] = cells, np.nan
-        part["period"], part["impact_count"] = branch.columns[4:, before]
+        part["period"], part["impact_count"] = branch.columns[4:6, before]
         part["amplitude"] = np.maximum(extrema[:, 0], -extrema[:, 1])
-        part["other"] = np.minimum(extrema[:, 0], -extrema[:, 1])
+        part["other"], part["slowest"] = np.minimum(extrema[:, 0], -extrema[:, 1]), extrema[:, 2]
         parts.append(part)
     return np.concatenate(parts)
 
@@ -143,7 +155,7 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
 
 def _is_at(motions: SimulatedMotions, row: int, branch: PlacedBranch, before: int, mirrored: bool) -> bool:
     """Whether a motion is the stable orbit of a branch after the point of this number."""
-    value, seen = float(motions.value[row]), np.array([motions.highest[row], motions.lowest[row]])
+    value, seen = float(motions.value[row]), np.array([motions.highest[row], motions.lowest[row], motions.slowest[row]])
     size = max(float(motions.amplitude[row]), SETTINGS.least)
     expected, uncertain, change = branch.extrema(value, before)
     apart = _apart(seen, expected, mirrored)
@@ -155,10 +167,11 @@ def _is_at(motions: SimulatedMotions, row: int, branch: PlacedBranch, before: in
     orbit = branch.solved(value, before)
     if orbit is None or not (orbit.stable or both_stable):
         return False
-    return _apart(seen, np.array([orbit.highest, orbit.lowest]), mirrored) < SETTINGS.same * size
+    return _apart(seen, _seen(orbit), mirrored) < SETTINGS.same * size
 
 
 def _apart(seen: np.ndarray, expected: np.ndarray, mirrored: bool) -> float:
-    """How far two pairs of extrema are apart, (highest, lowest)."""
+    """How far two motions are apart, (highest, lowest, slowest impact)."""
     apart = float(np.abs(seen - expected).max())
-    return min(apart, float(np.abs(seen + expected[::-1]).max())) if mirrored else apart
+    image = np.array([-expected[1], -expected[0], expected[2]])
+    return min(apart, float(np.abs(seen - image).max())) if mirrored else apart

@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.checks import Window
 from saltus.flow import Outcome, Recurrence, find_recurrence, return_distances
-from saltus.orbits import EVEN, within_window
+from saltus.orbits import even_steps, is_still, within_window
 from saltus.progress import Progress, silent
 from saltus.systems import System
 
@@ -41,13 +41,14 @@ class SimulatedMotions:
 
     value: np.ndarray  # (n,) of the parameter
     periods: np.ndarray  # (n,): forcing periods that it was followed, when last it was
-    last: np.ndarray  # (n, 2): coordinate and velocity at the end, at phase 0
+    last: np.ndarray  # (n, d): coordinates and velocities at the end, at phase 0
     outcome: np.ndarray  # (n,): an `Outcome`
     period: np.ndarray  # (n,): forcing periods after which it repeats itself; 0 where it does not
     impact_count: np.ndarray  # (n,): impacts in one period; in those that are kept where it has none
     highest: np.ndarray  # (n,): largest coordinate over its period, or those that are kept
     lowest: np.ndarray  # (n,): the least one
-    states: np.ndarray  # (n, kept, 2): its last stroboscopic states, of a periodic motion those of one period; else nan
+    slowest: np.ndarray  # (n,): with several contacts the least speed of an impact; else 0
+    states: np.ndarray  # (n, kept, d): its last stroboscopic states, of a periodic motion those of one period; else nan
     peaks: np.ndarray  # (n, kept): max abs of the coordinate in each of these periods
 
     def __len__(self) -> int:
@@ -87,16 +88,17 @@ Follow = Callable[[np.ndarray, np.ndarray, int, Progress], SimulatedMotions]
 
 
 def starts_at(system: System, values: np.ndarray, count: int, window: Window, seed: int) -> np.ndarray:
-    """(values, count, 2): states spread over the window at each value, every other one drawn in towards the contact.
+    """(values, count, d): states spread over the window at each value, every other one drawn in towards the contact.
 
     Those of a value follow from the seed and the value alone, and more of them begin with the fewer: a finer grid or more starts
     only adds to what was simulated. Their union over the values is dense in the window.
     """
     bits = np.ascontiguousarray(values, dtype="<f8").view("<u4").reshape(len(values), 2)
-    offsets = np.array([np.random.default_rng([seed, *pair]).random(3) for pair in bits.tolist()]).reshape(-1, 1, 3)
+    size, steps = len(window) + 1, even_steps(len(window))
+    offsets = np.array([np.random.default_rng([seed, *pair]).random(size) for pair in bits.tolist()]).reshape(-1, 1, size)
     number = np.arange(1, count + 1)
-    points = 2.0 * ((offsets[..., :2] + number[:, None] * EVEN) % 1.0) - 1.0
-    share = SETTINGS.innermost ** ((offsets[..., 2] + number * EVEN[0]) % 1.0)
+    points = 2.0 * ((offsets[..., :-1] + number[:, None] * steps) % 1.0) - 1.0
+    share = SETTINGS.innermost ** ((offsets[..., -1] + number * steps[0]) % 1.0)
     inner = np.where(number % 2 == 0, share, 1.0)[..., None]
     return within_window(system, points, window, inner)
 
@@ -110,7 +112,7 @@ def simulate_from(
     progress: Progress = silent,
     follow: Follow | None = None,
 ) -> SimulatedMotions:
-    """Follow motions from states (n, 2) at phase 0 at values (n,) of the parameter until they settle or the time is up.
+    """Follow motions from states (n, d) at phase 0 at values (n,) of the parameter until they settle or the time is up.
 
     `follow` is what `followed` of the system along the path gives, where it is computed elsewhere.
     """
@@ -127,7 +129,7 @@ def simulate_from(
 def followed(
     system: System, path: str, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent
 ) -> SimulatedMotions:
-    """Follow motions from states (n, 2) at values (n,) for so many forcing periods at most, each whatever the others are."""
+    """Follow motions from states (n, d) at values (n,) for so many forcing periods at most, each whatever the others are."""
     ends = find_recurrence(
         system,
         states,
@@ -137,6 +139,7 @@ def followed(
         kept=SETTINGS.kept,
         extrema=True,
         impact_count=True,
+        speed=bool(system.model.contacts),
         tol=SETTINGS.tol,
         progress=progress,
     )
@@ -146,11 +149,9 @@ def followed(
 def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedMotions:
     """The motions as they have ended; those that stay at the contact are at rest."""
     assert ends.extrema is not None
-    contact = float(system.model.contact) if system.model.sides else 0.0
     highest, lowest = ends.highest, ends.lowest
     period, outcome = ends.period.copy(), ends.outcome.copy()
-    still = np.maximum(np.abs(highest - contact), np.abs(lowest - contact)) <= SETTINGS.still
-    still &= (period > 0) | (outcome == Outcome.MOVING)
+    still = is_still(system, highest, lowest, SETTINGS.still) & ((period > 0) | (outcome == Outcome.MOVING))
     outcome[still], period[still] = Outcome.HELD, 0
     shown = ends.within_period & ~ends.rest[:, None]
     return SimulatedMotions(
@@ -162,6 +163,7 @@ def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedM
         impact_count=ends.impact_count,
         highest=highest,
         lowest=lowest,
+        slowest=np.zeros(len(ends)) if ends.speeds is None else ends.slowest,
         states=np.where(shown[..., None], ends.states, np.nan),
         peaks=np.where(shown, np.abs(ends.extrema).max(axis=2), np.nan),
     )

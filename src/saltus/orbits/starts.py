@@ -1,0 +1,114 @@
+"""Initial states: spread evenly over a window, where the contacts let the system be."""
+
+from __future__ import annotations
+
+import itertools
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import Window
+from saltus.systems import System
+
+ROUNDING = 1e-13  # A gap that is open, and moves, by less than this is closed but for rounding.
+
+
+@cache
+def even_steps(dimension: int) -> np.ndarray:
+    """Steps that cover a cube of so many dimensions d evenly: x^-1, x^-2, ..., of the root x of x^(d + 1) = x + 1."""
+    root = 2.0
+    for _ in range(200):  # each halves the error at least
+        root = (1.0 + root) ** (1.0 / (dimension + 1))
+    steps: np.ndarray = root ** -np.arange(1.0, dimension + 1.0)
+    return steps
+
+
+def initial_states(system: System, count: int, window: Window, seed: int) -> np.ndarray:
+    """(count, d): coordinates and velocities spread over a window, as `within_window` lays them there."""
+    offset = np.random.default_rng(int(seed)).random(len(window))
+    steps = even_steps(len(window))
+    return within_window(system, 2.0 * ((offset + np.arange(1, count + 1)[:, None] * steps) % 1.0) - 1.0, window)
+
+
+def within_window(system: System, points: np.ndarray, window: Window, shrunk: Any = 1.0) -> np.ndarray:
+    """The states (..., n, d) at points of the cube (-1, 1)^d laid over a window, drawn in towards the contact by a factor.
+
+    Those beyond a contact are reflected at it. Where closed contacts leave some coordinates free, the starts take turns, by two:
+    all open, then with each choice of coordinates held at their nearest contacts, if these lie in the window. Motions with a
+    closed contact would otherwise have no starts, as they have no share of the window's volume.
+    """
+    rest = rest_state(system)
+    states = np.asarray((points * window.half + (window.centre - rest)) * shrunk + rest)
+    model = system.model
+    if len(model.sides) == 1:
+        inward = np.sign(float(model.gap(model.contact + 1.0, model.sides[0])))
+        states[..., 0] = rest[0] + inward * np.abs(states[..., 0] - rest[0])
+    return _held(system, on_this_side(system, states), window) if model.contacts else states
+
+
+def rest_state(system: System) -> np.ndarray:
+    """Where the system is at its contacts without speed, (d,); 0 without a contact, the middle between two of a coordinate."""
+    model, names = system.model, system.model.coordinates
+    state = np.zeros(2 * len(names))
+    if model.sides:
+        state[0] = float(model.contact)
+    for i, name in enumerate(names):
+        positions = [float(contact.position) for contact in model.contacts if contact.coordinate == name]
+        state[i] = np.mean(positions) if positions else state[i]
+    return state
+
+
+def is_still(system: System, highest: np.ndarray, lowest: np.ndarray, within: float) -> np.ndarray:
+    """Whether motions with these extrema stay within a distance of one place of contact, or of 0 without one."""
+    model = system.model
+    places = [float(contact.position) for contact in model.contacts] or [float(model.contact) if model.sides else 0.0]
+    return np.any([np.maximum(np.abs(highest - place), np.abs(lowest - place)) <= within for place in places], axis=0)
+
+
+def on_this_side(system: System, states: np.ndarray) -> np.ndarray:
+    """States (..., d), changed in place: those beyond one of several contacts go to its mirror image."""
+    names = system.model.coordinates
+    for contact in system.model.contacts:
+        place, position = names.index(contact.coordinate), float(contact.position)
+        states[..., place] = position + contact.sign * np.abs(states[..., place] - position)
+    for contact in system.model.contacts:  # a reflection at one may lead beyond the opposite one
+        place, position = names.index(contact.coordinate), float(contact.position)
+        states[..., place] = position + contact.sign * np.maximum(contact.sign * (states[..., place] - position), 0.0)
+    return states
+
+
+def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.ndarray:
+    """States (..., d) moved by shifts, where closed contacts stay closed and nothing goes beyond one.
+
+    What then is open by no more than rounding is closed.
+    """
+    names, moved = system.model.coordinates, on_this_side(system, states + shifts)
+    for contact in system.model.contacts:
+        place = names.index(contact.coordinate)
+        closed = (np.asarray(contact.gap(states[..., place])) == 0.0) & (states[..., len(names) + place] == 0.0)
+        least = np.maximum(np.abs(contact.gap(moved[..., place])), np.abs(moved[..., len(names) + place]))
+        closed = closed | (least < ROUNDING)
+        moved[..., place] = np.where(closed, float(contact.position), moved[..., place])
+        moved[..., len(names) + place] = np.where(closed, 0.0, moved[..., len(names) + place])
+    return moved
+
+
+def _held(system: System, states: np.ndarray, window: Window) -> np.ndarray:
+    """States (..., n, d) of which some have coordinates held at contacts, by turns."""
+    names, turn = system.model.coordinates, np.arange(states.shape[-2]) // 2
+    bounds = np.asarray(window)
+    reached: dict[int, list[float]] = {}
+    for contact in system.model.contacts:
+        place, position = names.index(contact.coordinate), float(contact.position)
+        (low, high), (slowest, fastest) = bounds[place], bounds[len(names) + place]
+        if low <= position <= high and slowest <= 0.0 <= fastest:
+            reached.setdefault(place, []).append(position)
+    choices = [chosen for n in range(len(names)) for chosen in itertools.combinations(sorted(reached), n)]
+    for number, chosen in enumerate(choices):
+        rows = turn % len(choices) == number
+        for place in chosen:
+            at, positions = states[..., rows, place], np.array(reached[place])
+            states[..., rows, place] = positions[np.abs(at[..., None] - positions).argmin(axis=-1)]
+            states[..., rows, len(names) + place] = 0.0
+    return states

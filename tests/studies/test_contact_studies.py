@@ -1,0 +1,101 @@
+"""Diagrams, charts and searches of models with several contacts, beside the reduced model and closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+
+from saltus import branch_of
+from saltus.errors import ParameterError
+from saltus.orbits import search_orbits
+from saltus.plots import draw_diagram, draw_stability_chart
+from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
+from saltus.systems import Harmonic, Load, Metainterface, NewtonImpact, System, TwoLayer, TwoStops, VelocityReduction
+
+BETA80 = math.radians(80)
+FORCE, H = "load.force.amplitude", "load.horizontal.amplitude"
+
+
+def layers(model, amplitude=0.1, **numbers):
+    load = Load(frequency=1.0, vertical=-0.5, horizontal=Harmonic(amplitude=amplitude))
+    return System(model=model(beta0=BETA80, damping=0.1, **numbers), load=load, impact=VelocityReduction(1.0))
+
+
+def stops(e=0.7):
+    """x'' = A cos tau between stops at -1 and 1."""
+    return System(
+        model=TwoStops(stiffness=0.0),
+        load=Load(frequency=1.0, force=Harmonic(amplitude=0.8, phase=math.pi / 2)),
+        impact=NewtonImpact(e=e),
+    )
+
+
+def test_a_spectrum_of_both_layers_is_the_reduced_one_where_the_closed_layer_stays_closed():
+    """H = 0.1 and frequencies about 1: the same stable branch, to 1e-8 in amplitude, and nothing left that is not on it."""
+    few = {"values": [0.95, 1.0, 1.05], "starts": 6, "max_period": 1, "bands": False, "repelling": 0, "switch": False}
+    both, reduced = (response_spectrum(layers(model), bounds=(0.95, 1.05), **few) for model in (TwoLayer, Metainterface))
+    assert both.attrs["coordinate"] == "theta_1 theta_2"
+    for tree in (both, reduced):
+        assert tree["unplaced"].sizes["dot"] == 0
+        assert (tree["attractors"]["placed"] == 1).all()
+    one, other = (tree["attractors"].to_dataset() for tree in (both, reduced))
+    for value in few["values"]:
+        here, there = (data["amplitude"].values[data["parameter"].values == value] for data in (one, other))
+        np.testing.assert_allclose(here, there, rtol=0, atol=1e-8)
+    assert draw_diagram(both)[0].get_ylabel() == r"$\max_\tau(|\theta_1|, |\theta_2|)$ (rad)"
+
+
+def test_a_diagram_between_two_stops_follows_the_closed_form():
+    """Motions with one impact at each stop, half a period apart, have after each impact the speed v of
+
+    sin(phi) = -v (1 - e) / (2 e A), cos(phi) = (1 - v pi (1 + e) / (4 e)) / A,
+
+    before it v / e, and are stable for A from 0.5 to 0.65. All motions reach both stops: speeds tell them apart.
+    """
+    e = 0.7
+    tree = bifurcation_diagram(
+        stops(e), FORCE, (0.5, 0.65), values=[0.52, 0.62], starts=8, max_period=1, bands=False, repelling=0, switch=False
+    )
+    compared = 0
+    for number in range(tree["branches"].sizes["branch"]):
+        branch = branch_of(tree, number)
+        regular = (branch["impact_count"].values == 2) & (branch["stable"].values == 1)
+        for A, speed in zip(branch["parameter"].values[regular], e * branch["slowest"].values[regular], strict=True):
+            sine, cosine = -(1 - e) / (2 * e * A), -math.pi * (1 + e) / (4 * e * A)
+            assert (sine * speed) ** 2 + (1 / A + cosine * speed) ** 2 == pytest.approx(1.0, abs=1e-8)
+            compared += 1
+    assert compared > 5
+    assert set(tree["unplaced"]["reason"].values.tolist()) <= {"longer"}  # motions of three periods, beside these from 0.62 on
+
+
+def test_a_chart_of_both_layers_is_the_reduced_one_where_the_closed_layer_stays_closed():
+    """At V = -1 the closed layer stays closed for H up to 0.25, at V = -0.5 and H = 0.25 it does not (docs/both_layers.md)."""
+    axes = {"horizontal": [0.05, 0.15, 0.25], "vertical": [-1.0, -0.5], "starts": 6}
+    both, reduced = (stability_chart(layers(model), **axes) for model in (TwoLayer, Metainterface))
+    np.testing.assert_allclose(both["amplitude"].values[0], reduced["amplitude"].values[0], rtol=0, atol=1e-6)
+    assert abs(float(both["amplitude"][1, 2] - reduced["amplitude"][1, 2])) > 1e-3
+    np.testing.assert_array_equal(both["count"].values[0], reduced["count"].values[0])
+    assert {"motion_theta_1", "motion_theta_2_velocity", "motion_slowest"} <= set(both)
+    assert r"\theta_2" in draw_stability_chart(both).figure.axes[-1].get_ylabel()
+
+
+def test_a_chart_tells_motions_apart_that_all_reach_both_stops():
+    """Between two stops every motion has the amplitude 1; at A = 0.8 the two that are mirror images of one another count once."""
+    chart = stability_chart(stops(), horizontal=[0.8], vertical=[0.0], paths=(FORCE, "model.damping"), starts=12)
+    speeds = chart["motion_slowest"].values[np.isfinite(chart["motion_slowest"].values)]
+    assert len(speeds) == int(chart["count"].values[0, 0])
+    assert (np.diff(np.sort(speeds)) > 1e-4).all()
+
+
+def test_a_search_finds_the_orbit_of_both_layers_and_says_what_it_searched():
+    """The stable orbit of the reduced model at H = 0.1, and no other of one period."""
+    both, reduced = (search_orbits(layers(model), H, [0.1], max_period=1, starts=8) for model in (TwoLayer, Metainterface))
+    stable = [[orbit.amplitude for orbit in search.orbits if orbit.stable] for search in (both, reduced)]
+    np.testing.assert_allclose(stable[0], stable[1], rtol=0, atol=1e-9)
+    assert len(both.window) == 4
+
+
+def test_what_has_no_equations_for_several_contacts_is_refused_by_name():
+    both = layers(TwoLayer)
+    with pytest.raises(ParameterError, match="borders of a chart"):
+        bordered_chart(both, horizontal=[0.1, 0.2], vertical=[-0.5])
