@@ -115,7 +115,7 @@ def search_orbits(
     area = check_window(window, system)
     listed = list(values) if isinstance(values, Iterable) and not isinstance(values, np.ndarray) else values
     grid = np.atleast_1d(np.asarray(listed, dtype=float))
-    if not grid.size or not np.isfinite(grid).all():
+    if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
         raise ParameterError(f"values must be numbers of {path} at which to search, got {grid.tolist()}", "values")
     early, late = _follow(system, path, grid, initial_states(system, starts, area, seed), max_period)
     found: list[PeriodicOrbit] = []

@@ -125,12 +125,12 @@ QUANTITY_ORDER = {"force": 0, "displacement": 0, "velocity": 1, "acceleration": 
 def _samples(where: str, name: str, given: Any) -> np.ndarray:
     """The numbers of a list."""
     try:
-        samples = np.array(given, dtype=float)
+        samples = np.array(given)
     except (TypeError, ValueError):
         samples = np.array(0.0)
-    if samples.ndim != 1:
+    if samples.ndim != 1 or samples.dtype.kind not in "fiub":  # of complex numbers a part would be left out
         raise ParameterError(f"{where}: {name} must be a list of numbers, got {shown(given)}", name)
-    return samples
+    return samples.astype(float)
 
 
 @answering("__init__")
