@@ -72,12 +72,9 @@ def number_problem(
     number = isinstance(value, (float, int, np.floating, np.integer)) and not isinstance(value, bool)
     if number and isinstance(value, int) and abs(value) > sys.float_info.max:
         value = math.inf
-    wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
-    if not number:
-        kind = wanted.replace("lie in", "be a number in").replace("be finite", "be a finite number")
-        return f"must {kind}, got {shown(value)}"
     inside = (
-        math.isfinite(value)
+        number
+        and math.isfinite(value)
         and (above is None or value > above)
         and (below is None or value < below)
         and (at_least is None or value >= at_least)
@@ -87,6 +84,10 @@ def number_problem(
         return f"must be at most {LIMITS.value:g} in size, got {shown(value)}"
     if inside:
         return None
+    wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
+    if not number:
+        kind = wanted.replace("lie in", "be a number in").replace("be finite", "be a finite number")
+        return f"must {kind}, got {shown(value)}"
     hint = " (degrees?)" if unit == "rad" and math.isfinite(value) and 3.2 < abs(value) <= 360 else ""
     return f"must {wanted}, got {shown(value)}{hint}"
 

@@ -18,6 +18,7 @@ class NewtonSettings:
     slowdown: float = 0.3  # rounding does so where a step leaves more than this share of the residual before it
     diverged: float = 1e6  # residual above which the iteration is given up
     longest: float = 1.0  # largest component of a step: beyond it the equations are far from linear
+    last: float = 1e-6  # residual after which one step is expected to be enough, as it squares it: then all is evaluated
 
 
 NEWTON = NewtonSettings()
@@ -61,13 +62,14 @@ def newton(
     """
     place, before = guess.copy(), np.inf
     for iteration in range(iterations + 1):
-        found = evaluate(place, iteration > 0)
+        thorough = before <= NEWTON.last
+        found = evaluate(place, thorough)
         if found is None:
             return None
         error, scale = np.abs(found.residual).max(), max(1.0, np.abs(place).max())
         slow = error <= NEWTON.stalled * scale and error > NEWTON.slowdown * before
         if error <= NEWTON.converged * scale or slow:
-            looked = found if iteration > 0 else evaluate(place, True)
+            looked = found if thorough else evaluate(place, True)
             return None if looked is None else Corrected(place, looked, iteration)
         step = _step(*linear(found, place)) if error < NEWTON.diverged else None
         if step is None:

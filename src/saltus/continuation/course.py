@@ -51,8 +51,18 @@ class Course:
 
     def solved_at(self, value: float, index: int = -1) -> list[Any]:
         """All its points at a value of one number of their places, solved there, in order."""
-        found = [point for i in range(len(self.points) - 1) for point in self.solved_between(i, value, index)]
+        found = [point for i in self._around(value, index) for point in self.solved_between(i, value, index)]
         return found + [point for point in self.points[-1:] if point.place[index] == value]
+
+    def _around(self, value: float, index: int) -> list[int]:
+        """The points between which and the next ones a number of the place may have a value: it lies between theirs, or turns."""
+        places, tangents = self._last if index == -1 else _numbers(self.points, index)
+        beyond = places - value
+        return np.flatnonzero((beyond[:-1] * beyond[1:] <= 0.0) | (tangents[:-1] * tangents[1:] < 0.0)).tolist()
+
+    @cached_property
+    def _last(self) -> tuple[np.ndarray, np.ndarray]:
+        return _numbers(self.points, -1)
 
     def solved_between(self, before: int, value: float, index: int = -1) -> list[Any]:
         """The points at a value of one number of the places, from the point of this number up to before the next."""
@@ -60,3 +70,10 @@ class Course:
         a, b = self.points[before], self.points[before + 1]
         check_count("index", index, -a.place.size, a.place.size - 1)
         return solved_between(a, b, index, value) if self.is_joined(before) else []
+
+
+def _numbers(points: tuple[Any, ...], index: int) -> tuple[np.ndarray, np.ndarray]:
+    """One number of the places of points, and how it changes along the curve, (n,) each."""
+    for point in points:
+        check_count("index", index, -point.place.size, point.place.size - 1)
+    return np.array([point.place[index] for point in points]), np.array([point.tangent[index] for point in points])

@@ -32,8 +32,7 @@ class EquationCurve(Curve[P]):
         normal = direction * self.weights**2
 
         def linear(found: Evaluation, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            right = -np.append(found.residual, normal @ (place - guess))
-            return np.vstack([found.derivatives(), normal]), right
+            return bordered(found.derivatives(), normal), -bordered(found.residual, normal @ (place - guess))
 
         found = newton(self.evaluate, linear, guess, self.iterations)
         return None if found is None else self.with_tangent(found, direction)
@@ -66,9 +65,11 @@ class EquationCurve(Curve[P]):
 
     def with_tangent(self, found: Corrected[Any], direction: np.ndarray) -> P | None:
         """A solution as a point, with the tangent that goes along a direction; None where the tangent is not unique."""
-        matrix = np.vstack([found.evaluation.derivatives(), direction * self.weights**2])
+        matrix = bordered(found.evaluation.derivatives(), direction * self.weights**2)
+        right = np.zeros(len(matrix))
+        right[-1] = 1.0
         try:
-            tangent = np.linalg.solve(matrix, np.append(np.zeros(len(matrix) - 1), 1.0))
+            tangent = np.linalg.solve(matrix, right)
         except np.linalg.LinAlgError:
             return None
         length = self.norm(tangent)
@@ -91,3 +92,10 @@ class EquationCurve(Curve[P]):
         """The angle between the tangents, rad."""
         cosine = float(b.tangent @ (self.weights**2 * a.tangent))
         return math.acos(min(1.0, max(-1.0, cosine)))
+
+
+def bordered(rows: np.ndarray, last: Any) -> np.ndarray:
+    """An array (n, ...) with one more row below it; NumPy's own functions for it take longer than what a step computes."""
+    result = np.empty((len(rows) + 1, *rows.shape[1:]))
+    result[:-1], result[-1] = rows, last
+    return result

@@ -54,12 +54,19 @@ def torus(point: OrbitPoint) -> float:
         return -1.0
     with np.errstate(all="ignore"):
         if len(values) == 2:
-            half = float(np.prod(np.linalg.det(equations.here) / np.linalg.det(equations.there)))
+            half = float(np.prod(_areas(equations.here) / _areas(equations.there)))
             product = (half**2 if point.orbit.symmetric else half) - 1.0
         else:
             first, second = np.triu_indices(len(values), 1)
             product = float(np.prod(values[first] * values[second] - 1.0).real)
     return -1.0 if not math.isfinite(product) else product if abs(product) > ROUNDING else 0.0
+
+
+def _areas(maps: np.ndarray) -> np.ndarray:
+    """The determinants of maps (n, d, d)."""
+    if maps.shape[1] != 2:
+        return np.asarray(np.linalg.det(maps))
+    return np.asarray(maps[:, 0, 0] * maps[:, 1, 1] - maps[:, 0, 1] * maps[:, 1, 0])
 
 
 def complex_pair(orbit: PeriodicOrbit) -> float:

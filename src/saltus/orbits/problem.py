@@ -63,7 +63,10 @@ class Equations:
 
     @cached_property
     def _all(self) -> np.ndarray:
-        return np.column_stack([self.jacobian(), self.parameters])
+        size, count = self.parameters.shape
+        matrix = np.empty((size, size + count))
+        matrix[:, :size], matrix[:, size:] = self.jacobian(), self.parameters
+        return matrix
 
     def derivatives(self) -> np.ndarray:
         """The derivatives to the unknowns and the parameters."""
