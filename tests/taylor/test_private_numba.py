@@ -65,6 +65,25 @@ def test_without_what_is_private_motions_are_the_same(tmp_path):
     assert first == run(MOTION, cache_directory().parent)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"), [("NUMBA_DISABLE_JIT", "1"), ("NUMBA_NUM_THREADS", "0"), ("NUMBA_NUM_THREADS", "two")]
+)
+@pytest.mark.parametrize("command", ["simulate", "run", "doctor"])
+def test_an_environment_without_a_compiler_is_refused_in_a_sentence(name, value, command, tmp_path):
+    study = SOURCE.parent / "examples" / "metainterface.toml"
+    arguments = [] if command == "doctor" else [study, "--output", tmp_path / "results"]
+    done = subprocess.run(
+        [sys.executable, "-m", "saltus", command, *arguments],
+        capture_output=True,
+        text=True,
+        env=os.environ | {name: value, "PYTHONPATH": str(SOURCE)},
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith(f"saltus: the environment has {name}")
+    assert "Traceback" not in done.stderr
+
+
 def allowed():
     """The oldest numba and the bound that its versions stay below."""
     dependencies = tomllib.loads((SOURCE.parent / "pyproject.toml").read_text())["project"]["dependencies"]

@@ -115,7 +115,7 @@ def _improved(system: System, path: str, values: np.ndarray, states: np.ndarray,
 def _mapped(system: System, path: str, values: np.ndarray, states: np.ndarray, period: int) -> tuple[np.ndarray, np.ndarray]:
     """States (n, d) some periods later, and their derivatives to the ones at the start, (n, d, d).
 
-    With several contacts lanes have no derivatives: differences take their place, of motions beside on which closed contacts stay
+    With several contacts differences take the place of derivatives, of motions beside on which closed contacts stay
     closed.
     """
     options: dict[str, Any] = {"periods": period, "sample": (), "tol": SETTINGS.tol}

@@ -24,5 +24,7 @@ anything. What numba does not promise to keep is used in `private_numba.py` alon
 """
 
 from saltus._front_door import front_door
+from saltus.taylor.numba_environment import check_environment
 
+check_environment()
 __getattr__, __dir__, __all__ = front_door(__name__, __file__)

@@ -19,7 +19,7 @@ FEWEST = 4  # motions of which a scatter is taken
 
 @dataclass(frozen=True)
 class PartedSettings:
-    """How far a second motion is from the first, where lanes have no derivatives."""
+    """How far a second motion is from the first, where no derivatives are used."""
 
     distance: float = 1e-8  # Between the errors of a step, 1e-10, and where the map is no longer linear.
     periods: int = 4  # Forcing periods after which it is brought back: at an exponent of 0.3 it is then 2000 times as far.
@@ -53,7 +53,7 @@ def largest_exponents(
     t. Motions that are lost are left out, and so are those whose perturbations surely shrink where others surely grow. A
     perturbation is given a quarter of the periods to turn to the direction that grows. The derivatives of the end to the start,
     through impacts, are those of `simulate_many`: along that direction they are accurate however far it grows. With several
-    contacts lanes have no derivatives, and a motion 1e-8 beside each takes their place, brought back to there every four periods.
+    contacts a motion 1e-8 beside each takes the place of its derivatives, brought back to there every four periods.
 
     The resolution is 2 ln(t) / t for the time t of one motion, as regular ones may part like t^2.
 
