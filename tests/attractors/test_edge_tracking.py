@@ -71,7 +71,7 @@ def test_one_basin_has_no_curves() -> None:
 
 def test_curves_are_cut_at_the_window() -> None:
     line = np.stack([np.linspace(-4.0, 4.0, 81), np.zeros(81)], axis=1)
-    shown = clipped([line, line], Window((-1.0, 1.0), (-1.0, 1.0)))
+    shown = clipped([line, line], Window(((-1.0, 1.0), (-1.0, 1.0))))
     assert np.nanmax(np.abs(shown)) == pytest.approx(1.5)
     gaps = np.isnan(shown[:, 0])
     assert gaps.sum() == 2

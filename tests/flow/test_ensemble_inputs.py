@@ -362,8 +362,8 @@ def test_junk_is_refused_or_taken_but_never_a_traceback_of_another_kind(argument
 @given(
     theta=st.floats(-1e300, 1e300),
     velocity=st.floats(-1e300, 1e300),
-    amplitude=st.floats(-1e200, 1e200),
-    damping=st.floats(0, 1e200),
+    amplitude=st.floats(-1e100, 1e100),  # larger ones are refused where they are given
+    damping=st.floats(0, 1e100),
     frequency=st.floats(-5, 5).map(lambda x: 10.0**x),
 )
 def test_numbers_of_any_size_end_with_a_reason(theta, velocity, amplitude, damping, frequency):

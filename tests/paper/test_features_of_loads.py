@@ -34,8 +34,8 @@ def judged(data):
 def test_erratum_35_rest_is_lost_where_the_ellipse_leaves_the_domain(rest_under_both_loads):
     claim = judged(rest_under_both_loads)
     assert (claim.verdict, claim.erratum) == (ClaimVerdict.CORRECTED, 35)
-    assert "0.07635" in claim.headline
-    assert "0.08816" in claim.headline
+    assert "0.07635" in claim.evidence
+    assert "0.08816" in claim.evidence
 
 
 @pytest.mark.parametrize(

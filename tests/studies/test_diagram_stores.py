@@ -124,13 +124,13 @@ def test_a_motion_that_has_settled_is_the_same_however_long_it_is_given():
     common = {"system": system.to_json(), "path": FREQUENCY, **identity(system)}
     work, direct = (diagram_work.DiagramWork(system, FREQUENCY, made) for made in (Parts(common), None))
     work.simulate(values, states, 200)
-    rows = [(given[3], row[1]) for given, row in work.parts.remembered(diagram_work._parts()["motions"])]
+    rows = [(given[3], row[1]) for given, row in work.parts.remembered(diagram_work._parts(2)["motions"])]
     moving = sum(outcome == Outcome.MOVING for time, outcome in rows if time == 200)
     assert 0 < moving < len(values)
     longer, fresh = work.simulate(values, states, 400), direct.simulate(values, states, 400)
     for field in fields(fresh):
         np.testing.assert_array_equal(getattr(longer, field.name), getattr(fresh, field.name))
-    assert sum(given[3] == 400 for given, _ in work.parts.remembered(diagram_work._parts()["motions"])) == moving
+    assert sum(given[3] == 400 for given, _ in work.parts.remembered(diagram_work._parts(2)["motions"])) == moving
 
 
 @pytest.mark.parametrize(

@@ -68,8 +68,8 @@ def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
         >>> [rest.stable for rest in rests]
         [True, False, True, False, True]
     """
-    area = check_window(window, system)
     check_constant(system)
+    area = check_window(window, system)
     model, low, high = system.model, *area[0]
     found = []
     for side in model.sides or (1,):
