@@ -28,8 +28,10 @@ def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[
 
     def get(name: str) -> Any:
         if name.startswith("__") or name in public:
-            public_here = package in FOR_USERS or name in vars(sys.modules["saltus"]).get("__all__", ())
-            return _answering(load(name)) if public_here else load(name)
+            found = load(name)
+            if package in FOR_USERS or name in vars(sys.modules["saltus"]).get("__all__", ()):
+                found = vars(sys.modules[package])[name] = _answering(found)  # lazy_loader 0.6 keeps there what it has loaded
+            return found
         raise AttributeError(f"{package} has no {name!r}; {near(name, public)}")
 
     return get, names, public

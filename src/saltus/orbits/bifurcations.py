@@ -63,10 +63,10 @@ def torus(point: OrbitPoint) -> float:
 
 
 def _areas(maps: np.ndarray) -> np.ndarray:
-    """The determinants of maps (n, d, d)."""
-    if maps.shape[1] != 2:
+    """The determinants of maps (..., d, d)."""
+    if maps.shape[-1] != 2:
         return np.asarray(np.linalg.det(maps))
-    return np.asarray(maps[:, 0, 0] * maps[:, 1, 1] - maps[:, 0, 1] * maps[:, 1, 0])
+    return np.asarray(maps[..., 0, 0] * maps[..., 1, 1] - maps[..., 0, 1] * maps[..., 1, 0])
 
 
 def complex_pair(orbit: PeriodicOrbit) -> float:
