@@ -57,6 +57,7 @@ def made():
     curve = saltus.continue_special(fold, "load.vertical", (-0.51, -0.49), first_bounds=(0.8, 1.2), most_points=10)
     chart = studies.stability_chart(SYSTEM, horizontal=[0.1, 0.2], vertical=[-0.5, -0.4], starts=2, periods=60)
     many = saltus.simulate_many(SYSTEM, theta=[0.1, 0.3], periods=4, last=3)
+    branch.to_xarray()  # computes defects, which are then kept
     return {"motion": motion, "orbit": orbit, "branch": branch, "fold": fold, "curve": curve, "chart": chart, "many": many}
 
 
