@@ -57,12 +57,13 @@ def draw(data: Any) -> Any:
         column[1].set_xlabel(r"frequency $\Omega$")
     axes[0, 0].set_ylabel(r"$\theta$ at phase 0 (rad)")
     axes[1, 0].set_ylabel(r"largest exponent $\lambda$")
+    axes[1, -1].legend(loc="upper right")
     return figure
 
 
 def _stroboscopic_states(ax: Any, tree: Any) -> None:
     draw_bands(ax, tree)
-    ax.plot(tree["stroboscopic"]["value"], tree["stroboscopic"]["position"], **POINTS)
+    ax.plot(tree["stroboscopic"]["value"], tree["stroboscopic"]["position"], **POINTS | {"markersize": 1.2})
 
 
 def _exponents(ax: Any, tree: Any) -> None:
@@ -70,11 +71,15 @@ def _exponents(ax: Any, tree: Any) -> None:
     draw_bands(ax, tree)
     ax.axhline(0.0, color=FAINT, lw=0.6, zorder=1)
     table = tree["exponents"]
-    for kind, colour, face in ((Unsettled.CHAOTIC, STABLE, STABLE), (Unsettled.UNDECIDED, UNSTABLE, "white")):
+    for kind, colour, face, label in (
+        (Unsettled.CHAOTIC, STABLE, STABLE, "chaotic"),
+        (Unsettled.UNDECIDED, UNSTABLE, "white", "undecided"),
+    ):
         here = table["verdict"].values == kind
         ax.errorbar(
             table["value"].values[here], table["exponent"].values[here], table["error"].values[here],
             linestyle="none", marker="o", markersize=2.2, markerfacecolor=face, color=colour, elinewidth=0.5, zorder=3,
+            label=label,
         )  # fmt: skip
 
 
