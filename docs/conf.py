@@ -38,7 +38,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 python_use_unqualified_type_names = True
 maximum_signature_line_length = 100
-napoleon_numpy_docstring = False
+napoleon_google_docstring = False
 napoleon_use_rtype = False
 
 sphinx_gallery_conf = {

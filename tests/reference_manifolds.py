@@ -52,8 +52,10 @@ def manifold(
     """The branch that leaves `saddle` away from (`outward`) or towards theta = 0, followed for at most `span` of time, to
     abs(theta) = `bound`, through at most `crossings` of contact, or until it comes close to one of `saddles`.
 
-    Raises:
-        ParameterError: an equilibrium that is not a saddle, or an impact law without v+ = e v-, e > 0.
+    Raises
+    ------
+    ParameterError
+        An equilibrium that is not a saddle, or an impact law without v+ = e v-, e > 0.
     """
     if saddle.eigenvalues is None or not saddle.eigenvalues[0].real > 0 > saddle.eigenvalues[1].real:
         raise ParameterError(f"theta = {saddle.theta:g} is not a saddle, so it has no separatrices")

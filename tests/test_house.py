@@ -53,7 +53,7 @@ HEAVY = (
     *("scipy", "numba", "xarray", "matplotlib", "h5netcdf", "zarr", "distributed"),
     *("saltus.flow", "saltus.sweep", "saltus.paper"),
 )
-LONGEST_FUNCTION, MEDIAN_FUNCTION, LONGEST_FILE = 60, 8, 400  # lines, docstrings included, but not their examples
+LONGEST_FUNCTION, MEDIAN_FUNCTION, LONGEST_FILE = 60, 8, 400  # lines, docstrings included, but not their sections
 
 
 # --- imports ---------------------------------------------------------------------------------------------------------------
@@ -186,14 +186,16 @@ def functions() -> Iterator[tuple[str, int]]:
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
                 where = f"{path.relative_to(SOURCE)}:{node.lineno} {node.name}"
-                yield where, (node.end_lineno or node.lineno) - node.lineno + 1 - lines_of_examples(node)
+                yield where, (node.end_lineno or node.lineno) - node.lineno + 1 - lines_of_sections(node)
 
 
-def lines_of_examples(node: ast.AST) -> int:
-    """How many lines the examples of docstrings take."""
-    parts = [n for n in ast.walk(node) if isinstance(n, (ast.FunctionDef, ast.ClassDef))]
-    shown = [(ast.get_docstring(part) or "").partition("\nExamples:\n") for part in parts]
-    return sum(text.count("\n") + 3 for _, head, text in shown if head)
+SECTION = re.compile(r"^(Parameters|Attributes|Returns|Yields|Raises|Examples|References)\n-{6,}$", re.MULTILINE)
+
+
+def lines_of_sections(node: ast.AST) -> int:
+    """How many lines the sections of docstrings take, from the first one of each on."""
+    parts = [ast.get_docstring(n) or "" for n in ast.walk(node) if isinstance(n, (ast.FunctionDef, ast.ClassDef))]
+    return sum(text[found.start() :].count("\n") + 2 for text in parts if (found := SECTION.search(text)))
 
 
 def test_functions_are_short() -> None:
@@ -203,9 +205,15 @@ def test_functions_are_short() -> None:
     assert statistics.median(lengths.values()) <= MEDIAN_FUNCTION
 
 
+def test_docstrings_have_the_sections_of_numpy() -> None:
+    """One style for all: a heading with a line under it, and never a heading with a colon."""
+    files = [path for path in FILES if re.search(r"^ *(Args|Parameters|Returns|Yields|Raises|Examples):$", path.read_text(), re.M)]
+    assert not files
+
+
 def test_files_hold_one_thing() -> None:
     texts = {str(path.relative_to(SOURCE)): path.read_text() for path in FILES}
-    lengths = {name: text.count("\n") - lines_of_examples(ast.parse(text)) for name, text in texts.items()}
+    lengths = {name: text.count("\n") - lines_of_sections(ast.parse(text)) for name, text in texts.items()}
     assert not {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE}
 
 

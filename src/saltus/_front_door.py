@@ -20,8 +20,10 @@ FOR_USERS = ("saltus.theory",)  # of which users call every function, beside tho
 def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """`__getattr__`, `__dir__` and `__all__` of a package whose public names are those of the stub beside its `__init__`.
 
-    Raises:
-        AttributeError: by `__getattr__`, of a name that is not there, with the names that are near to it.
+    Raises
+    ------
+    AttributeError
+        By `__getattr__`, of a name that is not there, with the names that are near to it.
     """
     load, names, public = attach_stub(package, file)
     sys.modules[package].__class__ = Room

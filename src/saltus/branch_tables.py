@@ -70,13 +70,16 @@ def branches_of(diagram: Any) -> Iterator[tuple[int, xarray.Dataset]]:
 def branch_of(diagram: xarray.DataTree, number: int) -> xarray.Dataset:
     """The branch of this number of a diagram, as `Branch.to_xarray` gives it; `orbits_of` makes its orbits again.
 
-    Raises:
-        ParameterError: a tree without branches, or of fewer.
+    Raises
+    ------
+    ParameterError
+        A tree without branches, or of fewer.
 
-    Examples:
-        >>> diagram = saltus.bifurcation_diagram(system, bounds=(0.45, 0.55), max_period=1, values=[0.5], starts=4, bands=False)
-        >>> saltus.branch_of(diagram, 0).parameter.values[[0, -1]]
-        array([0.45, 0.55])
+    Examples
+    --------
+    >>> diagram = saltus.bifurcation_diagram(system, bounds=(0.45, 0.55), max_period=1, values=[0.5], starts=4, bands=False)
+    >>> saltus.branch_of(diagram, 0).parameter.values[[0, -1]]
+    array([0.45, 0.55])
     """
 
     missing = [name for name in ("branches", *TABLES.values(), "orbits") if name not in diagram.children]

@@ -51,8 +51,10 @@ HALF_WIDTH = 1.5  # of the window that is taken where none is given: about the s
 def check_number(name: str, value: Any, **bounds: Any) -> None:
     """Refuse what is not a finite real number within the bounds of `number_problem`.
 
-    Raises:
-        ParameterError: with the name, the range and the value, and a hint where degrees look likely.
+    Raises
+    ------
+    ParameterError
+        With the name, the range and the value, and a hint where degrees look likely.
     """
     problem = number_problem(value, **bounds)
     if problem is not None:
@@ -110,8 +112,10 @@ def _short(value: float) -> str:
 def check_count(name: str, value: Any, at_least: int, at_most: int | None = None) -> None:
     """Refuse what is not a whole number within the stated bounds; the upper one is that of `Limits` where none is given.
 
-    Raises:
-        ParameterError: with the name, the range and the value.
+    Raises
+    ------
+    ParameterError
+        With the name, the range and the value.
     """
     at_most = MOST.get(name.rpartition(".")[2], LIMITS.count) if at_most is None else at_most
     problem = number_problem(value, at_least=at_least, at_most=at_most)
@@ -124,13 +128,19 @@ def check_count(name: str, value: Any, at_least: int, at_most: int | None = None
 def check_memory(name: str, size: float, what: str) -> None:
     """Refuse a request that needs more than its share of the memory that is free, before anything is computed.
 
-    Args:
-        name: the argument to make smaller.
-        size: the estimate, in bytes.
-        what: what needs it, such as "1000000 starts".
+    Parameters
+    ----------
+    name
+        The argument to make smaller.
+    size
+        The estimate, in bytes.
+    what
+        What needs it, such as "1000000 starts".
 
-    Raises:
-        ParameterError: with the estimate and what is free.
+    Raises
+    ------
+    ParameterError
+        With the estimate and what is free.
     """
     free = free_memory()
     if size > LIMITS.memory * free:
@@ -142,8 +152,10 @@ def check_memory(name: str, size: float, what: str) -> None:
 def check_work(name: str, motions: float, periods: float) -> None:
     """Refuse what would take days: so many motions of so many forcing periods.
 
-    Raises:
-        ParameterError: with the estimate.
+    Raises
+    ------
+    ParameterError
+        With the estimate.
     """
     if motions * periods > LIMITS.work:
         days = motions * periods / LIMITS.work * 4.0
@@ -157,8 +169,10 @@ def check_work(name: str, motions: float, periods: float) -> None:
 def check_starts(starts: Any, beside: int = 1) -> None:
     """Refuse a number of initial states that is none, or that needs too much memory, each `beside` so many others at once.
 
-    Raises:
-        ParameterError: with the range, or the estimate of the memory.
+    Raises
+    ------
+    ParameterError
+        With the range, or the estimate of the memory.
     """
     check_count("starts", starts, 1)
     each = f" in each of {beside} places" if beside > 1 else ""
@@ -186,8 +200,10 @@ def check_dataset(
 ) -> None:
     """Refuse a dataset without what `source`, the functions that make such ones, puts into it.
 
-    Raises:
-        ParameterError: with what it lacks.
+    Raises
+    ------
+    ParameterError
+        With what it lacks.
     """
     lacks = [each for each in variables if each not in dataset] + [each for each in attributes if each not in dataset.attrs]
     if lacks:
@@ -197,8 +213,10 @@ def check_dataset(
 def check_bounds(bounds: Any, name: str = "bounds") -> tuple[float, float]:
     """Two finite numbers, the smaller first.
 
-    Raises:
-        ParameterError: bounds that are no such pair.
+    Raises
+    ------
+    ParameterError
+        Bounds that are no such pair.
     """
     try:
         low, high = (float(x) for x in bounds)
@@ -212,8 +230,10 @@ def check_bounds(bounds: Any, name: str = "bounds") -> tuple[float, float]:
 def check_step(step: Any) -> None:
     """Refuse what is no longest step along a curve: shorter ones come nowhere, longer ones are longer than any curve's features.
 
-    Raises:
-        ParameterError: no number in [1e-6, 1].
+    Raises
+    ------
+    ParameterError
+        No number in [1e-6, 1].
     """
     check_number("step", step, at_least=1e-6, at_most=1.0)
 
@@ -221,8 +241,10 @@ def check_step(step: Any) -> None:
 def check_axis(name: str, values: Any) -> np.ndarray:
     """The numbers along an axis of a grid.
 
-    Raises:
-        ParameterError: with the name, for what is no list of finite numbers that rise.
+    Raises
+    ------
+    ParameterError
+        With the name, for what is no list of finite numbers that rise.
     """
     try:
         axis = np.atleast_1d(np.asarray(values, dtype=float))
@@ -236,8 +258,10 @@ def check_axis(name: str, values: Any) -> np.ndarray:
 def check_path(system: Any, path: Any, name: str = "path") -> None:
     """Refuse what is not the dotted path of a number of the system.
 
-    Raises:
-        ParameterError: of the argument `name`, with the paths that are near.
+    Raises
+    ------
+    ParameterError
+        Of the argument `name`, with the paths that are near.
     """
     if isinstance(path, str) and path in system.parameters:
         return
@@ -251,8 +275,10 @@ def check_path(system: Any, path: Any, name: str = "path") -> None:
 def check_along(system: Any, path: str, values: Iterable[float], name: str) -> None:
     """Refuse values of the parameter at `path` that the system does not allow.
 
-    Raises:
-        ParameterError: of the argument `name`, with what the system says.
+    Raises
+    ------
+    ParameterError
+        Of the argument `name`, with what the system says.
     """
     for value in values:
         try:
@@ -290,8 +316,10 @@ def check_window(window: Any, system: System) -> Window:
     With several contacts that is as much of it as the contacts leave. Of several coordinates bounds may be equal: that state
     variable then has one value.
 
-    Raises:
-        ParameterError: what is no pair of bounds for each coordinate and each velocity, or lies beyond the contacts.
+    Raises
+    ------
+    ParameterError
+        What is no pair of bounds for each coordinate and each velocity, or lies beyond the contacts.
     """
     names = system.model.coordinates
     if window is None:
@@ -336,8 +364,10 @@ def _default_window(system: System) -> Window:
 def check_names(name: str, values: Any, meaning: str) -> tuple[str, ...]:
     """The texts of a list, or a single one.
 
-    Raises:
-        ParameterError: with the name, for what is neither; `meaning` says of what they are the names.
+    Raises
+    ------
+    ParameterError
+        With the name, for what is neither; `meaning` says of what they are the names.
     """
     try:
         texts = (values,) if isinstance(values, str) else tuple(values)
@@ -351,8 +381,10 @@ def check_names(name: str, values: Any, meaning: str) -> tuple[str, ...]:
 def instants(times: Any) -> np.ndarray:
     """A time or a list of times as an array (n,).
 
-    Raises:
-        ParameterError: what is neither.
+    Raises
+    ------
+    ParameterError
+        What is neither.
     """
     try:
         asked = np.atleast_1d(np.asarray(times, dtype=float))
@@ -366,8 +398,10 @@ def instants(times: Any) -> np.ndarray:
 def check_states(name: str, states: Any, dimension: int = 2) -> np.ndarray:
     """States, coordinates then velocities, as an array (n, dimension).
 
-    Raises:
-        ParameterError: with the name, for what is no such array, or not finite.
+    Raises
+    ------
+    ParameterError
+        With the name, for what is no such array, or not finite.
     """
     try:
         array = np.asarray(states, dtype=float).reshape(-1, dimension)

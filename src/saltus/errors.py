@@ -12,9 +12,10 @@ LONGEST_NAME, LONGEST_LIST = 80, 200  # characters of what is compared with know
 class SaltusError(Exception):
     """The base of every error that saltus raises on purpose; the command line prints it as one sentence.
 
-    Examples:
-        >>> issubclass(saltus.ParameterError, saltus.SaltusError)
-        True
+    Examples
+    --------
+    >>> issubclass(saltus.ParameterError, saltus.SaltusError)
+    True
     """
 
 
@@ -23,11 +24,12 @@ class ParameterError(SaltusError, ValueError):
 
     `parameter` is the dotted path of what is wrong, such as "load.frequency" or "max_period", or None where it is no single one.
 
-    Examples:
-        >>> saltus.Metainterface(beta0=80.0)
-        Traceback (most recent call last):
-            ...
-        saltus.errors.ParameterError: beta0 must lie in (0, pi) rad, got 80.0 (degrees?)
+    Examples
+    --------
+    >>> saltus.Metainterface(beta0=80.0)
+    Traceback (most recent call last):
+        ...
+    saltus.errors.ParameterError: beta0 must lie in (0, pi) rad, got 80.0 (degrees?)
     """
 
     def __init__(self, message: str, parameter: str | None = None) -> None:
@@ -47,21 +49,23 @@ class ParameterError(SaltusError, ValueError):
 class TraceError(SaltusError, TypeError):
     """A model uses an operation that cannot be expanded in a Taylor series.
 
-    Examples:
-        >>> issubclass(saltus.TraceError, saltus.SaltusError)
-        True
+    Examples
+    --------
+    >>> issubclass(saltus.TraceError, saltus.SaltusError)
+    True
     """
 
 
 class MotionError(SaltusError, RuntimeError):
     """A motion cannot be continued: it is not unique, an impact has no solution, or the numbers overflow.
 
-    Examples:
-        >>> sliding = saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(vertical=0.5))
-        >>> saltus.simulate(sliding, theta=0.0, duration=1.0)
-        Traceback (most recent call last):
-            ...
-        saltus.errors.MotionError: the motion from rest at contact at time 0 is not unique: ...
+    Examples
+    --------
+    >>> sliding = saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(vertical=0.5))
+    >>> saltus.simulate(sliding, theta=0.0, duration=1.0)
+    Traceback (most recent call last):
+        ...
+    saltus.errors.MotionError: the motion from rest at contact at time 0 is not unique: ...
     """
 
 
@@ -70,9 +74,10 @@ class SweepError(SaltusError, RuntimeError):
 
     `failures` are the chunks that failed (`saltus.sweep.Failure`); `dataset` is what there is where no store keeps it, else None.
 
-    Examples:
-        >>> issubclass(saltus.SweepError, saltus.SaltusError)
-        True
+    Examples
+    --------
+    >>> issubclass(saltus.SweepError, saltus.SaltusError)
+    True
     """
 
     def __init__(self, message: str, failures: Iterable[Any] = (), dataset: Any = None) -> None:

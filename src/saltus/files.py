@@ -45,8 +45,10 @@ def write_durably(path: Path, content: bytes) -> None:
     It is written beside its place, brought to the disk, and moved there; its folder is made as needed. If that fails or is
     interrupted, `path` is what it was before and nothing is left.
 
-    Raises:
-        OSError: with the name of the file.
+    Raises
+    ------
+    OSError
+        With the name of the file.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{secrets.token_hex(6)}{PART}")
@@ -131,8 +133,10 @@ def read_dataset(path: Path | str) -> Any:
 
     One without a checksum, which another program wrote, is `UNCHECKED`: it is read if a process of its own can read it.
 
-    Raises:
-        ParameterError: there is no such file, it is damaged, or it is no netCDF file.
+    Raises
+    ------
+    ParameterError
+        There is no such file, it is damaged, or it is no netCDF file.
     """
     path = Path(path)
     content = checked_content(path)
@@ -210,8 +214,10 @@ def _without_unraisable() -> Iterator[None]:
 def checked_content(path: Path) -> bytes:
     """The bytes of a netCDF file, without its checksum.
 
-    Raises:
-        ParameterError: it cannot be read, or its checksum is not that of its bytes.
+    Raises
+    ------
+    ParameterError
+        It cannot be read, or its checksum is not that of its bytes.
     """
     try:
         if path.exists() and not path.is_file():  # a device or a pipe may have no end
@@ -251,8 +257,10 @@ def _digest(content: bytes) -> bytes:
 def check_writable(folder: Path | str) -> None:
     """Refuse, before anything is computed, a folder in which no file can be made; nothing is left behind.
 
-    Raises:
-        ParameterError: the folder, or the nearest one above it that exists, is a file or cannot be written to.
+    Raises
+    ------
+    ParameterError
+        The folder, or the nearest one above it that exists, is a file or cannot be written to.
     """
     folder = Path(folder)
     existing = folder

@@ -21,8 +21,9 @@ def silent(fraction: float, what: str) -> None:
 def show_progress(fraction: float, what: str) -> None:
     """The progress of work in one line on stderr, written over itself: for terminals and notebooks, `progress=show_progress`.
 
-    Examples:
-        >>> ends = saltus.simulate_many(system, theta=[0.1, 0.3], periods=10, progress=saltus.show_progress)
+    Examples
+    --------
+    >>> ends = saltus.simulate_many(system, theta=[0.1, 0.3], periods=10, progress=saltus.show_progress)
     """
     check_number("fraction", fraction)
     bar = "#" * round(20 * min(max(fraction, 0.0), 1.0))

@@ -32,8 +32,10 @@ def provenance(system: System | None = None, *, tol: float | None = None, seed: 
 def identity(system: System) -> dict[str, Any]:
     """What `check_provenance` compares: `result_version` and `equations`, for whoever computes a part of a result elsewhere.
 
-    Raises:
-        TraceError: a model that cannot be traced.
+    Raises
+    ------
+    TraceError
+        A model that cannot be traced.
     """
     from saltus.taylor import equations_of
 
@@ -43,8 +45,10 @@ def identity(system: System) -> dict[str, Any]:
 def check_provenance(attributes: Mapping[str, Any], system: System, what: str, remedy: str = "compute it again") -> None:
     """Refuse a result, `what`, whose attributes are not those of this system and of this version of saltus.
 
-    Raises:
-        ParameterError: with what differs: the version, or the part of the equations; and with the `remedy`.
+    Raises
+    ------
+    ParameterError
+        With what differs: the version, or the part of the equations; and with the `remedy`.
     """
     differ = "; ".join(_differences(attributes, system))
     if differ:

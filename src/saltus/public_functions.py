@@ -72,8 +72,10 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Check
 def bound_arguments(function: Callable[..., Any], given: tuple[Any, ...], named: dict[str, Any]) -> inspect.BoundArguments:
     """The arguments of a call by their names.
 
-    Raises:
-        ParameterError: one is unknown (with the near names), missing, or given twice.
+    Raises
+    ------
+    ParameterError
+        One is unknown (with the near names), missing, or given twice.
     """
     signature = _signature(function)
     try:
@@ -171,8 +173,10 @@ def fitting_arguments(
     What iterators yield comes as tuples, since it could be looked at only once, and a whole number that is a float as an int.
     What does not fit may be refused by the function's own checks, which `refuses` calls if there is such, as they know more.
 
-    Raises:
-        ParameterError: one is unknown, missing or of another kind, with its name.
+    Raises
+    ------
+    ParameterError
+        One is unknown, missing or of another kind, with its name.
     """
     bound, hints = bound_arguments(function, given, named), _hints(function)
     for name, value in bound.arguments.items():

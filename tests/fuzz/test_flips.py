@@ -54,8 +54,10 @@ def files_of(kind, folder):
 def content_of(kind, folder, file):
     """What is read of the flipped file, of a part of a diagram's search the part.
 
-    Raises:
-        SaltusError: the damage is noticed.
+    Raises
+    ------
+    SaltusError
+        The damage is noticed.
     """
     if kind == "netcdf":
         return read_dataset(file)

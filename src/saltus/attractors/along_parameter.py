@@ -59,28 +59,41 @@ def attractors_along(
     between two of the same period if motions from all points of the one settle on the other. One that is matched to none is
     born, or has died. Rest is always 0.
 
-    Args:
-        system: what moves.
-        path: dotted path of the parameter.
-        values: of the parameter, increasing or decreasing: identities are kept from each to the next.
-        window, starts, max_period, seed, tol: as for `find_attractors`.
-        known: branches along the same parameter, whose stable orbits count at every value.
-        threshold: the largest relative distance of one and the same attractor at neighbouring values.
-        progress: called with the fraction done and what is being done.
+    Parameters
+    ----------
+    system
+        What moves.
+    path
+        Dotted path of the parameter.
+    values
+        Of the parameter, increasing or decreasing: identities are kept from each to the next.
+    window, starts, max_period, seed, tol
+        As for `find_attractors`.
+    known
+        Branches along the same parameter, whose stable orbits count at every value.
+    threshold
+        The largest relative distance of one and the same attractor at neighbouring values.
+    progress
+        Called with the fraction done and what is being done.
 
-    Returns:
+    Returns
+    -------
+    xarray.Dataset
         A Dataset over (value, attractor), nan where it does not exist: `fraction`, `error`, `amplitude`, `largest_...`,
         `smallest_...`, `period` (0: none), `kind` ("" where it does not exist); over (value): `undecided`; over (event):
         births and deaths.
 
-    Raises:
-        ParameterError: a path to no number, values that are not monotonic, and as for `find_attractors`.
+    Raises
+    ------
+    ParameterError
+        A path to no number, values that are not monotonic, and as for `find_attractors`.
 
-    Examples:
-        >>> along = saltus.attractors_along(system, "load.frequency", [0.98, 1.0], starts=8)
-        >>> along.period.values
-        array([[1.],
-               [1.]])
+    Examples
+    --------
+    >>> along = saltus.attractors_along(system, "load.frequency", [0.98, 1.0], starts=8)
+    >>> along.period.values
+    array([[1.],
+           [1.]])
     """
     check_number("threshold", threshold, above=0.0)
     grid, followed = _values(system, path, values), _Followed(threshold, system.dimension)

@@ -75,10 +75,11 @@ class Target:
 class Attractor:
     """One attractor, with its evidence.
 
-    Examples:
-        >>> found = saltus.find_attractors(system, starts=16)
-        >>> found.of(1).orbit.stable
-        True
+    Examples
+    --------
+    >>> found = saltus.find_attractors(system, starts=16)
+    >>> found.of(1).orbit.stable
+    True
     """
 
     target: Target
@@ -143,10 +144,11 @@ class Attractor:
 class Attractors:
     """The attractors that were found, by their labels, and what was searched.
 
-    Examples:
-        >>> found = saltus.find_attractors(system, starts=16)
-        >>> len(found), found.undecided
-        (1, 0)
+    Examples
+    --------
+    >>> found = saltus.find_attractors(system, starts=16)
+    >>> len(found), found.undecided
+    (1, 0)
     """
 
     system: System
@@ -168,8 +170,10 @@ class Attractors:
     def of(self, label: int) -> Attractor:
         """The attractor of a label.
 
-        Raises:
-            KeyError: there is none.
+        Raises
+        ------
+        KeyError
+            There is none.
         """
         for member in self.members:
             if member.label == label:

@@ -69,26 +69,39 @@ def find_attractors(
     symmetric system is another one, unless it is its own, and is added even where no start leads to it. Under a constant load the
     equilibria are found, as orbits of period 1.
 
-    Args:
-        system: what moves, under a load with a frequency or a constant one.
-        window: of the states, ((least, largest coordinate), (least, largest velocity)), covered evenly by initial states; with
-            several coordinates such a pair for each of them, then for each velocity. By default half widths are 1.5 around the
-            contact, or around 0 without one. With several contacts starts take turns in which of them are closed.
-        starts: how many.
-        max_period: the longest period of an orbit, at most 16.
-        seed: shifts the states.
-        known: stable orbits, or branches of which those at the system's parameter are taken, that count as attractors too.
-        also: further initial states (n, d), coordinates and velocities, which do not count in the shares.
-        tol: the error of a step, as for `simulate_many`.
-        progress: called with the fraction done and what is being done.
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency or a constant one.
+    window
+        Of the states, ((least, largest coordinate), (least, largest velocity)), covered evenly by initial states; with
+        several coordinates such a pair for each of them, then for each velocity. By default half widths are 1.5 around the
+        contact, or around 0 without one. With several contacts starts take turns in which of them are closed.
+    starts
+        How many.
+    max_period
+        The longest period of an orbit, at most 16.
+    seed
+        Shifts the states.
+    known
+        Stable orbits, or branches of which those at the system's parameter are taken, that count as attractors too.
+    also
+        Further initial states (n, d), coordinates and velocities, which do not count in the shares.
+    tol
+        The error of a step, as for `simulate_many`.
+    progress
+        Called with the fraction done and what is being done.
 
-    Raises:
-        ParameterError: a load that never repeats, known orbits of another system, numbers without meaning.
+    Raises
+    ------
+    ParameterError
+        A load that never repeats, known orbits of another system, numbers without meaning.
 
-    Examples:
-        >>> found = saltus.find_attractors(system, starts=16)
-        >>> [attractor.period for attractor in found]
-        [1]
+    Examples
+    --------
+    >>> found = saltus.find_attractors(system, starts=16)
+    >>> [attractor.period for attractor in found]
+    [1]
     """
     clock, further, area = with_clock(system), check_states("also", also, system.dimension), check_window(window, system)
     progress(0.0, "motions")

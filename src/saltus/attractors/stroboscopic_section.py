@@ -14,8 +14,10 @@ def with_clock(system: System) -> System:
 
     Equilibria are then orbits of period 1.
 
-    Raises:
-        ParameterError: what is no system, or a load of records, which never repeats.
+    Raises
+    ------
+    ParameterError
+        What is no system, or a load of records, which never repeats.
     """
     check_system(system, "the search of attractors", several_contacts=True)
     check_periodic(system)
@@ -27,8 +29,10 @@ def with_clock(system: System) -> System:
 def check_periodic(system: System) -> None:
     """Refuse loads by records of samples and by pulses: what goes on for ever under them is not defined.
 
-    Raises:
-        ParameterError: with the channel.
+    Raises
+    ------
+    ParameterError
+        With the channel.
     """
     for name, signal in system.load.channels.items():
         if signal.once:

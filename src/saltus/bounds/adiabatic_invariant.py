@@ -206,11 +206,16 @@ def budget(form: Form, box: Box, v: Any) -> Budget:
 def largest_start(budgets: list[Budget], loss: Any, period: Any, v: Any) -> Any:
     """The largest speed after an impact from which the speed provably stays below v and falls to 0; 0 if there is none.
 
-    Args:
-        budgets: of the sides of a cycle.
-        loss: -ln of the impacts' factor, at least 0; (1, n).
-        period: what the cells of the time divide evenly; (1, n).
-        v: the largest speed for which the budgets hold; (1, n).
+    Parameters
+    ----------
+    budgets
+        Of the sides of a cycle.
+    loss
+        -ln of the impacts' factor, at least 0; (1, n).
+    period
+        What the cells of the time divide evenly; (1, n).
+    v
+        The largest speed for which the budgets hold; (1, n).
     """
     best = np.zeros_like(v)
     with np.errstate(all="ignore"):

@@ -58,21 +58,29 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     All bounds are interval bounds over the whole forcing period, or the whole record, and over all openings and speeds in
     question.
 
-    Args:
-        system: a model with a contact.
-        parameters: arrays or numbers by dotted path, which broadcast; all others are the system's.
+    Parameters
+    ----------
+    system
+        A model with a contact.
+    parameters
+        Arrays or numbers by dotted path, which broadcast; all others are the system's.
 
-    Returns:
-        the speeds, an array of the shape to which the parameters broadcast; a DataArray where they are DataArrays.
+    Returns
+    -------
+    Any
+        The speeds, an array of the shape to which the parameters broadcast; a DataArray where they are DataArrays.
 
-    Raises:
-        ParameterError: what is no system; a path that is not a number of it; values that are none or that it refuses; shapes
-            that do not fit.
+    Raises
+    ------
+    ParameterError
+        What is no system; a path that is not a number of it; values that are none or that it refuses; shapes
+        that do not fit.
 
-    Examples:
-        >>> quiet = system.with_({"load.horizontal.amplitude": 0.02})
-        >>> bool(saltus.capture_speed(quiet) > 0.02), float(saltus.capture_speed(system))  # beyond Hcr nothing is proved
-        (True, 0.0)
+    Examples
+    --------
+    >>> quiet = system.with_({"load.horizontal.amplitude": 0.02})
+    >>> bool(saltus.capture_speed(quiet) > 0.02), float(saltus.capture_speed(system))  # beyond Hcr nothing is proved
+    (True, 0.0)
     """
     check_system(system, "capture_speed", several_contacts=True)
     arrays = {path: finite_array(path, given) for path, given in parameter_table(system, parameters).items()}
@@ -120,7 +128,9 @@ def keeps_rest(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
     It is proved where interval bounds of every contact's reaction, l = -r(t, q, 0) along its sign at rest, are positive over the
     whole forcing period. Nothing is proved where a coordinate has no contact or two of them, or under a load by records.
 
-    Returns:
+    Returns
+    -------
+    np.ndarray
         (n,), or (1,) for numbers alone.
     """
     traced = trace(system)

@@ -29,13 +29,19 @@ CLIMB = ClimbSettings()
 def climb(pull: Bounds, slope: Bounds, allowed: Any) -> Work:
     """Open a gap from 0 while the pull is above 0 at all times, and the ratio of the two works below `allowed`.
 
-    Args:
-        pull: bounds of -A(t, w, 0) over all t for w in an interval, arrays (1, n).
-        slope: bounds of its derivative to w.
-        allowed: (1, n).
+    Parameters
+    ----------
+    pull
+        Bounds of -A(t, w, 0) over all t for w in an interval, arrays (1, n).
+    slope
+        Bounds of its derivative to w.
+    allowed
+        (1, n).
 
-    Returns:
-        how far it opens, W, and lower and upper bounds of the work, int_0^W min_t(-A) dw and int_0^W max_t(-A) dw; arrays
+    Returns
+    -------
+    Work
+        How far it opens, W, and lower and upper bounds of the work, int_0^W min_t(-A) dw and int_0^W max_t(-A) dw; arrays
         (1, n), 0 where nothing is proved. For all smaller openings too, the ratio of the works is below `allowed`.
     """
     done: Work = (np.zeros_like(allowed), np.zeros_like(allowed), np.zeros_like(allowed))

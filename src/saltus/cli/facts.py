@@ -17,8 +17,10 @@ PHASES = 64  # Instants at which a load is compared with its mirror image: no ha
 def describe(system: System, start: float | None = None) -> Iterator[Block]:
     """What is known of `system`.
 
-    Args:
-        start: the angle, rad, from which the period of a free vibration is wanted.
+    Parameters
+    ----------
+    start
+        The angle, rad, from which the period of a free vibration is wanted.
     """
     parameters: list[Row] = [(path, number(value)) for path, value in system.parameters.items()]
     yield Block("Parameters", [*parameters, ("impact law", type(system.impact).__name__)])

@@ -15,8 +15,10 @@ LEAST_START = 1e-6  # rad; below it a free vibration is too small to speak of
 def print_info(path: Path) -> None:
     """Print what is known of the system in the study at `path`.
 
-    Raises:
-        SaltusError: a bad study, or a model that cannot be traced, so that no motion of it could be computed.
+    Raises
+    ------
+    SaltusError
+        A bad study, or a model that cannot be traced, so that no motion of it could be computed.
     """
     from saltus.config import Ask, load_study
     from saltus.taylor import trace

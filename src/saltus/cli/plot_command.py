@@ -13,8 +13,10 @@ from saltus.errors import ParameterError, SaltusError
 def plot_store(path: Path, output: Path | None) -> None:
     """Draw the result at `path` (netCDF, or the Zarr store of a sweep) beside it, or into the folder `output`.
 
-    Raises:
-        ParameterError: there is no result of saltus at `path`, a sweep is not complete, a folder cannot be written to.
+    Raises
+    ------
+    ParameterError
+        There is no result of saltus at `path`, a sweep is not complete, a folder cannot be written to.
     """
     from saltus.config import kind_of, open_result
     from saltus.files import UNCHECKED, check_writable, has_checksum
@@ -53,8 +55,10 @@ def _check_sizes(path: Path, data: Any) -> None:
 def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     """Draw a result as `stem`.png and `stem`.pdf.
 
-    Raises:
-        ParameterError: it is of no kind that has a picture.
+    Raises
+    ------
+    ParameterError
+        It is of no kind that has a picture.
     """
     from saltus.config import kind_of
     from saltus.files import write_figure

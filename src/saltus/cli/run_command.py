@@ -20,9 +20,11 @@ SWEPT = ("basins", "stability_chart", *DIAGRAMS)  # computed in parts into a sto
 def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None, fresh: bool = False) -> None:
     """Answer every question of the study at `path` into `output`, the motion first; `fresh` begins every store anew.
 
-    Raises:
-        SaltusError: a bad study or one that asks nothing, a folder that cannot be written to, a scheduler that does not answer,
-            all before anything is computed; then what a question's function raises.
+    Raises
+    ------
+    SaltusError
+        A bad study or one that asks nothing, a folder that cannot be written to, a scheduler that does not answer,
+        all before anything is computed; then what a question's function raises.
     """
     from saltus.cli.simulate_command import simulate_study
     from saltus.config import load_study
@@ -51,8 +53,10 @@ def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None
 def check(study: Study, ask: Ask, output: Path | None) -> None:
     """Refuse what the function of a question would refuse.
 
-    Raises:
-        ParameterError: an argument without meaning, or in `output`, if it is given, the store of something else.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning, or in `output`, if it is given, the store of something else.
     """
     function: Any = ask.function
     store = {} if output is None or ask.kind not in SWEPT else {"store": output / f"{ask.kind}.zarr"}

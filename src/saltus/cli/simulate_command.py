@@ -28,8 +28,10 @@ SETTINGS = SampleSettings()
 def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
     """Run the study at `path`, write its motion into `output`, and print a summary.
 
-    Raises:
-        SaltusError: a bad study, a folder that cannot be written to (before anything is computed), a motion that cannot go on.
+    Raises
+    ------
+    SaltusError
+        A bad study, a folder that cannot be written to (before anything is computed), a motion that cannot go on.
     """
     from saltus.cli.motion_summary import print_summary
     from saltus.cli.progress_bar import progress_bar

@@ -28,8 +28,10 @@ def print_status(path: Path, verify: bool = False) -> None:
 
     To `verify` compares every file with its checksum, also of a netCDF file, or of all results in a folder.
 
-    Raises:
-        ParameterError: there is no store of a sweep at `path`, or what was verified is damaged.
+    Raises
+    ------
+    ParameterError
+        There is no store of a sweep at `path`, or what was verified is damaged.
     """
     from saltus.sweep import damage, parts_of, status
 
@@ -61,8 +63,10 @@ def print_status(path: Path, verify: bool = False) -> None:
 def print_verified(path: Path) -> None:
     """Print of the netCDF file at `path`, or of each result below that folder, whether it is what was written.
 
-    Raises:
-        ParameterError: with all that is damaged; there is no result at `path`.
+    Raises
+    ------
+    ParameterError
+        With all that is damaged; there is no result at `path`.
     """
     from saltus.files import UNCHECKED, checked_content, has_checksum
     from saltus.sweep import damage, parts_of, status

@@ -54,8 +54,10 @@ def functions_of(kind: str) -> list[Callable[..., Any]]:
 def keys_of(kind: str, coordinates: tuple[str, ...] = ()) -> dict[str, Reader]:
     """The keys that the table of a question may have, with their readers: the arguments of types that a file can give.
 
-    Args:
-        coordinates: the names of the coordinates; the state variables of such a model stand for an open-ended argument.
+    Parameters
+    ----------
+    coordinates
+        The names of the coordinates; the state variables of such a model stand for an open-ended argument.
     """
     keys: dict[str, Reader] = {}
     for function in functions_of(kind):

@@ -42,8 +42,10 @@ def show(value: Any) -> str:
 def read_number(value: Any) -> float:
     """A finite number as a float.
 
-    Raises:
-        ValueError: for anything else, with the predicate of a sentence.
+    Raises
+    ------
+    ValueError
+        For anything else, with the predicate of a sentence.
     """
     if isinstance(value, str):
         raise ValueError(f"must be a number, got {show(value)}{_unquoted(value)}")
@@ -71,8 +73,10 @@ def _unquoted(text: str) -> str:
 def read_angle(value: Any) -> float:
     """An angle in radians from "80 deg", "1.4 rad" or a number of radians.
 
-    Raises:
-        ValueError: for anything else, with the predicate of a sentence.
+    Raises
+    ------
+    ValueError
+        For anything else, with the predicate of a sentence.
     """
     if not isinstance(value, str):
         return read_number(value)

@@ -30,14 +30,17 @@ def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
     a Dataset; a study (.toml) a `Study`; a system (.json, of `System.to_json`) a `System`. Orbits of a branch are given by
     `saltus.orbits.orbits_of(load(...))`. Nothing in a result is run; a study may name Python files with models, and these are.
 
-    Raises:
-        ParameterError: there is no such file, it is of none of these kinds, or it is damaged, in one sentence.
+    Raises
+    ------
+    ParameterError
+        There is no such file, it is of none of these kinds, or it is damaged, in one sentence.
 
-    Examples:
-        >>> from pathlib import Path
-        >>> _ = Path("system.json").write_text(system.to_json())
-        >>> saltus.load("system.json") == system
-        True
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("system.json").write_text(system.to_json())
+    >>> saltus.load("system.json") == system
+    True
     """
     path = Path(path)
     if not path.exists():
@@ -62,8 +65,10 @@ def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
 def open_result(path: Path) -> Any:
     """The Dataset or DataTree at `path`; nothing in it is run, and its system is not made.
 
-    Raises:
-        ParameterError: no such file, or one that is not of saltus, or is damaged; a sweep that is not complete.
+    Raises
+    ------
+    ParameterError
+        No such file, or one that is not of saltus, or is damaged; a sweep that is not complete.
     """
     from saltus.files import read_dataset
 
@@ -97,17 +102,23 @@ def to_mat(path: str | Path, result: Result) -> Path:
     Each variable and coordinate is an array under its name, in which what MATLAB does not take becomes "_"; texts are cell
     arrays; `attributes` is a struct, and so is each group of a tree.
 
-    Args:
-        path: of the file; ".mat" is appended where it has no suffix.
-        result: a Dataset, a DataTree, or what has `to_xarray`, such as a motion or a branch.
+    Parameters
+    ----------
+    path
+        Of the file; ".mat" is appended where it has no suffix.
+    result
+        A Dataset, a DataTree, or what has `to_xarray`, such as a motion or a branch.
 
-    Raises:
-        ParameterError: what is no such result; two names that become one.
+    Raises
+    ------
+    ParameterError
+        What is no such result; two names that become one.
 
-    Examples:
-        >>> path = saltus.to_mat("branch.mat", branch)
-        >>> path.name
-        'branch.mat'
+    Examples
+    --------
+    >>> path = saltus.to_mat("branch.mat", branch)
+    >>> path.name
+    'branch.mat'
     """
     import io
 

@@ -61,8 +61,10 @@ def read_samples(source: Source, keys: Keys, name: str) -> tuple[np.ndarray, np.
     Columns are parted by commas, semicolons, tabs or spaces; one line of headings, blank lines and lines that begin with # are
     skipped. Returns two arrays of shape (samples,).
 
-    Raises:
-        ParameterError: no such file, a line that is not two finite numbers, times that do not increase (with the line).
+    Raises
+    ------
+    ParameterError
+        No such file, a line that is not two finite numbers, times that do not increase (with the line).
     """
     where = f"{'.'.join(keys)} {name!r}"
     path = source.path.parent / Path(name)

@@ -49,8 +49,10 @@ def one_line(text: str) -> str:
 def read_source(path: Path) -> tuple[Source, dict[str, Any]]:
     """The file at `path` and the tables in it.
 
-    Raises:
-        ParameterError: no such file, a folder, a file that cannot be read, text that is not TOML (with the line).
+    Raises
+    ------
+    ParameterError
+        No such file, a folder, a file that cannot be read, text that is not TOML (with the line).
     """
     source = Source(path)
     try:

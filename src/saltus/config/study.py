@@ -24,11 +24,12 @@ class Study:
 
     `load_study("study.toml").run()` is `saltus.simulate` with the file's settings.
 
-    Examples:
-        >>> from pathlib import Path
-        >>> _ = Path("study.toml").write_text("[model]\ntype = 'WallOscillator'\n[simulate]\nx = -0.5\nduration = 3\n")
-        >>> saltus.load_study("study.toml").system.model.wall
-        1.0
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("study.toml").write_text("[model]\ntype = 'WallOscillator'\n[simulate]\nx = -0.5\nduration = 3\n")
+    >>> saltus.load_study("study.toml").system.model.wall
+    1.0
     """
 
     name: str
@@ -40,8 +41,10 @@ class Study:
     def settings(self) -> Settings:
         """`simulate`, refused where the file has none.
 
-        Raises:
-            ParameterError: the file has no [simulate].
+        Raises
+        ------
+        ParameterError
+            The file has no [simulate].
         """
         if self.simulate is None:
             self.source.refuse((), "has no [simulate]; add one, such as [simulate] theta = 0.3, periods = 20")
@@ -50,10 +53,14 @@ class Study:
     def run(self, **more: Any) -> Any:
         """The motion that the study asks for; `more` goes to `saltus.simulate` as it is, in place of the file's own settings.
 
-        Raises:
-            ParameterError: the file has no [simulate], or the flow refuses a setting (with the file's name).
-            MotionError: the motion cannot be continued (with the file's name).
-            TraceError: the model uses an operation that cannot be traced (with the file's name).
+        Raises
+        ------
+        ParameterError
+            The file has no [simulate], or the flow refuses a setting (with the file's name).
+        MotionError
+            The motion cannot be continued (with the file's name).
+        TraceError
+            The model uses an operation that cannot be traced (with the file's name).
         """
         from saltus.flow import simulate
 
@@ -63,9 +70,16 @@ class Study:
     def answer(self, ask: Ask, function: Callable[..., Any], **more: Any) -> Any:
         """`function(system, ...)` with the arguments of a question, and `more`.
 
-        Raises:
-            ParameterError: the function refuses an argument, with its place in the file.
-            MotionError, TraceError, SweepError: as the function raises them, with the file's name.
+        Raises
+        ------
+        ParameterError
+            The function refuses an argument, with its place in the file.
+        MotionError
+            As the function raises them, with the file's name.
+        TraceError
+            As the function raises them, with the file's name.
+        SweepError
+            As the function raises them, with the file's name.
         """
         try:
             return function(self.system, **ask.options, **more)
@@ -79,18 +93,24 @@ class Study:
 def load_study(path: Path | str, *, questions: bool = True) -> Study:
     r"""The study in the TOML file at `path`, checked in full.
 
-    Args:
-        path: of the file.
-        questions: whether the other questions are read, which loads the functions that answer them.
+    Parameters
+    ----------
+    path
+        Of the file.
+    questions
+        Whether the other questions are read, which loads the functions that answer them.
 
-    Raises:
-        ParameterError: whatever is wrong, in one sentence with the file, the line and the dotted key.
+    Raises
+    ------
+    ParameterError
+        Whatever is wrong, in one sentence with the file, the line and the dotted key.
 
-    Examples:
-        >>> from pathlib import Path
-        >>> _ = Path("study.toml").write_text("[model]\ntype = 'WallOscillator'\n[simulate]\nx = -0.5\nduration = 3\n")
-        >>> str(saltus.load_study("study.toml").run().stop)
-        'horizon'
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("study.toml").write_text("[model]\ntype = 'WallOscillator'\n[simulate]\nx = -0.5\nduration = 3\n")
+    >>> str(saltus.load_study("study.toml").run().stop)
+    'horizon'
     """
     source, tables = read_source(Path(path))
     for name in tables:

@@ -53,12 +53,17 @@ def newton(
 ) -> Corrected[E] | None:
     """The zero of a system near a guess, or None where Newton's method does not converge.
 
-    Args:
-        evaluate: the equations at (place, thorough), None where they have no value. The evaluation that is returned was a
-            thorough one, with all that is wanted to be known of a solution.
-        linear: the matrix and the right-hand side of the equations for a step, from an evaluation and its place.
-        guess: where to begin.
-        iterations: the most steps.
+    Parameters
+    ----------
+    evaluate
+        The equations at (place, thorough), None where they have no value. The evaluation that is returned was a
+        thorough one, with all that is wanted to be known of a solution.
+    linear
+        The matrix and the right-hand side of the equations for a step, from an evaluation and its place.
+    guess
+        Where to begin.
+    iterations
+        The most steps.
     """
     place, before = guess.copy(), np.inf
     for iteration in range(iterations + 1):

@@ -18,9 +18,10 @@ class EndReason(Enum):
 class CurveEnd(EndReason):
     """The reasons that any curve may have.
 
-    Examples:
-        >>> [end.reason.name for end in branch.ends]
-        ['BOUND', 'BOUND']
+    Examples
+    --------
+    >>> [end.reason.name for end in branch.ends]
+    ['BOUND', 'BOUND']
     """
 
     BOUND = "bound {detail}{parameter:g}"
@@ -34,9 +35,10 @@ class CurveEnd(EndReason):
 class End:
     """An end of a curve: its reason, with the parameter there, the kind of a special point and what else the sentence names.
 
-    Examples:
-        >>> branch.ends[0].parameter, str(branch.ends[0])
-        (0.8, 'bound 0.8')
+    Examples
+    --------
+    >>> branch.ends[0].parameter, str(branch.ends[0])
+    (0.8, 'bound 0.8')
     """
 
     reason: EndReason

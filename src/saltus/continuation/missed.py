@@ -28,9 +28,10 @@ class CurveMissed(MissedReason):
 class Missed:
     """Something special between two neighbouring points of a curve that was not located.
 
-    Examples:
-        >>> branch.missed  # all that a test function told was located
-        ()
+    Examples
+    --------
+    >>> branch.missed  # all that a test function told was located
+    ()
     """
 
     reason: MissedReason

@@ -10,10 +10,11 @@ from typing import Any
 class Evidence:
     """The numbers that show that a special point is there.
 
-    Examples:
-        >>> fold = next(point for point in branch.special if point.kind == "LP")
-        >>> fold.evidence.bracket < 1e-9, fold.evidence.before * fold.evidence.after < 0
-        (True, True)
+    Examples
+    --------
+    >>> fold = next(point for point in branch.special if point.kind == "LP")
+    >>> fold.evidence.bracket < 1e-9, fold.evidence.before * fold.evidence.after < 0
+    (True, True)
     """
 
     residual: float  # of the equations

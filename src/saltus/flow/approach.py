@@ -35,11 +35,16 @@ def approached(states: np.ndarray, longest: int) -> tuple[np.ndarray, np.ndarray
     steps before the last, the orbit is at s + M (1 - M)^-1 d after the last one. It is believed if M predicts the last step too
     and is a contraction. The fewest periods q up to `longest` are taken for which 4 q + 1 states are there.
 
-    Args:
-        states: (n, kept, 2), coordinate and velocity at the ends of the last forcing periods, the last one last.
-        longest: the longest period looked for.
+    Parameters
+    ----------
+    states
+        (n, kept, 2), coordinate and velocity at the ends of the last forcing periods, the last one last.
+    longest
+        The longest period looked for.
 
-    Returns:
+    Returns
+    -------
+    tuple[np.ndarray, np.ndarray]
         (n, 2): the last states, or what they approach; (n,): the periods.
     """
     limit, period = states[:, -1].copy(), np.zeros(len(states), dtype=int)

@@ -27,8 +27,10 @@ class Clock:
 def clock(time: Any, length: Any, periods: float | None, duration: float | None) -> Clock:
     """When motions start and end that begin at `time`, under loads of period `length` (or None), and go on for so long.
 
-    Raises:
-        ParameterError: both of periods and duration or neither, a negative one, periods without a period, too many to count.
+    Raises
+    ------
+    ParameterError
+        Both of periods and duration or neither, a negative one, periods without a period, too many to count.
     """
     if (periods is None) == (duration is None):
         raise ParameterError("say how long: either periods=... or duration=...", "periods")

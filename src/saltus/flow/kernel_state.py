@@ -28,8 +28,10 @@ class KernelState:
     def at_start(cls, request: MotionRequest, run: Program) -> Self:
         """The state in which a motion starts.
 
-        Raises:
-            ParameterError: a state beyond the contact, a gap or a reset that cannot be.
+        Raises
+        ------
+        ParameterError
+            A state beyond the contact, a gap or a reset that cannot be.
         """
         where, at = np.zeros(len(Where), dtype=np.int64), request.clock
         where[Where.PERIOD], where[Where.LAST_PERIOD] = int(at.first), int(at.last)

@@ -18,11 +18,12 @@ RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: th
 class Release:
     """A root of a contact acceleration at which it begins to pull: from then on rest cannot be kept.
 
-    Examples:
-        >>> resting = system.with_({"load.horizontal.amplitude": 0.15, "impact.e": 0.3})
-        >>> first = saltus.flow.load_releases(resting)[0]
-        >>> float(0.15 * np.sin(first.time) / saltus.theory.critical_horizontal(np.deg2rad(80), -0.5))  # the load is at Hcr
-        0.9999999999999999
+    Examples
+    --------
+    >>> resting = system.with_({"load.horizontal.amplitude": 0.15, "impact.e": 0.3})
+    >>> first = saltus.flow.load_releases(resting)[0]
+    >>> float(0.15 * np.sin(first.time) / saltus.theory.critical_horizontal(np.deg2rad(80), -0.5))  # the load is at Hcr
+    0.9999999999999999
     """
 
     time: float  # in [0, T)
@@ -61,10 +62,11 @@ def load_releases(system: System) -> tuple[Release, ...]:
     For load (i) of the metainterface with equal layers those of side +1 are at sin(Omega t) = Hcr / Hhat, with
     Hcr = abs(V / tan(beta0)), and those of side -1 half a period later.
 
-    Examples:
-        >>> resting = system.with_({"load.horizontal.amplitude": 0.15, "impact.e": 0.3})
-        >>> [release.side for release in saltus.flow.load_releases(resting)]
-        [1, -1]
+    Examples
+    --------
+    >>> resting = system.with_({"load.horizontal.amplitude": 0.15, "impact.e": 0.3})
+    >>> [release.side for release in saltus.flow.load_releases(resting)]
+    [1, -1]
     """
     check_system(system, "load_releases", several_contacts=True)
     if system.load.period is None:

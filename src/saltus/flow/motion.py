@@ -27,9 +27,10 @@ if TYPE_CHECKING:
 class EventKind(StrEnum):
     """What happens at an instant of a motion, in the order of the kernel's numbers.
 
-    Examples:
-        >>> [str(kind) for kind in saltus.EventKind][:2]
-        ['impact', 'grazing']
+    Examples
+    --------
+    >>> [str(kind) for kind in saltus.EventKind][:2]
+    ['impact', 'grazing']
     """
 
     IMPACT = "impact"  # an impact: the gap closes with a speed
@@ -48,10 +49,11 @@ EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
 class Event:
     """One event: its time, and the velocities before and after it (equal where nothing jumps).
 
-    Examples:
-        >>> event = saltus.simulate(system, theta=0.3, periods=1).events[0]
-        >>> str(event.kind), event.time > 0
-        ('impact', True)
+    Examples
+    --------
+    >>> event = saltus.simulate(system, theta=0.3, periods=1).events[0]
+    >>> str(event.kind), event.time > 0
+    ('impact', True)
     """
 
     time: float
@@ -65,10 +67,11 @@ class Event:
 class Impacts:
     """The impacts of a motion, as arrays of one length.
 
-    Examples:
-        >>> impacts = saltus.simulate(system, theta=0.3, periods=2).impacts
-        >>> bool(np.all(np.diff(impacts.time) > 0)), len(impacts) == len(impacts.velocity_before)
-        (True, True)
+    Examples
+    --------
+    >>> impacts = saltus.simulate(system, theta=0.3, periods=2).impacts
+    >>> bool(np.all(np.diff(impacts.time) > 0)), len(impacts) == len(impacts.velocity_before)
+    (True, True)
     """
 
     time: np.ndarray
@@ -142,10 +145,11 @@ class Motion:
     The coordinate at the end has the model's own name: `motion.theta`, or `motion.x` for a wall oscillator; all of them are in
     `motion.position`. With several degrees of freedom positions and velocities are tuples.
 
-    Examples:
-        >>> motion = saltus.simulate(system, theta=0.3, periods=5)
-        >>> len(motion.impacts), motion.at([0.0])[0]
-        (9, array([0.3]))
+    Examples
+    --------
+    >>> motion = saltus.simulate(system, theta=0.3, periods=5)
+    >>> len(motion.impacts), motion.at([0.0])[0]
+    (9, array([0.3]))
     """
 
     system: System
@@ -203,11 +207,15 @@ class Motion:
     def at(self, times: Numbers) -> tuple[Any, Any]:
         """Coordinate and velocity at any times of the motion, at the method's accuracy; after the impact at an impact.
 
-        Returns:
+        Returns
+        -------
+        tuple[Any, Any]
             Two floats for one time, two arrays (n,) for n times; (degrees of freedom, n) where there are several.
 
-        Raises:
-            ParameterError: a time outside the motion, or a motion computed with dense=False.
+        Raises
+        ------
+        ParameterError
+            A time outside the motion, or a motion computed with dense=False.
         """
         position, velocity, _ = self._states(instants(times))
         if len(self.system.model.coordinates) == 1:
@@ -238,8 +246,10 @@ class Motion:
     def validity(self) -> Validity:
         """Whether the mechanism could move so: limits passed, and the share of time with a wrong reaction (errata 20, 21).
 
-        Raises:
-            ParameterError: a motion computed with dense=False and without samples.
+        Raises
+        ------
+        ParameterError
+            A motion computed with dense=False and without samples.
         """
         if self.sampled_validity is not None:
             return self.sampled_validity
@@ -253,8 +263,10 @@ class Motion:
     def samples(self, count: int) -> Samples:
         """So many states, evenly over the motion, its start and its end among them.
 
-        Raises:
-            ParameterError: fewer than 2; a motion computed with dense=False.
+        Raises
+        ------
+        ParameterError
+            Fewer than 2; a motion computed with dense=False.
         """
         check_count("count", count, 2)
         times = np.linspace(self.start, self.time, int(count))

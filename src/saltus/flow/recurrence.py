@@ -166,21 +166,33 @@ def find_recurrence(
 ) -> Recurrence:
     """Follow motions from states at phase 0 until they rest for good, repeat themselves or the time is up.
 
-    Args:
-        system: what moves, under a load with a frequency.
-        states: (n, d): coordinates, then velocities.
-        periods: for how many forcing periods at most.
-        parameters: numbers by dotted path, (n,) each, in place of the system's.
-        max_period: the longest period looked for. Those above 16 need `kept` to be more than twice as many.
-        kept: how many of the last stroboscopic states are kept, by default all; 0 for none.
-        extrema, impact_count, speed: whether these are recorded, over max(kept, max_period) of the last forcing periods.
-        stop_early: False follows every motion for all periods, and reads its period off the last states (`near_return`).
-        tol: the error that one step may make.
-        threads: how many cores to use; by default all.
-        progress: called with the fraction done.
-
     A motion at the contact is at rest for good if it is proved to be captured, or if the load never pulls there; with parameters
     of its own, only if it is proved.
+
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    states
+        (n, d): coordinates, then velocities.
+    periods
+        For how many forcing periods at most.
+    parameters
+        Numbers by dotted path, (n,) each, in place of the system's.
+    max_period
+        The longest period looked for. Those above 16 need `kept` to be more than twice as many.
+    kept
+        How many of the last stroboscopic states are kept, by default all; 0 for none.
+    extrema, impact_count, speed
+        Whether these are recorded, over max(kept, max_period) of the last forcing periods.
+    stop_early
+        False follows every motion for all periods, and reads its period off the last states (`near_return`).
+    tol
+        The error that one step may make.
+    threads
+        How many cores to use; by default all.
+    progress
+        Called with the fraction done.
     """
     wanted = {"state": kept != 0, "extrema": extrema, "impact_count": impact_count, "speed": speed}
     size = periods if kept is None else kept

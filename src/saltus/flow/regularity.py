@@ -18,9 +18,10 @@ from saltus.taylor import Expr, Form, NoNormalForm, Trace, constant, constant_va
 class ContactRegularity(Enum):
     """What passing the contact does to a motion.
 
-    Examples:
-        >>> [kind.name for kind in saltus.flow.ContactRegularity]
-        ['IMPACT', 'JUMP', 'CONTINUOUS']
+    Examples
+    --------
+    >>> [kind.name for kind in saltus.flow.ContactRegularity]
+    ['IMPACT', 'JUMP', 'CONTINUOUS']
     """
 
     IMPACT = "the velocity changes: a grazing is a square root in the map"

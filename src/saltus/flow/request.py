@@ -22,8 +22,10 @@ ARGUMENTS = ("velocity", "periods", "duration", "time")  # a misspelt one arrive
 class MotionRequest:
     """The arguments of `simulate`, as they are given.
 
-    Raises:
-        ParameterError: an argument without meaning.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning.
     """
 
     system: System

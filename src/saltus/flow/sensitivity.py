@@ -44,10 +44,11 @@ class Sensitivities:
     parameter: the derivative of its time. It is nan where the event has none (a grazing, the beginning of chatter) or where
     the motion had lost its derivative before.
 
-    Examples:
-        >>> result = saltus.sensitivities(system, theta=0.3, periods=2)
-        >>> float(result.determinant / np.exp(-0.1 * result.motion.time))  # with e = 1 areas shrink by the damping alone
-        1.0000000000001628
+    Examples
+    --------
+    >>> result = saltus.sensitivities(system, theta=0.3, periods=2)
+    >>> float(result.determinant / np.exp(-0.1 * result.motion.time))  # with e = 1 areas shrink by the damping alone
+    1.0000000000001628
     """
 
     motion: Motion
@@ -94,20 +95,28 @@ def sensitivities(
     whose determinant is R_v v+ / v-. A release moves with the root of the contact acceleration; at rest the derivatives are
     those of the contact. With several contacts the law of those that act is differentiated (see `contacts/contact_tangent.py`).
 
-    Args:
-        system: what moves.
-        parameters: dotted paths of the numbers to differentiate to, such as "load.frequency", "impact.e".
-        velocity, periods, duration, tol, time, side, stop_at, dense, progress, coordinates: as for `simulate`.
+    Parameters
+    ----------
+    system
+        What moves.
+    parameters
+        Dotted paths of the numbers to differentiate to, such as "load.frequency", "impact.e".
+    velocity, periods, duration, tol, time, side, stop_at, dense, progress, coordinates
+        As for `simulate`.
 
-    Raises:
-        ParameterError: a path to no number, with the near ones; an argument without meaning.
-        MotionError: as for `simulate`.
+    Raises
+    ------
+    ParameterError
+        A path to no number, with the near ones; an argument without meaning.
+    MotionError
+        As for `simulate`.
 
-    Examples:
-        >>> ball = saltus.System(model=saltus.WallOscillator(stiffness=0.0, wall=0.0), load=saltus.Load(force=1.0))
-        >>> result = saltus.sensitivities(ball, x=-2.0, duration=3.0)
-        >>> float(result.event_times[0, 0])  # a fall from x = -h takes sqrt(2 h), with the derivative -1 / sqrt(2 h)
-        -0.5
+    Examples
+    --------
+    >>> ball = saltus.System(model=saltus.WallOscillator(stiffness=0.0, wall=0.0), load=saltus.Load(force=1.0))
+    >>> result = saltus.sensitivities(ball, x=-2.0, duration=3.0)
+    >>> float(result.event_times[0, 0])  # a fall from x = -h takes sqrt(2 h), with the derivative -1 / sqrt(2 h)
+    -0.5
     """
     paths = _paths(system, parameters)
     request = MotionRequest(

@@ -41,27 +41,43 @@ def simulate(
 ) -> Motion:
     """The exact motion of a system from a state, event by event, by Taylor series.
 
-    Args:
-        system: what moves.
-        velocity: the velocity at the start (a tuple where there are several coordinates, or 0 for all).
-        periods, duration: how long, in forcing periods or in dimensionless time; one of them.
-        tol: the error that one step may make, relative to the state, in [1e-15, 1e-6].
-        time: the dimensionless time at the start.
-        side: +1 or -1, the side to leave by where the motion from rest at contact is not unique.
-        stop_at: margins of the model that end the motion, such as "kinematic_limit"; its own `stops` always do.
-        dense: keep the motion between the events; False keeps the events alone.
-        samples: times at which to keep the states instead, for a motion too long to be kept whole.
-        progress: called with the fraction done and what is being done, now and then.
-        coordinates: the state at the start by the model's names: theta=0.3, or x=0.0 for a wall oscillator.
+    Parameters
+    ----------
+    system
+        What moves.
+    velocity
+        The velocity at the start (a tuple where there are several coordinates, or 0 for all).
+    periods, duration
+        How long, in forcing periods or in dimensionless time; one of them.
+    tol
+        The error that one step may make, relative to the state, in [1e-15, 1e-6].
+    time
+        The dimensionless time at the start.
+    side
+        +1 or -1, the side to leave by where the motion from rest at contact is not unique.
+    stop_at
+        Margins of the model that end the motion, such as "kinematic_limit"; its own `stops` always do.
+    dense
+        Keep the motion between the events; False keeps the events alone.
+    samples
+        Times at which to keep the states instead, for a motion too long to be kept whole.
+    progress
+        Called with the fraction done and what is being done, now and then.
+    coordinates
+        The state at the start by the model's names: theta=0.3, or x=0.0 for a wall oscillator.
 
-    Raises:
-        ParameterError: an argument without meaning.
-        MotionError: the motion is not unique, an impact has no solution, or the numbers overflow; with the instant.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning.
+    MotionError
+        The motion is not unique, an impact has no solution, or the numbers overflow; with the instant.
 
-    Examples:
-        >>> motion = saltus.simulate(system, theta=0.3, periods=20)
-        >>> f"{motion.theta:.12f} after {len(motion.impacts)} impacts"
-        '-0.235680595299 after 39 impacts'
+    Examples
+    --------
+    >>> motion = saltus.simulate(system, theta=0.3, periods=20)
+    >>> f"{motion.theta:.12f} after {len(motion.impacts)} impacts"
+    '-0.235680595299 after 39 impacts'
     """
     request = MotionRequest(
         system=system,

@@ -8,9 +8,10 @@ from enum import StrEnum
 class Stop(StrEnum):
     """Why a motion ended: a word, and its `meaning` in a sentence.
 
-    Examples:
-        >>> str(saltus.simulate(system, theta=0.3, periods=2).stop)
-        'horizon'
+    Examples
+    --------
+    >>> str(saltus.simulate(system, theta=0.3, periods=2).stop)
+    'horizon'
     """
 
     meaning: str

@@ -21,10 +21,11 @@ class Validity:
 
     `gains` has the contacts at which the impact law may raise the kinetic energy, and by what share of it (see `energy_gain`).
 
-    Examples:
-        >>> validity = saltus.simulate(system, theta=0.3, periods=1).validity
-        >>> validity.first["kinematic_limit"] is None  # never passed
-        True
+    Examples
+    --------
+    >>> validity = saltus.simulate(system, theta=0.3, periods=1).validity
+    >>> validity.first["kinematic_limit"] is None  # never passed
+    True
     """
 
     first: dict[str, float | None]

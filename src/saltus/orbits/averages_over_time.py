@@ -60,24 +60,32 @@ def transmissibility(of: Followed, channel: str, response: Response | None = Non
     of the channel u of the load (its value: a force, or a displacement of the ground) and the response r, over one period of an
     orbit or the last forcing periods of a motion, of duration D. Of harmonics it is the ratio of their amplitudes.
 
-    Args:
-        of: an orbit, or a motion that was kept densely.
-        channel: of the load, such as "horizontal".
-        response: r(t, position, velocity) of arrays, such as the force on the ground k x + c x', or x plus the ground's
-        displacement;
-            by default the first coordinate. With several coordinates positions and velocities are arrays (coordinates, n).
-        periods: the last forcing periods of a motion, by default 1; all of it under a load without a frequency.
+    Parameters
+    ----------
+    of
+        An orbit, or a motion that was kept densely.
+    channel
+        Of the load, such as "horizontal".
+    response
+        r(t, position, velocity) of arrays, such as the force on the ground k x + c x', or x plus the ground's
+        displacement; by default the first coordinate. With several coordinates positions and velocities are arrays
+        (coordinates, n).
+    periods
+        The last forcing periods of a motion, by default 1; all of it under a load without a frequency.
 
-    Raises:
-        ParameterError: a channel that does not vary, a motion that was not kept or is shorter, a response that is no numbers.
+    Raises
+    ------
+    ParameterError
+        A channel that does not vary, a motion that was not kept or is shorter, a response that is no numbers.
 
-    Examples:
-        >>> spring = saltus.System(
-        ...     model=saltus.WallOscillator(damping=0.1, wall=9.0), load=saltus.Load(frequency=2.0, force=saltus.Harmonic(1.0))
-        ... )
-        >>> orbit = saltus.find_orbit(spring, x=0.0)
-        >>> round(saltus.transmissibility(orbit, "force") * np.hypot(1 - 2.0**2, 0.1 * 2.0), 9)  # x over force
-        np.float64(1.0)
+    Examples
+    --------
+    >>> spring = saltus.System(
+    ...     model=saltus.WallOscillator(damping=0.1, wall=9.0), load=saltus.Load(frequency=2.0, force=saltus.Harmonic(1.0))
+    ... )
+    >>> orbit = saltus.find_orbit(spring, x=0.0)
+    >>> round(saltus.transmissibility(orbit, "force") * np.hypot(1 - 2.0**2, 0.1 * 2.0), 9)  # x over force
+    np.float64(1.0)
     """
     course = _course(of, periods)
     model, load = course.system.model, course.system.load
@@ -109,22 +117,28 @@ def mean_dissipated_power(of: Followed, *, periods: int | None = None) -> float:
     v; velocities are those beside the ground. On a periodic orbit it is the mean power of the load. For load (i) the unit is that
     of K2 over the unit of time.
 
-    Args:
-        of: an orbit, or a motion that was kept densely.
-        periods: the last forcing periods of a motion, by default 1; all of it under a load without a frequency.
+    Parameters
+    ----------
+    of
+        An orbit, or a motion that was kept densely.
+    periods
+        The last forcing periods of a motion, by default 1; all of it under a load without a frequency.
 
-    Raises:
-        ParameterError: a motion that was not kept or is shorter; a model that gives neither its kinetic energy nor its mass
+    Raises
+    ------
+    ParameterError
+        A motion that was not kept or is shorter; a model that gives neither its kinetic energy nor its mass
         matrix.
 
-    Examples:
-        >>> spring = saltus.System(
-        ...     model=saltus.WallOscillator(damping=0.1, wall=9.0), load=saltus.Load(frequency=2.0, force=saltus.Harmonic(1.0))
-        ... )
-        >>> orbit = saltus.find_orbit(spring, x=0.0)
-        >>> expected = 0.1 * (2.0 * orbit.amplitude) ** 2 / 2  # c v^2 over a period
-        >>> round(float(saltus.mean_dissipated_power(orbit) / expected), 6)
-        1.0
+    Examples
+    --------
+    >>> spring = saltus.System(
+    ...     model=saltus.WallOscillator(damping=0.1, wall=9.0), load=saltus.Load(frequency=2.0, force=saltus.Harmonic(1.0))
+    ... )
+    >>> orbit = saltus.find_orbit(spring, x=0.0)
+    >>> expected = 0.1 * (2.0 * orbit.amplitude) ** 2 / 2  # c v^2 over a period
+    >>> round(float(saltus.mean_dissipated_power(orbit) / expected), 6)
+    1.0
     """
     course = _course(of, periods)
     return course.mean(-_damping_power(course)) + _impact_losses(course) / course.length

@@ -29,9 +29,10 @@ class Branch(Course):
     A family of resting orbits is a branch as well: `special` then holds grazings (GR), the zeros of margins and functions, and
     the ends RL and CH.
 
-    Examples:
-        >>> branch.ends[0].parameter, len(branch.at(0.88))
-        (0.8, 3)
+    Examples
+    --------
+    >>> branch.ends[0].parameter, len(branch.at(0.88))
+    (0.8, 3)
     """
 
     path: str
@@ -55,8 +56,10 @@ class Branch(Course):
     def at(self, value: float) -> list[PeriodicOrbit]:
         """All orbits of the branch at a value of the parameter, solved there.
 
-        Raises:
-            ParameterError: what is no finite number.
+        Raises
+        ------
+        ParameterError
+            What is no finite number.
         """
         check_number("value", value)
         return [point.orbit for point in self.solved_at(value)]

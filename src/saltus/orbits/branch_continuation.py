@@ -40,23 +40,34 @@ def continue_orbit(
 ) -> Branch:
     """The branch of an orbit along a parameter, both ways, until it closes, reaches a bound, shrinks to rest or cannot go on.
 
-    Args:
-        orbit: where to begin, as from `find_orbit`.
-        path: dotted path of the parameter, such as "load.frequency".
-        bounds: the least and the largest value of the parameter.
-        functions: further functions of an orbit whose zeros are special points, by name. Those of the model's margins are
-            found anyway.
-        step: the longest step, in the norm of `OrbitCurve`.
-        while_stable: whether to end just beyond the loss of stability; an orbit that rests never loses it.
-        progress: called with the share of the range that has been seen and the value of the parameter.
+    Parameters
+    ----------
+    orbit
+        Where to begin, as from `find_orbit`.
+    path
+        Dotted path of the parameter, such as "load.frequency".
+    bounds
+        The least and the largest value of the parameter.
+    functions
+        Further functions of an orbit whose zeros are special points, by name. Those of the model's margins are
+        found anyway.
+    step
+        The longest step, in the norm of `OrbitCurve`.
+    while_stable
+        Whether to end just beyond the loss of stability; an orbit that rests never loses it.
+    progress
+        Called with the share of the range that has been seen and the value of the parameter.
 
-    Raises:
-        ParameterError: what is no orbit, an unknown parameter, bounds that exclude the orbit, a step that leads nowhere.
+    Raises
+    ------
+    ParameterError
+        What is no orbit, an unknown parameter, bounds that exclude the orbit, a step that leads nowhere.
 
-    Examples:
-        >>> branch = saltus.continue_orbit(orbit, "load.frequency", (0.8, 1.0))
-        >>> [(str(point.kind), round(point.parameter, 6)) for point in branch.special]
-        [('LP', 0.908811), ('LP', 0.848485), ('line_limit', 0.863778)]
+    Examples
+    --------
+    >>> branch = saltus.continue_orbit(orbit, "load.frequency", (0.8, 1.0))
+    >>> [(str(point.kind), round(point.parameter, 6)) for point in branch.special]
+    [('LP', 0.908811), ('LP', 0.848485), ('line_limit', 0.863778)]
     """
     check_step(step)
     for name, function in (functions or {}).items():

@@ -29,8 +29,10 @@ SETTINGS = ReadingSettings()
 def solved_from(base: ContactProblem, state: dict[str, Any], periods: int, iterations: int) -> PeriodicOrbit | None:
     """The orbit with the signature of a motion over `periods` forcing periods from a state, by Newton's method.
 
-    Raises:
-        MotionError: a motion that stays at its contacts for good, or whose events have no equations yet.
+    Raises
+    ------
+    MotionError
+        A motion that stays at its contacts for good, or whose events have no equations yet.
     """
     motion = simulate(base.system, **state, periods=2 * periods, tol=SETTINGS.tol)
     if motion.limit is not None:
@@ -72,8 +74,10 @@ def _mode_changes(base: ContactProblem, motion: Motion, together: float) -> list
     What happens at one instant to contacts of different groups, such as cells of a chain that move alike, are events in a row:
     their impulses do not act on one another, so that the order makes no difference.
 
-    Raises:
-        MotionError: events for which orbits have no equations.
+    Raises
+    ------
+    MotionError
+        Events for which orbits have no equations.
     """
     changes: list[tuple[float, ModeChange]] = []
     for time, acting in _instants(base, motion, together):

@@ -60,22 +60,33 @@ def find_orbit(
 
     Where impacts have a loss and the load pulls the system off its contact in every period, that may be a `RestingOrbit`.
 
-    Args:
-        system: what moves, under a load with a frequency.
-        velocity, coordinates: the state at phase 0, by the model's names: theta=0.3.
-        period: how many forcing periods the orbit takes; by default the fewest, up to `max_period`, after which the motion
-            returns.
-        settle: forcing periods to let pass first; by default as many as it takes, up to 4960.
-        max_period: the longest period looked for.
-        parameters: dotted paths along which the orbit will be continued; `continue_orbit` sees to them itself.
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    velocity, coordinates
+        The state at phase 0, by the model's names: theta=0.3.
+    period
+        How many forcing periods the orbit takes; by default the fewest, up to `max_period`, after which the motion
+        returns.
+    settle
+        Forcing periods to let pass first; by default as many as it takes, up to 4960.
+    max_period
+        The longest period looked for.
+    parameters
+        Dotted paths along which the orbit will be continued; `continue_orbit` sees to them itself.
 
-    Raises:
-        ParameterError: an argument without meaning.
-        MotionError: the motion comes to rest for good, does not settle, or Newton's method does not converge; with what to do.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning.
+    MotionError
+        The motion comes to rest for good, does not settle, or Newton's method does not converge; with what to do.
 
-    Examples:
-        >>> saltus.find_orbit(system, theta=0.3).signature.impact_count
-        2
+    Examples
+    --------
+    >>> saltus.find_orbit(system, theta=0.3).signature.impact_count
+    2
     """
     _check(system, parameters, coordinates, {"period": period, "max_period": max_period, "settle": settle})
     base = problem_of(system, Signature((), 1), tuple(parameters))  # refuses what has no orbits

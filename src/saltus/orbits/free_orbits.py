@@ -57,11 +57,12 @@ class FreeOrbit:
 
     Where a wall throws it back, the wall is the other turning point.
 
-    Examples:
-        >>> free = saltus.System(model=saltus.RockingBlock(alpha=0.25))
-        >>> orbit = saltus.free_orbit(free, 0.1)
-        >>> bool(abs(orbit.period - saltus.theory.rocking_period(0.1, alpha=0.25)) < 1e-10)
-        True
+    Examples
+    --------
+    >>> free = saltus.System(model=saltus.RockingBlock(alpha=0.25))
+    >>> orbit = saltus.free_orbit(free, 0.1)
+    >>> bool(abs(orbit.period - saltus.theory.rocking_period(0.1, alpha=0.25)) < 1e-10)
+    True
     """
 
     system: System
@@ -89,14 +90,18 @@ def free_orbit(system: System, amplitude: float) -> FreeOrbit:
     impact on the way is exact. The load is constant. At a distance d beside a saddle, where the energy says little of the turning
     point, the period is exact to about 1e-16 / d^2.
 
-    Raises:
-        ParameterError: several coordinates, a load that varies, an amplitude without meaning.
-        MotionError: the motion does not come back: `FreeOutcome` says why.
+    Raises
+    ------
+    ParameterError
+        Several coordinates, a load that varies, an amplitude without meaning.
+    MotionError
+        The motion does not come back: `FreeOutcome` says why.
 
-    Examples:
-        >>> spring = saltus.System(model=saltus.WallOscillator(stiffness=4.0))
-        >>> round(saltus.free_orbit(spring, -0.5).frequency, 12)  # sqrt(k)
-        2.0
+    Examples
+    --------
+    >>> spring = saltus.System(model=saltus.WallOscillator(stiffness=4.0))
+    >>> round(saltus.free_orbit(spring, -0.5).frequency, 12)  # sqrt(k)
+    2.0
     """
     _check(system, "free_orbit")
     check_number("amplitude", amplitude)
@@ -111,22 +116,31 @@ def free_orbit(system: System, amplitude: float) -> FreeOrbit:
 def backbone(system: System, amplitudes: Iterable[float], *, progress: Progress = silent) -> xarray.Dataset:
     """The free periodic motions of a system without loss along their amplitude: the backbone of its resonances.
 
-    Args:
-        system: what moves, with one coordinate, under a constant load.
-        amplitudes: the coordinates of the turning point at which the motions begin, at rest.
-        progress: called with the fraction done.
+    Parameters
+    ----------
+    system
+        What moves, with one coordinate, under a constant load.
+    amplitudes
+        The coordinates of the turning point at which the motions begin, at rest.
+    progress
+        Called with the fraction done.
 
-    Returns:
+    Returns
+    -------
+    xarray.Dataset
         A Dataset over (amplitude): `period`, `frequency` = 2 pi / period, `turning` (the other turning point), `impact_speed`
         (the largest; nan without impacts), `defect`, and `outcome`, a word of `FreeOutcome`; nan where there is no free orbit.
 
-    Raises:
-        ParameterError: several coordinates, a load that varies, amplitudes that are no numbers.
+    Raises
+    ------
+    ParameterError
+        Several coordinates, a load that varies, amplitudes that are no numbers.
 
-    Examples:
-        >>> line = saltus.backbone(saltus.System(model=saltus.RockingBlock(alpha=0.25)), [0.05, 0.1, 0.2])
-        >>> bool(np.allclose(line.period, saltus.theory.rocking_period([0.05, 0.1, 0.2], alpha=0.25)))
-        True
+    Examples
+    --------
+    >>> line = saltus.backbone(saltus.System(model=saltus.RockingBlock(alpha=0.25)), [0.05, 0.1, 0.2])
+    >>> bool(np.allclose(line.period, saltus.theory.rocking_period([0.05, 0.1, 0.2], alpha=0.25)))
+    True
     """
     import xarray
 

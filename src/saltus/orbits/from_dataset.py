@@ -33,14 +33,17 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     The equations are evaluated at the unknowns as they are kept, which must solve them, and orbits that rest are followed from
     their first release. `continue_orbit` goes on from any.
 
-    Raises:
-        ParameterError: a dataset of something else, of other equations than the model has now, or of another version of saltus;
-            unknowns that do not solve the equations; a model of one's own that is not registered (`saltus.register`).
+    Raises
+    ------
+    ParameterError
+        A dataset of something else, of other equations than the model has now, or of another version of saltus;
+        unknowns that do not solve the equations; a model of one's own that is not registered (`saltus.register`).
 
-    Examples:
-        >>> again = saltus.orbits.orbits_of(branch.to_xarray())
-        >>> again[0].amplitude == branch.orbits[0].amplitude
-        True
+    Examples
+    --------
+    >>> again = saltus.orbits.orbits_of(branch.to_xarray())
+    >>> again[0].amplitude == branch.orbits[0].amplitude
+    True
     """
     check_dataset(dataset, "a branch or a curve of special points", NEEDED, ("system", "tol"))
     system, tol = System.from_json(dataset.attrs["system"]), float(dataset.attrs["tol"])

@@ -46,11 +46,16 @@ def orbits_near_returns(
 ) -> list[PeriodicOrbit]:
     """Orbits of up to `max_period` forcing periods near which motions return to where they were.
 
-    Args:
-        system, path: what moves, and the parameter that is varied.
-        values: (n,) of it.
-        states: (n, motions, kept, d): successive stroboscopic states of motions at each of them; nan where there are fewer.
-        known: for each value the states (k, d) at phase 0 of orbits that are known there, which are not given again.
+    Parameters
+    ----------
+    system, path
+        What moves, and the parameter that is varied.
+    values
+        (n,) of it.
+    states
+        (n, motions, kept, d): successive stroboscopic states of motions at each of them; nan where there are fewer.
+    known
+        For each value the states (k, d) at phase 0 of orbits that are known there, which are not given again.
     """
     found: list[tuple[int, PeriodicOrbit]] = []
     known = [other.reshape(-1, system.dimension) for other in known]

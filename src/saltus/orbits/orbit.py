@@ -29,11 +29,12 @@ class PeriodicOrbit:
 
     Phases and speeds are those of one period of the orbit, q forcing periods, in the order of the impacts.
 
-    Examples:
-        >>> orbit.period, orbit.signature.impact_count, orbit.stable
-        (1, 2, True)
-        >>> bool(orbit.defect < 1e-12)  # its distance from itself after a period of direct simulation
-        True
+    Examples
+    --------
+    >>> orbit.period, orbit.signature.impact_count, orbit.stable
+    (1, 2, True)
+    >>> bool(orbit.defect < 1e-12)  # its distance from itself after a period of direct simulation
+    True
     """
 
     problem: Problem

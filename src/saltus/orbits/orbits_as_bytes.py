@@ -36,8 +36,10 @@ def as_bytes(found: Any) -> bytes:
 def from_bytes(content: bytes) -> Any:
     """What `as_bytes` was given.
 
-    Raises:
-        ParameterError: bytes of anything else.
+    Raises
+    ------
+    ParameterError
+        Bytes of anything else.
     """
     try:
         return _OrbitReader(io.BytesIO(zlib.decompress(content))).load()

@@ -168,8 +168,10 @@ class Problem:
     def at(self, values: np.ndarray) -> System:
         """The system with the given parameters.
 
-        Raises:
-            ParameterError: where it refuses them.
+        Raises
+        ------
+        ParameterError
+            Where it refuses them.
         """
         return self.system.with_({path: float(value) for path, value in zip(self.paths, values, strict=True)})
 

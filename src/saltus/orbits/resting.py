@@ -35,11 +35,12 @@ class RestingOrbit(PeriodicOrbit):
     It has all that a `PeriodicOrbit` has. Its impacts are those that the flow resolves before it jumps to rest; there are
     infinitely many. `residual` is by how much the smooth segments from impact to impact miss what the event-driven flow found.
 
-    Examples:
-        >>> lossy = system.with_({"load.horizontal.amplitude": 0.15, "load.frequency": 0.2, "impact.e": 0.3})
-        >>> resting = saltus.find_orbit(lossy, theta=0.3)
-        >>> 0.31 < resting.rest_share < 0.32, abs(resting.multipliers)
-        (True, array([0., 0.]))
+    Examples
+    --------
+    >>> lossy = system.with_({"load.horizontal.amplitude": 0.15, "load.frequency": 0.2, "impact.e": 0.3})
+    >>> resting = saltus.find_orbit(lossy, theta=0.3)
+    >>> 0.31 < resting.rest_share < 0.32, abs(resting.multipliers)
+    (True, array([0., 0.]))
     """
 
     excursions: np.ndarray  # (n, 3) of the (half) period: when released, when at rest again, and the side released to

@@ -52,10 +52,11 @@ class Settled:
 class Search:
     """What was found, and what was searched.
 
-    Examples:
-        >>> found = saltus.search_orbits(system, "load.frequency", [1.0], max_period=1, starts=8)
-        >>> found.at_rest, found.unsettled
-        (array([0]), array([0]))
+    Examples
+    --------
+    >>> found = saltus.search_orbits(system, "load.frequency", [1.0], max_period=1, starts=8)
+    >>> found.at_rest, found.unsettled
+    (array([0]), array([0]))
     """
 
     path: str
@@ -97,13 +98,16 @@ def search_orbits(
     attracting orbits. Returns of the motions near to where they were, on their way or in chaos, are first guesses for Newton's
     method, which finds repelling ones, of up to `repelling` forcing periods (by default `max_period`; 0 looks for none).
 
-    Raises:
-        ParameterError: an unknown parameter, no values, an effort without meaning.
+    Raises
+    ------
+    ParameterError
+        An unknown parameter, no values, an effort without meaning.
 
-    Examples:
-        >>> found = saltus.search_orbits(system, "load.frequency", [1.0], max_period=1, starts=8)
-        >>> len(found.orbits)
-        1
+    Examples
+    --------
+    >>> found = saltus.search_orbits(system, "load.frequency", [1.0], max_period=1, starts=8)
+    >>> len(found.orbits)
+    1
     """
     check_system(system, "search_orbits", several_contacts=True)
     check_count("max_period", max_period, 1)

@@ -28,9 +28,10 @@ class Signature:
     `sides` is the side before each impact. A symmetric orbit is its own mirror image half a period later; then only the
     impacts of the first half are listed, and the equations are those of the half.
 
-    Examples:
-        >>> orbit.signature.sides
-        (-1,)
+    Examples
+    --------
+    >>> orbit.signature.sides
+    (-1,)
     """
 
     sides: tuple[int, ...]  # empty for an orbit without impacts

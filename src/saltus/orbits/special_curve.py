@@ -95,11 +95,12 @@ class ConditionedCurve(OrbitCurve):
 class SpecialCurve(Course):
     """A curve of special points in two parameters: its points in order, its codimension-two points, and why it ends.
 
-    Examples:
-        >>> fold = next(point for point in branch.special if point.kind == "LP")
-        >>> curve = saltus.continue_special(fold, "load.vertical", (-0.51, -0.49), most_points=10)
-        >>> str(curve.kind)
-        'LP'
+    Examples
+    --------
+    >>> fold = next(point for point in branch.special if point.kind == "LP")
+    >>> curve = saltus.continue_special(fold, "load.vertical", (-0.51, -0.49), most_points=10)
+    >>> str(curve.kind)
+    'LP'
     """
 
     kind: str  # LP, PD, BPC or GR
@@ -113,8 +114,10 @@ class SpecialCurve(Course):
     def at(self, path: str, value: float) -> list[PeriodicOrbit]:
         """All orbits of the curve at a value of one of its parameters, solved there.
 
-        Raises:
-            ParameterError: a path that is not one of the two.
+        Raises
+        ------
+        ParameterError
+            A path that is not one of the two.
         """
         if path not in self.paths:
             raise ParameterError(

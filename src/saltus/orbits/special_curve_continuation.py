@@ -78,24 +78,35 @@ def continue_special(
     It is followed both ways, through cusps, until it closes, reaches a bound, meets another grazing or cannot go on. PD, BPC:
     the orbits are those that lose their stability, not the ones born there.
 
-    Args:
-        special: where to begin, one of `branch.special`.
-        path: dotted path of the second parameter, such as "load.horizontal.amplitude".
-        bounds: its least and largest value; by default from a tenth to ten times what it is (from -1 to 1 for 0).
-        first_bounds: those of the branch's own parameter; by default as far to both sides as its branch was wide, or to a tenth.
-        step: the longest step, in the norm of `OrbitCurve`.
-        most_points: of each direction, after which the curve is given up, with that reason.
-        progress: called with the share of the first range that has been seen and the values of both parameters.
+    Parameters
+    ----------
+    special
+        Where to begin, one of `branch.special`.
+    path
+        Dotted path of the second parameter, such as "load.horizontal.amplitude".
+    bounds
+        Its least and largest value; by default from a tenth to ten times what it is (from -1 to 1 for 0).
+    first_bounds
+        Those of the branch's own parameter; by default as far to both sides as its branch was wide, or to a tenth.
+    step
+        The longest step, in the norm of `OrbitCurve`.
+    most_points
+        Of each direction, after which the curve is given up, with that reason.
+    progress
+        Called with the share of the first range that has been seen and the values of both parameters.
 
-    Raises:
-        ParameterError: another kind of point, an unknown parameter or the branch's own, bounds that exclude the point, a second
-            parameter that takes away the symmetry which a BPC or a grazing on both sides rests on.
+    Raises
+    ------
+    ParameterError
+        Another kind of point, an unknown parameter or the branch's own, bounds that exclude the point, a second
+        parameter that takes away the symmetry which a BPC or a grazing on both sides rests on.
 
-    Examples:
-        >>> fold = next(point for point in branch.special if point.kind == "LP")
-        >>> curve = saltus.continue_special(fold, "load.horizontal.amplitude", (0.15, 0.6))
-        >>> next(str(point.kind) for point in curve.special)  # the two folds meet in a cusp
-        'CP'
+    Examples
+    --------
+    >>> fold = next(point for point in branch.special if point.kind == "LP")
+    >>> curve = saltus.continue_special(fold, "load.horizontal.amplitude", (0.15, 0.6))
+    >>> next(str(point.kind) for point in curve.special)  # the two folds meet in a cusp
+    'CP'
     """
     check_step(step)
     check_count("most_points", most_points, 1)

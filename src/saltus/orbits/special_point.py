@@ -16,9 +16,10 @@ class SpecialKind(StrEnum):
 
     Those of codimension 1 lie on branches, those of codimension 2 on curves of special points in two parameters.
 
-    Examples:
-        >>> saltus.orbits.SpecialKind.LP == "LP", saltus.orbits.SpecialKind.CP.codimension
-        (True, 2)
+    Examples
+    --------
+    >>> saltus.orbits.SpecialKind.LP == "LP", saltus.orbits.SpecialKind.CP.codimension
+    (True, 2)
     """
 
     description: str
@@ -52,9 +53,10 @@ class SpecialKind(StrEnum):
 class OrbitEnd(EndReason):
     """The reasons for which branches of orbits and curves of special points end, besides those of any curve.
 
-    Examples:
-        >>> len(saltus.orbits.OrbitEnd) > 5
-        True
+    Examples
+    --------
+    >>> len(saltus.orbits.OrbitEnd) > 5
+    True
     """
 
     START = "start"
@@ -105,9 +107,10 @@ class OrbitMissed(MissedReason):
 class SpecialPoint(Zero):
     """A special point of a branch or of a curve, with its orbit and its evidence; its kind is one of `SpecialKind`, or a name.
 
-    Examples:
-        >>> sorted(round(point.parameter, 6) for point in branch.special if point.kind == "LP")
-        [0.848485, 0.908811]
+    Examples
+    --------
+    >>> sorted(round(point.parameter, 6) for point in branch.special if point.kind == "LP")
+    [0.848485, 0.908811]
     """
 
     @property

@@ -32,21 +32,28 @@ def switch_branch(
     At a PD that of the doubled orbit; at a BPC those of the two unsymmetric orbits, mirror images of one another, or, where two
     branches cross, the two halves of the other branch.
 
-    Args:
-        special: where to begin.
-        bounds, functions, step: as for `continue_orbit`.
-        both: whether both of two mirror images are followed, which differ in nothing but their phase and sign.
+    Parameters
+    ----------
+    special
+        Where to begin.
+    bounds, functions, step
+        As for `continue_orbit`.
+    both
+        Whether both of two mirror images are followed, which differ in nothing but their phase and sign.
 
-    Raises:
-        ParameterError: a special point where no branch begins.
+    Raises
+    ------
+    ParameterError
+        A special point where no branch begins.
 
-    Examples:
-        >>> unsymmetric = system.with_({"load.horizontal.amplitude": 1.4})
-        >>> one = saltus.find_orbit(unsymmetric, theta=0.3)
-        >>> path = saltus.continue_orbit(one, "load.horizontal.amplitude", (1.35, 1.55))
-        >>> breaking = next(point for point in path.special if point.kind == "BPC")
-        >>> [new.orbits[-1].symmetric for new in saltus.switch_branch(breaking, (1.35, 1.55))]
-        [False, False]
+    Examples
+    --------
+    >>> unsymmetric = system.with_({"load.horizontal.amplitude": 1.4})
+    >>> one = saltus.find_orbit(unsymmetric, theta=0.3)
+    >>> path = saltus.continue_orbit(one, "load.horizontal.amplitude", (1.35, 1.55))
+    >>> breaking = next(point for point in path.special if point.kind == "BPC")
+    >>> [new.orbits[-1].symmetric for new in saltus.switch_branch(breaking, (1.35, 1.55))]
+    [False, False]
     """
     check_step(step)
     bounds = check_bounds(bounds)
@@ -117,9 +124,10 @@ def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
 class Cascade:
     """Period doublings one after the other, and how fast they follow: the ratios tend to Feigenbaum's 4.6692.
 
-    Examples:
-        >>> [field for field in ("parameters", "ratios") if hasattr(saltus.orbits.Cascade, field)]
-        ['parameters', 'ratios']
+    Examples
+    --------
+    >>> [field for field in ("parameters", "ratios") if hasattr(saltus.orbits.Cascade, field)]
+    ['parameters', 'ratios']
     """
 
     points: tuple[SpecialPoint, ...]
@@ -146,16 +154,19 @@ def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_pe
 
     It ends early where a doubled branch has no further doubling within the bounds.
 
-    Raises:
-        ParameterError: a special point that is no PD.
+    Raises
+    ------
+    ParameterError
+        A special point that is no PD.
 
-    Examples:
-        >>> unsymmetric = system.with_({"load.horizontal.amplitude": 1.6})
-        >>> one = saltus.find_orbit(unsymmetric, theta=0.3)
-        >>> path = saltus.continue_orbit(one, "load.horizontal.amplitude", (1.55, 1.75))
-        >>> first = next(point for point in path.special if point.kind == "PD")
-        >>> saltus.doubling_cascade(first, (1.6, 1.8), max_period=4).parameters.round(6)
-        array([1.684394, 1.742241, 1.750439])
+    Examples
+    --------
+    >>> unsymmetric = system.with_({"load.horizontal.amplitude": 1.6})
+    >>> one = saltus.find_orbit(unsymmetric, theta=0.3)
+    >>> path = saltus.continue_orbit(one, "load.horizontal.amplitude", (1.55, 1.75))
+    >>> first = next(point for point in path.special if point.kind == "PD")
+    >>> saltus.doubling_cascade(first, (1.6, 1.8), max_period=4).parameters.round(6)
+    array([1.684394, 1.742241, 1.750439])
     """
     check_step(step)
     if first.kind != SpecialKind.PD:

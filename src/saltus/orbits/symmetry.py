@@ -18,9 +18,10 @@ from saltus.systems import Constant, Harmonic, Load, Signal, System, check_syste
 def is_symmetric(system: System) -> bool:
     """Whether -theta(t + T/2) moves as theta(t) does: a mirrored load that is the load half a period later (errata 18).
 
-    Examples:
-        >>> saltus.orbits.is_symmetric(system)
-        True
+    Examples
+    --------
+    >>> saltus.orbits.is_symmetric(system)
+    True
     """
     check_system(system, "is_symmetric", several_contacts=True)
     mirrored = system.mirrored()

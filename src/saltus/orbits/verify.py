@@ -34,12 +34,15 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
     All must belong to one system but for its parameters along their common path, if they have one. A motion that starts after its
     first impact ends with that impact, before or after it as rounding decides: the nearer counts.
 
-    Raises:
-        ParameterError: what is no orbit.
+    Raises
+    ------
+    ParameterError
+        What is no orbit.
 
-    Examples:
-        >>> bool(saltus.orbits.defects(branch.orbits[:3]).max() < 1e-10)
-        True
+    Examples
+    --------
+    >>> bool(saltus.orbits.defects(branch.orbits[:3]).max() < 1e-10)
+    True
     """
     check_count("rounds", rounds, 1)
     if len(orbits) == 0:

@@ -22,7 +22,9 @@ def compute_panels(parts: Mapping[str, Panels]) -> Iterator[tuple[str, dict[str,
 
     Panels are begun in the order of the parts. Parts of a single panel each are computed here: to start a process takes longer.
 
-    Yields:
+    Yields
+    ------
+    tuple[str, dict[str, Any], float]
         The name of the part, its panels by name and in their order, and the seconds of processor time that they took.
     """
     shared: dict[Any, list[Task]] = {}  # by what computes them: a chart of two figures is computed once

@@ -37,8 +37,10 @@ def reproduce(
 
     What is up to date is left alone unless `force`. An interrupt leaves complete files only, and the next run goes on from there.
 
-    Raises:
-        ParameterError: an unknown name, with the near ones; an output folder that cannot be written to.
+    Raises
+    ------
+    ParameterError
+        An unknown name, with the near ones; an output folder that cannot be written to.
     """
     from saltus.paper.parts import FIGURES, LONGEST
 

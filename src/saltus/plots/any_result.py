@@ -34,17 +34,23 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
 def plot(result: Any, **options: Any) -> Any:
     """Draw any result; returns the axes, or of several panels an array of them.
 
-    Args:
-        result: a Dataset or a DataTree that saltus has made, or what has `to_xarray`, such as a motion or a branch.
-        options: of the function that draws it, such as `ax=` (or `figure=`, where it has several panels) and `width=`, in mm.
+    Parameters
+    ----------
+    result
+        A Dataset or a DataTree that saltus has made, or what has `to_xarray`, such as a motion or a branch.
+    options
+        Of the function that draws it, such as `ax=` (or `figure=`, where it has several panels) and `width=`, in mm.
 
-    Raises:
-        ParameterError: what has no picture.
+    Raises
+    ------
+    ParameterError
+        What has no picture.
 
-    Examples:
-        >>> axes = saltus.plot(branch)
-        >>> type(axes).__name__
-        'Axes'
+    Examples
+    --------
+    >>> axes = saltus.plot(branch)
+    >>> type(axes).__name__
+    'Axes'
     """
     data = result.to_xarray() if hasattr(result, "to_xarray") else result
     if not hasattr(data, "attrs") or not hasattr(data, "data_vars"):

@@ -34,14 +34,21 @@ def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), *, ax: Axes | None 
     Rest is light grey, the other attractors go from dark to light by their labels, undecided cells are white; each attractor
     is marked at phase 0 of the load, one that does not repeat by some of its points.
 
-    Args:
-        dataset: the labels of the cells, and the attractors.
-        manifolds: arrays (n, 2) of coordinate and velocity, nan where they are interrupted, such as
-            `stable_manifold(orbit).states`, to be drawn besides the dataset's own.
-        ax: the axes to draw into; by default those of a figure of its own.
-        width: of that figure, mm.
+    Parameters
+    ----------
+    dataset
+        The labels of the cells, and the attractors.
+    manifolds
+        Arrays (n, 2) of coordinate and velocity, nan where they are interrupted, such as
+        `stable_manifold(orbit).states`, to be drawn besides the dataset's own.
+    ax
+        The axes to draw into; by default those of a figure of its own.
+    width
+        Of that figure, mm.
 
-    Returns:
+    Returns
+    -------
+    Axes
         The axes.
     """
     y, x = (str(dim) for dim in dataset["label"].dims)

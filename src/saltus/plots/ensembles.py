@@ -19,8 +19,10 @@ OWN = ("period", "state", "column")  # dimensions of what is kept of each motion
 def draw_ensemble(dataset: Any, quantity: str | None = None, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw a variable of `simulate_many`, by default the first coordinate at the end, over one dimension or two; returns `ax`.
 
-    Raises:
-        ParameterError: a variable that is not there, or that has no dimensions or more than two.
+    Raises
+    ------
+    ParameterError
+        A variable that is not there, or that has no dimensions or more than two.
     """
     quantity = next(iter(dataset.data_vars)) if quantity is None else quantity
     if quantity not in dataset or not 1 <= dataset[quantity].ndim <= 2 or set(dataset[quantity].dims) & set(OWN):

@@ -57,31 +57,45 @@ def phase_portrait(
 ) -> xarray.Dataset:
     """The phase plane of a system with one coordinate under a constant load (the paper's Figs. 4 and 5).
 
-    Args:
-        system: what moves.
-        window: the least and the largest coordinate, then velocity.
-        starts: states (coordinate, velocity) from which motions are followed; by default two beside each stable equilibrium, and
-            24 spread over the window.
-        duration: how long, in dimensionless time.
-        samples: instants at which each motion is given, besides its impacts.
-        seed: of the spread.
-        progress: called with the fraction done and what is being done, first when all arguments have been checked.
+    Parameters
+    ----------
+    system
+        What moves.
+    window
+        The least and the largest coordinate, then velocity.
+    starts
+        States (coordinate, velocity) from which motions are followed; by default two beside each stable equilibrium, and
+        24 spread over the window.
+    duration
+        How long, in dimensionless time.
+    samples
+        Instants at which each motion is given, besides its impacts.
+    seed
+        Of the spread.
+    progress
+        Called with the fraction done and what is being done, first when all arguments have been checked.
 
-    Returns:
+    Returns
+    -------
+    xarray.Dataset
         A Dataset: `time`, the coordinate and `velocity` over (motion, sample), with the velocities before and after each impact,
         and nan between them where they differ; `equilibrium`, the coordinates of all equilibria in the window, with `stable`
         and, over (equilibrium, root), the real and imaginary part of the `eigenvalue`s, nan at the contact;
         `separatrix_<coordinate>` and `separatrix_velocity` over (separatrix, point): the stable manifolds of the saddles, none
         where the impact law has no inverse (the attribute `no_separatrices` says why).
 
-    Raises:
-        ParameterError: a load that varies, several coordinates, numbers, a window or starts without meaning.
-        MotionError: a motion that cannot be continued.
+    Raises
+    ------
+    ParameterError
+        A load that varies, several coordinates, numbers, a window or starts without meaning.
+    MotionError
+        A motion that cannot be continued.
 
-    Examples:
-        >>> portrait = saltus.phase_portrait(tristable, duration=5.0)
-        >>> portrait.attrs["saltus_version"] == saltus.__version__
-        True
+    Examples
+    --------
+    >>> portrait = saltus.phase_portrait(tristable, duration=5.0)
+    >>> portrait.attrs["saltus_version"] == saltus.__version__
+    True
     """
     points = equilibria(system, window)
     states = _spread(system, window, points, seed) if starts is None else _states(system, starts)

@@ -140,30 +140,45 @@ def frequency_sweep(
     a thousandth, and what is then left of it is a jump (without `settle` it is reported as it is). Where up and down differ there
     is hysteresis.
 
-    Args:
-        system: what moves, under a load with a frequency.
-        values: of the parameter, increasing.
-        path: its dotted path.
-        periods: forcing periods at each value, at most or exactly.
-        settle: whether a value is left as soon as the motion repeats itself.
-        max_period: the longest period looked for.
-        velocity, coordinates: the state at the first value, at phase 0; 0 where it is not given.
-        tol: the error that one step of the integration may make.
-        progress: called with the fraction done and what is being done.
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    values
+        Of the parameter, increasing.
+    path
+        Its dotted path.
+    periods
+        Forcing periods at each value, at most or exactly.
+    settle
+        Whether a value is left as soon as the motion repeats itself.
+    max_period
+        The longest period looked for.
+    velocity, coordinates
+        The state at the first value, at phase 0; 0 where it is not given.
+    tol
+        The error that one step of the integration may make.
+    progress
+        Called with the fraction done and what is being done.
 
-    Returns:
+    Returns
+    -------
+    xarray.Dataset
         A Dataset over (direction, value): of the first coordinate in the motion's period `amplitude` (its largest size),
         `largest_...` and `smallest_...`; `impact_count`, `period` (0: it does not repeat itself), `outcome` and the state at
         phase 0; over (value): `hysteresis`; over (jump): its direction, the values that enclose it and the amplitudes there.
         Values that a motion did not reach, as a margin ended it, are nan.
 
-    Raises:
-        ParameterError: an argument without meaning; a load without a frequency.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning; a load without a frequency.
 
-    Examples:
-        >>> sweep = saltus.frequency_sweep(system, [0.98, 0.99, 1.0], theta=0.3)
-        >>> int(sweep.hysteresis.sum()), sweep.sizes["jump"]
-        (0, 0)
+    Examples
+    --------
+    >>> sweep = saltus.frequency_sweep(system, [0.98, 0.99, 1.0], theta=0.3)
+    >>> int(sweep.hysteresis.sum()), sweep.sizes["jump"]
+    (0, 0)
     """
     asked = SweepRequest(
         system=system, path=path, values=values, periods=periods, settle=settle, max_period=max_period, tol=tol,

@@ -24,10 +24,11 @@ Arrays = dict[str, np.ndarray]
 class Failure:
     """A chunk that failed: which, where in the grid, why, and how often it was tried.
 
-    Examples:
-        >>> import dataclasses
-        >>> [field.name for field in dataclasses.fields(saltus.sweep.Failure)]
-        ['index', 'place', 'error', 'attempts']
+    Examples
+    --------
+    >>> import dataclasses
+    >>> [field.name for field in dataclasses.fields(saltus.sweep.Failure)]
+    ['index', 'place', 'error', 'attempts']
     """
 
     index: Index
@@ -50,8 +51,10 @@ class Raised:
 def resolve(function: str) -> Callable[[Any, dict[str, np.ndarray]], Mapping[str, Any]]:
     """The function that `function`, "package.module:name", names.
 
-    Raises:
-        ParameterError: it is not of this form, there is no such module or name, or it is not a function.
+    Raises
+    ------
+    ParameterError
+        It is not of this form, there is no such module or name, or it is not a function.
     """
     module, colon, name = function.partition(":") if isinstance(function, str) else ("", "", "")
     if not (module and colon and name):
@@ -81,8 +84,10 @@ def attempt(function: str, arguments: Mapping[str, Any], block: dict[str, np.nda
 def checked(plan: Plan, index: Index, result: Any) -> Arrays:
     """The arrays that a function returned for a chunk, of the types of the plan's variables; NaN is a value as any other.
 
-    Raises:
-        ParameterError: no mapping, a variable missing or too many, a wrong shape, or values that the variable's type cannot hold.
+    Raises
+    ------
+    ParameterError
+        No mapping, a variable missing or too many, a wrong shape, or values that the variable's type cannot hold.
     """
     where = f"{plan.function} returned for chunk {'/'.join(map(str, index))} ({plan.place(index)})"
     if not isinstance(result, Mapping):

@@ -37,8 +37,10 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
     A chunk whose worker dies is given to another by the scheduler. The workers need saltus and the plan's function, in the same
     versions as here.
 
-    Raises:
-        SweepError: `distributed` is not installed, the scheduler does not answer or goes away, or it has no workers.
+    Raises
+    ------
+    SweepError
+        `distributed` is not installed, the scheduler does not answer or goes away, or it has no workers.
     """
     client = _connect(address)
     try:

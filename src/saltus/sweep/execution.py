@@ -35,9 +35,10 @@ log = logging.getLogger("saltus.sweep")
 class SweepInterrupted(KeyboardInterrupt):
     """Ctrl-C during a sweep; the message says what is kept and how to go on.
 
-    Examples:
-        >>> issubclass(saltus.sweep.SweepInterrupted, KeyboardInterrupt)
-        True
+    Examples
+    --------
+    >>> issubclass(saltus.sweep.SweepInterrupted, KeyboardInterrupt)
+    True
     """
 
 
@@ -56,33 +57,47 @@ def run(
     A chunk whose function raises is reported through `logging` and tried again after the others. Results are written by this
     process alone, wherever they are computed: a cluster's machines need not share its disk.
 
-    Args:
-        plan: what is computed.
-        store: a folder for a Zarr v3 store; it is made, or gone on with if it is of the same plan. None keeps all in memory.
-        workers: how many processes compute chunks at once; None computes one chunk after the other in this one, which is right
-            for functions that use all cores themselves. `Workers` are kept from one run to the next. Scripts need
-            `if __name__ == "__main__":` around a run with workers.
-        scheduler: the address of a Dask scheduler, such as "tcp://host:8786", whose workers compute the chunks.
-        progress: called before the first chunk and after each with the share of the chunks that are done, and in words with their
-            number and about how many seconds are left.
-        retries: how often a failed chunk is tried again.
+    Parameters
+    ----------
+    plan
+        What is computed.
+    store
+        A folder for a Zarr v3 store; it is made, or gone on with if it is of the same plan. None keeps all in memory.
+    workers
+        How many processes compute chunks at once; None computes one chunk after the other in this one, which is right
+        for functions that use all cores themselves. `Workers` are kept from one run to the next. Scripts need
+        `if __name__ == "__main__":` around a run with workers.
+    scheduler
+        The address of a Dask scheduler, such as "tcp://host:8786", whose workers compute the chunks.
+    progress
+        Called before the first chunk and after each with the share of the chunks that are done, and in words with their
+        number and about how many seconds are left.
+    retries
+        How often a failed chunk is tried again.
 
-    Returns:
+    Returns
+    -------
+    xarray.Dataset
         The complete dataset, with the plan's variables, coordinates and attributes: in memory, or read from the store when it
         is needed.
 
-    Raises:
-        ParameterError: bad arguments, the store of another plan, or a function that returns something else than planned.
-        SweepError: chunks failed for good, the store cannot be written, another run writes to it, or the cluster does not answer.
-        SweepInterrupted: Ctrl-C. In all these cases the chunks written before are kept.
+    Raises
+    ------
+    ParameterError
+        Bad arguments, the store of another plan, or a function that returns something else than planned.
+    SweepError
+        Chunks failed for good, the store cannot be written, another run writes to it, or the cluster does not answer.
+    SweepInterrupted
+        Ctrl-C. In all these cases the chunks written before are kept.
 
-    Examples:
-        >>> from pathlib import Path
-        >>> _ = Path("squares.py").write_text("def squares(arguments, block):\n    return {'y': block['x'] ** 2}\n")
-        >>> axes, variables = {"x": np.arange(4.0)}, {"y": saltus.sweep.Variable()}
-        >>> plan = saltus.sweep.Plan(function="squares:squares", axes=axes, variables=variables)
-        >>> saltus.sweep.run(plan)["y"].values
-        array([0., 1., 4., 9.])
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("squares.py").write_text("def squares(arguments, block):\n    return {'y': block['x'] ** 2}\n")
+    >>> axes, variables = {"x": np.arange(4.0)}, {"y": saltus.sweep.Variable()}
+    >>> plan = saltus.sweep.Plan(function="squares:squares", axes=axes, variables=variables)
+    >>> saltus.sweep.run(plan)["y"].values
+    array([0., 1., 4., 9.])
     """
     if not isinstance(plan, Plan):
         raise ParameterError(f"plan must be a Plan, got {plan!r:.80}", "plan")
@@ -196,8 +211,10 @@ def _here(plan: Plan, queue: deque[Index]) -> Outcomes:
 def check_run(store: Any, workers: Any, scheduler: Any, progress: Any) -> Path | None:
     """The path of the store, if what says where chunks are kept and who computes them has a meaning.
 
-    Raises:
-        ParameterError: it has none.
+    Raises
+    ------
+    ParameterError
+        It has none.
     """
     if workers is not None:
         check_count("workers", getattr(workers, "count", workers), 1)

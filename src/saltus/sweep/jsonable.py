@@ -19,8 +19,10 @@ DIGEST = re.compile(r"[0-9a-f]{20,}")  # of which a reader learns only that it h
 def as_json(value: Any, place: str) -> Any:
     """`value` as JSON gives it back: mappings to dicts, tuples to lists, NumPy's numbers to Python's.
 
-    Raises:
-        ParameterError: something that JSON does not have; `place` and the keys below it say where.
+    Raises
+    ------
+    ParameterError
+        Something that JSON does not have; `place` and the keys below it say where.
     """
     if isinstance(value, np.generic):
         value = value.item()

@@ -25,9 +25,10 @@ class Variable:
     grid's axes, its attributes, and the value that stands where nothing is computed yet (by default NaN; 0 or False where
     there is none).
 
-    Examples:
-        >>> saltus.sweep.Variable(attrs={"units": "rad"}).dtype
-        'float64'
+    Examples
+    --------
+    >>> saltus.sweep.Variable(attrs={"units": "rad"}).dtype
+    'float64'
     """
 
     dtype: str = "f8"
@@ -67,24 +68,34 @@ class Plan:
     depend on nothing else: a random generator takes its seed from the arguments and the block, so that a chunk is the same
     whichever process computes it, and when.
 
-    Args:
-        function: "package.module:name", importable wherever it runs.
-        arguments: what is the same for all chunks; JSON-able, and given to the function as JSON gives it back.
-        axes: 1-D arrays of numbers by name, the grid's coordinates.
-        chunk: how many points of each axis one chunk takes; all of an axis that is not named.
-        variables: a `Variable` by name for each array that the function returns.
-        attrs: provenance, JSON-able: kind, system, version, seed, ...
+    Parameters
+    ----------
+    function
+        "package.module:name", importable wherever it runs.
+    arguments
+        What is the same for all chunks; JSON-able, and given to the function as JSON gives it back.
+    axes
+        1-D arrays of numbers by name, the grid's coordinates.
+    chunk
+        How many points of each axis one chunk takes; all of an axis that is not named.
+    variables
+        A `Variable` by name for each array that the function returns.
+    attrs
+        Provenance, JSON-able: kind, system, version, seed, ...
 
-    Raises:
-        ParameterError: an unknown function, a bad name, axis or chunk, or something that JSON does not have;
-            a grid of more chunks than can be looked through.
+    Raises
+    ------
+    ParameterError
+        An unknown function, a bad name, axis or chunk, or something that JSON does not have;
+        a grid of more chunks than can be looked through.
 
-    Examples:
-        >>> plan = saltus.sweep.Plan(
-        ...     function="numpy:squeeze", axes={"x": np.arange(4.0)}, chunk={"x": 2}, variables={"y": saltus.sweep.Variable()}
-        ... )
-        >>> plan.axes["x"].size
-        4
+    Examples
+    --------
+    >>> plan = saltus.sweep.Plan(
+    ...     function="numpy:squeeze", axes={"x": np.arange(4.0)}, chunk={"x": 2}, variables={"y": saltus.sweep.Variable()}
+    ... )
+    >>> plan.axes["x"].size
+    4
     """
 
     function: str

@@ -53,8 +53,10 @@ class Store:
     def missing(self) -> list[Index]:
         """The chunks that are not done; a file that is damaged is removed first, so that its chunk is computed again.
 
-        Raises:
-            SweepError: a damaged file cannot be removed.
+        Raises
+        ------
+        SweepError
+            A damaged file cannot be removed.
         """
         extra = {name: len(variable.extra) for name, variable in self.plan.variables.items()}
         for name, index in damaged_chunks(self.path, self.arrays, self.plan.chunks, extra):
@@ -69,8 +71,10 @@ class Store:
     def write(self, index: Index, values: Arrays) -> None:
         """Keep a chunk: the files that are not there yet, if an earlier run was killed among them.
 
-        Raises:
-            SweepError: the store cannot be written to.
+        Raises
+        ------
+        SweepError
+            The store cannot be written to.
         """
         cut = self.plan.chunks.slices(index)
         try:
@@ -111,9 +115,12 @@ class Store:
 def opened(plan: Plan, path: Path) -> Iterator[Store]:
     """The store of `plan` at `path`, made if it is not there, and locked.
 
-    Raises:
-        ParameterError: there is something else at `path`, or the store of another plan.
-        SweepError: it cannot be made, or another run is writing to it.
+    Raises
+    ------
+    ParameterError
+        There is something else at `path`, or the store of another plan.
+    SweepError
+        It cannot be made, or another run is writing to it.
     """
     check_store(plan, path)
     if not (path / files.METADATA).is_file():  # it is what the lock is on
@@ -131,8 +138,10 @@ def opened(plan: Plan, path: Path) -> Iterator[Store]:
 def check_store(plan: Plan, path: Path) -> None:
     """Refuse a path at which there is something else than the store of `plan`.
 
-    Raises:
-        ParameterError: with what is there, or what is damaged so that it cannot be told whose store it is.
+    Raises
+    ------
+    ParameterError
+        With what is there, or what is damaged so that it cannot be told whose store it is.
     """
     if not path.name:
         raise ParameterError(f"store must name a folder, such as 'chart.zarr', got {str(path)!r}", "store")
@@ -156,12 +165,16 @@ def check_store(plan: Plan, path: Path) -> None:
 def remove_store(path: Path | str) -> None:
     """Remove the store at `path`, if there is one.
 
-    Raises:
-        ParameterError: there is something else.
-        SweepError: a run is writing to it, or it cannot be removed.
+    Raises
+    ------
+    ParameterError
+        There is something else.
+    SweepError
+        A run is writing to it, or it cannot be removed.
 
-    Examples:
-        >>> saltus.sweep.remove_store("nowhere.zarr")
+    Examples
+    --------
+    >>> saltus.sweep.remove_store("nowhere.zarr")
     """
     path = Path(path)
     if not path.exists():
@@ -179,8 +192,10 @@ def remove_store(path: Path | str) -> None:
 def _restorable(plan: Plan, path: Path) -> dict[str, bytes]:
     """The content of the damaged files of a store that is made anew from its plan: metadata and coordinates, no chunks.
 
-    Raises:
-        ParameterError: nothing that is left shows that the store is of this plan.
+    Raises
+    ------
+    ParameterError
+        Nothing that is left shows that the store is of this plan.
     """
     damaged = files.damaged_files(path)
     with tempfile.TemporaryDirectory() as folder:
@@ -214,19 +229,26 @@ def _restore(plan: Plan, path: Path) -> None:
 def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
     """The dataset of a sweep's store, read as it is needed; `load()` reads it all.
 
-    Args:
-        path: the store.
-        partial: whether it may be incomplete; where nothing is computed yet stands each variable's fill value, NaN for reals.
+    Parameters
+    ----------
+    path
+        The store.
+    partial
+        Whether it may be incomplete; where nothing is computed yet stands each variable's fill value, NaN for reals.
 
-    Raises:
-        ParameterError: no store of a sweep.
-        SweepError: it is incomplete or damaged.
+    Raises
+    ------
+    ParameterError
+        No store of a sweep.
+    SweepError
+        It is incomplete or damaged.
 
-    Examples:
-        >>> saltus.sweep.open_store("nowhere.zarr")
-        Traceback (most recent call last):
-            ...
-        saltus.errors.ParameterError: there is no store at nowhere.zarr
+    Examples
+    --------
+    >>> saltus.sweep.open_store("nowhere.zarr")
+    Traceback (most recent call last):
+        ...
+    saltus.errors.ParameterError: there is no store at nowhere.zarr
     """
     found = status(path, verify=True)
     if found.damaged:

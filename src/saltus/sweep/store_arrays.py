@@ -19,8 +19,10 @@ CODECS = ["bytes", "zstd", "crc32c"]  # as `store` makes them
 def check_arrays(where: str, group: dict[str, Any], plan: dict[str, Any], chunks: ChunkGrid) -> None:
     """Refuse a store, called `where`, whose metadata describe other arrays than those of its plan.
 
-    Raises:
-        ParameterError: with the array that differs; the coordinates need more memory than there is.
+    Raises
+    ------
+    ParameterError
+        With the array that differs; the coordinates need more memory than there is.
     """
     try:
         expected = dict(_expected(plan, chunks))

@@ -40,8 +40,12 @@ def damaged_files(root: Path) -> list[str]:
 def checksums(root: Path) -> dict[str, str]:
     """The digests of the files that were written when the store at `root` was made.
 
-    Raises:
-        OSError, ValueError: they cannot be read.
+    Raises
+    ------
+    OSError
+        They cannot be read.
+    ValueError
+        They cannot be read.
     """
     if not (root / CHECKSUMS).is_file():  # a pipe may have no end
         raise FileNotFoundError

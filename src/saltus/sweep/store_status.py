@@ -29,10 +29,11 @@ class StoreStatus:
     `running` is whether a run on this machine is writing to it, None where the file system has no locks. `damaged` are the files
     that are not what was written, if that was looked at; a chunk with such a file is not done.
 
-    Examples:
-        >>> import dataclasses
-        >>> "done" in [field.name for field in dataclasses.fields(saltus.sweep.StoreStatus)]
-        True
+    Examples
+    --------
+    >>> import dataclasses
+    >>> "done" in [field.name for field in dataclasses.fields(saltus.sweep.StoreStatus)]
+    True
     """
 
     path: Path
@@ -63,14 +64,17 @@ class StoreStatus:
 def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
     """How far the sweep is whose store is at `path`; to `verify` reads all of it, and finds the files that are damaged.
 
-    Raises:
-        ParameterError: there is no store of a sweep at `path`, or its metadata are damaged.
+    Raises
+    ------
+    ParameterError
+        There is no store of a sweep at `path`, or its metadata are damaged.
 
-    Examples:
-        >>> saltus.sweep.status("nowhere.zarr")
-        Traceback (most recent call last):
-            ...
-        saltus.errors.ParameterError: there is no store at nowhere.zarr
+    Examples
+    --------
+    >>> saltus.sweep.status("nowhere.zarr")
+    Traceback (most recent call last):
+        ...
+    saltus.errors.ParameterError: there is no store at nowhere.zarr
     """
     path = Path(path)
     plan = read_plan(path)
@@ -122,9 +126,11 @@ def _broken_chunks(path: Path, chunks: ChunkGrid, extra: dict[str, int]) -> dict
 def read_plan(path: Path) -> dict[str, Any]:
     """The plan that the store at `path` was made for, as JSON.
 
-    Raises:
-        ParameterError: there is nothing at `path`, or no store, or one that is not of a sweep, or whose metadata are damaged
-            or are not those of its plan.
+    Raises
+    ------
+    ParameterError
+        There is nothing at `path`, or no store, or one that is not of a sweep, or whose metadata are damaged
+        or are not those of its plan.
     """
     if not path.exists():
         raise ParameterError(f"there is no store at {path}", "path")
@@ -153,8 +159,16 @@ def read_plan(path: Path) -> dict[str, Any]:
 def grid_of(plan: dict[str, Any]) -> ChunkGrid:
     """How the grid of a plan that was read from a file is cut.
 
-    Raises:
-        KeyError, TypeError, ValueError, AttributeError: it is none that a plan can have.
+    Raises
+    ------
+    KeyError
+        It is none that a plan can have.
+    TypeError
+        It is none that a plan can have.
+    ValueError
+        It is none that a plan can have.
+    AttributeError
+        It is none that a plan can have.
     """
     sizes = {str(name): plan["axes"][name]["size"] for name in plan["order"]}
     chunks = ChunkGrid(sizes, {name: plan["chunk"][name] for name in sizes})

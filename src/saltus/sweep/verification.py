@@ -18,11 +18,16 @@ AT_ONCE = 256e6  # bytes that are read together, which is faster than chunk by c
 def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, int]) -> Iterator[tuple[str, Index]]:
     """The (variable, chunk) of every chunk in the store at `path` that is there and cannot be read.
 
-    Args:
-        path: of the store.
-        arrays: Zarr's array of each variable.
-        chunks: how the grid is cut.
-        extra: the number of dimensions of each variable beside the grid's axes.
+    Parameters
+    ----------
+    path
+        Of the store.
+    arrays
+        Zarr's array of each variable.
+    chunks
+        How the grid is cut.
+    extra
+        The number of dimensions of each variable beside the grid's axes.
     """
     written = files.all_files(path)
     for name, count in extra.items():

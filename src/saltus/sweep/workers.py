@@ -41,8 +41,10 @@ class Workers:
 
         A process that dies (killed, out of memory) fails its own chunk alone, and another takes its place.
 
-        Raises:
-            SweepError: a process ends before it can compute.
+        Raises
+        ------
+        SweepError
+            A process ends before it can compute.
         """
         pool = self.pool
         pool += [_Worker() for _ in range(min(self.count, len(queue)) - len(pool))]

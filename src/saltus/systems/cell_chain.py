@@ -136,9 +136,10 @@ class CellChain(Model):
 class TwoCells(CellChain):
     """A `CellChain` of two cells.
 
-    Examples:
-        >>> saltus.TwoCells(beta0=1.4, coupling=0.5).coordinates
-        ('lower_1', 'upper_1', 'lower_2', 'upper_2')
+    Examples
+    --------
+    >>> saltus.TwoCells(beta0=1.4, coupling=0.5).coordinates
+    ('lower_1', 'upper_1', 'lower_2', 'upper_2')
     """
 
     cells: ClassVar[int] = 2
@@ -150,9 +151,10 @@ class TwoCells(CellChain):
 class ThreeCells(CellChain):
     """A `CellChain` of three cells.
 
-    Examples:
-        >>> saltus.ThreeCells(beta0=1.4, coupling=0.5).coordinates
-        ('lower_1', 'upper_1', 'lower_2', 'upper_2', 'lower_3', 'upper_3')
+    Examples
+    --------
+    >>> saltus.ThreeCells(beta0=1.4, coupling=0.5).coordinates
+    ('lower_1', 'upper_1', 'lower_2', 'upper_2', 'lower_3', 'upper_3')
     """
 
     cells: ClassVar[int] = 3
@@ -164,9 +166,10 @@ class ThreeCells(CellChain):
 class FourCells(CellChain):
     """A `CellChain` of four cells.
 
-    Examples:
-        >>> len(saltus.FourCells(beta0=1.4).coordinates)
-        8
+    Examples
+    --------
+    >>> len(saltus.FourCells(beta0=1.4).coordinates)
+    8
     """
 
     cells: ClassVar[int] = 4

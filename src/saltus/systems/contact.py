@@ -18,10 +18,11 @@ class Contact:
 
     While it is closed, q stays at p, and its reaction, an impulse or a force along q times the sign, is not negative.
 
-    Examples:
-        >>> right = saltus.Contact(name="right", coordinate="x", position=1.0, sign=-1)
-        >>> right.gap(0.25)
-        0.75
+    Examples
+    --------
+    >>> right = saltus.Contact(name="right", coordinate="x", position=1.0, sign=-1)
+    >>> right.gap(0.25)
+    0.75
     """
 
     name: str  # such as "lower", in events and in the names of stops
@@ -43,8 +44,10 @@ class Contact:
 def check_contacts(model: Any) -> None:
     """Refuse contacts of a model that have no meaning.
 
-    Raises:
-        ParameterError: two of one name, an unknown coordinate, a model with sides, two contacts that leave a coordinate no room.
+    Raises
+    ------
+    ParameterError
+        Two of one name, an unknown coordinate, a model with sides, two contacts that leave a coordinate no room.
     """
     contacts, kind = model.contacts, type(model).__name__
     names = [contact.name for contact in contacts]

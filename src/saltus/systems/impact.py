@@ -37,8 +37,10 @@ class ImpactLaw:
 
         J are the impulses, and v the rates of the gaps, at all contacts whose gap is 0.
 
-        Raises:
-            ParameterError: a law that has no meaning for several contacts.
+        Raises
+        ------
+        ParameterError
+            A law that has no meaning for several contacts.
         """
         raise ParameterError(
             f"{type(self).__name__} is no law for the contacts of a {type(model).__name__}; give NewtonImpact(e=...)", "impact"
@@ -52,11 +54,12 @@ class VelocityReduction(ImpactLaw):
 
     In a model with contacts the other ones take the speed on if it says so (`transfers`), else each contact turns it back.
 
-    Examples:
-        >>> lossy = saltus.System(model=system.model, load=system.load, impact=saltus.VelocityReduction(e=0.8))
-        >>> impacts = saltus.simulate(lossy, theta=0.3, periods=2).impacts
-        >>> bool(np.allclose(impacts.velocity_after / impacts.velocity_before, 0.8))
-        True
+    Examples
+    --------
+    >>> lossy = saltus.System(model=system.model, load=system.load, impact=saltus.VelocityReduction(e=0.8))
+    >>> impacts = saltus.simulate(lossy, theta=0.3, periods=2).impacts
+    >>> bool(np.allclose(impacts.velocity_after / impacts.velocity_before, 0.8))
+    True
     """
 
     e: float = 1.0
@@ -88,10 +91,11 @@ class EnergyRestitution(ImpactLaw):
     one on the same side of the minimum -b / (2 a) as v-. At r = 1 that is v+ = v- for m = 0 and nu' = 0. Where no root has the
     sign of v- (small v- on a moving ground) the motion cannot go on, and is refused with the instant and the numbers.
 
-    Examples:
-        >>> ball = saltus.System(model=saltus.WallOscillator(), impact=saltus.EnergyRestitution(r=0.25))
-        >>> float(saltus.simulate(ball, x=-2.0, duration=3.0).impacts.velocity_after[0] / -(3**0.5))  # a quarter of the energy
-        0.5000000000000006
+    Examples
+    --------
+    >>> ball = saltus.System(model=saltus.WallOscillator(), impact=saltus.EnergyRestitution(r=0.25))
+    >>> float(saltus.simulate(ball, x=-2.0, duration=3.0).impacts.velocity_after[0] / -(3**0.5))  # a quarter of the energy
+    0.5000000000000006
     """
 
     r: float
@@ -126,11 +130,12 @@ class InelasticImpact(ImpactLaw):
     For the metainterface v+ = -cos(2 beta0) v- from lower to upper and -cos(2 beta0)/(1+m) v- back, whatever the ground does, for
     45 to 135 degrees; outside that range both contacts act and the motion stops. For the rocking block Housner's factor.
 
-    Examples:
-        >>> inelastic = saltus.System(model=system.model, load=system.load, impact=saltus.InelasticImpact())
-        >>> impacts = saltus.simulate(inelastic, theta=0.3, periods=1).impacts
-        >>> float(impacts.velocity_after[0] / impacts.velocity_before[0] + np.cos(2 * system.model.beta0))
-        0.0
+    Examples
+    --------
+    >>> inelastic = saltus.System(model=system.model, load=system.load, impact=saltus.InelasticImpact())
+    >>> impacts = saltus.simulate(inelastic, theta=0.3, periods=1).impacts
+    >>> float(impacts.velocity_after[0] / impacts.velocity_before[0] + np.cos(2 * system.model.beta0))
+    0.0
     """
 
     def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:

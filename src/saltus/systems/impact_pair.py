@@ -22,9 +22,10 @@ class ImpactPair(Model):
     The coordinates are those of T = (z'^2 + mu (z' + x')^2) / 2, so that an impact at a wall acts on x alone, and the balance of
     momentum gives the jump of z'. Contacts `left` at x = -d and `right` at x = d.
 
-    Examples:
-        >>> [contact.name for contact in saltus.ImpactPair(clearance=0.5).contacts]
-        ['left', 'right']
+    Examples
+    --------
+    >>> [contact.name for contact in saltus.ImpactPair(clearance=0.5).contacts]
+    ['left', 'right']
     """
 
     mass_ratio: float = 0.1  # mu, of the mass to the case, above 0

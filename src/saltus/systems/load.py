@@ -17,9 +17,10 @@ class Channel:
 
     `t` is the dimensionless time tau: a number, an array, or the symbolic time of a traced model.
 
-    Examples:
-        >>> [channel for channel in system.model.channels if channel in system.load.channels]
-        ['horizontal', 'vertical']
+    Examples
+    --------
+    >>> [channel for channel in system.model.channels if channel in system.load.channels]
+    ['horizontal', 'vertical']
     """
 
     __slots__ = ("_frequency", "_signal")
@@ -58,16 +59,21 @@ class Load:
     (ii) `loadpathaa`, `Load(frequency=W, ground_horizontal=Harmonic(amplitude=z), vertical=-0.5)`; (iii) `loadpathb`,
     `Load(frequency=W, horizontal=Harmonic(amplitude=H), vertical=Harmonic(mean=-0.5, amplitude=0.25, phase=pi/2))`.
 
-    Args:
-        frequency: the base angular frequency Omega > 0 of every harmonic, or None for a load without a period.
+    Parameters
+    ----------
+    frequency
+        The base angular frequency Omega > 0 of every harmonic, or None for a load without a period.
 
-    Raises:
-        ParameterError: a harmonic without a frequency, a record or a pulse of the wrong quantity.
+    Raises
+    ------
+    ParameterError
+        A harmonic without a frequency, a record or a pulse of the wrong quantity.
 
-    Examples:
-        >>> load = saltus.Load(frequency=2.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5)
-        >>> load.period / np.pi, load.vertical(0.0)
-        (1.0, -0.5)
+    Examples
+    --------
+    >>> load = saltus.Load(frequency=2.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5)
+    >>> load.period / np.pi, load.vertical(0.0)
+    (1.0, -0.5)
     """
 
     frequency: float | None

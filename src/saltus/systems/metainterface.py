@@ -37,9 +37,10 @@ class Metainterface(Model):
     >= 0, with the upper one open R1 = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2
     - [(1+h) H - (1+m) zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one of `eomnl`.
 
-    Examples:
-        >>> saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1).coordinates
-        ('theta',)
+    Examples
+    --------
+    >>> saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1).coordinates
+    ('theta',)
     """
 
     beta0: float = field(metadata=RADIANS)  # angle of the undeformed cell, in (0, pi)

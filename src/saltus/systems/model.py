@@ -15,9 +15,10 @@ from saltus.systems.contact import Contact
 class MarginKind(StrEnum):
     """What it means that a motion of a model passes one of its margins.
 
-    Examples:
-        >>> str(system.model.margin_kind("reaction"))
-        'assumption'
+    Examples
+    --------
+    >>> str(system.model.margin_kind("reaction"))
+    'assumption'
     """
 
     LANDMARK = "landmark"  # a place worth a mark: the mechanism goes on through it
@@ -50,16 +51,17 @@ class Model:
     Every argument may be a number, an array or a symbol. With one degree of freedom the coordinate, the velocity and the
     acceleration are scalars; with several they are tuples.
 
-    Examples:
-        >>> from dataclasses import dataclass
-        >>> @dataclass(frozen=True, kw_only=True)
-        ... class Pendulum(saltus.Model):
-        ...     coordinates, channels, sides = ("angle",), (), ()
-        ...     def acceleration(self, t, angle, velocity, side, load):
-        ...         return -np.sin(angle)
-        >>> motion = saltus.simulate(saltus.System(model=Pendulum()), angle=0.5, duration=10.0)
-        >>> bool(abs(motion.velocity**2 / 2 - np.cos(motion.angle) + np.cos(0.5)) < 1e-12)  # its energy
-        True
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Pendulum(saltus.Model):
+    ...     coordinates, channels, sides = ("angle",), (), ()
+    ...     def acceleration(self, t, angle, velocity, side, load):
+    ...         return -np.sin(angle)
+    >>> motion = saltus.simulate(saltus.System(model=Pendulum()), angle=0.5, duration=10.0)
+    >>> bool(abs(motion.velocity**2 / 2 - np.cos(motion.angle) + np.cos(0.5)) < 1e-12)  # its energy
+    True
     """
 
     __slots__ = ()

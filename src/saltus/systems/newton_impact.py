@@ -24,10 +24,11 @@ class NewtonImpact(ImpactLaw):
     contact with an impulse is left with -e_i v_i- less g times the other ones' v-. For g = 0 the energy lost at an impact is
     1/2 sum J_i (1 - e_i) |v_i-| on fixed ground. A transfer may gain energy: see `energy_gain`.
 
-    Examples:
-        >>> stops = saltus.System(model=saltus.TwoStops(stiffness=0.0), impact=saltus.NewtonImpact(e=0.5))
-        >>> [float(event.velocity_after[0]) for event in saltus.simulate(stops, x=0.0, velocity=1.0, duration=4.0).events]
-        [-0.5]
+    Examples
+    --------
+    >>> stops = saltus.System(model=saltus.TwoStops(stiffness=0.0), impact=saltus.NewtonImpact(e=0.5))
+    >>> [float(event.velocity_after[0]) for event in saltus.simulate(stops, x=0.0, velocity=1.0, duration=4.0).events]
+    [-0.5]
     """
 
     e: Any = 0.0  # of all contacts, or a tuple with one for each in the order of the model; in [0, 1]
@@ -62,10 +63,11 @@ def energy_gain(model: Model, impact: ImpactLaw) -> dict[str, float]:
     on fixed ground and in the position where these contacts are closed. For two layers it is positive where
     M_ss e_s^2 + 2 cos(2 beta0) e_s g + M_jj g^2 > M_ss, s the layer that is hit.
 
-    Examples:
-        >>> heavy = saltus.TwoLayer(beta0=np.deg2rad(80), mass_ratio=0.7)
-        >>> saltus.energy_gain(heavy, saltus.NewtonImpact(transfer=1.0))["upper"]  # the lower mass is heavier by that share
-        0.7
+    Examples
+    --------
+    >>> heavy = saltus.TwoLayer(beta0=np.deg2rad(80), mass_ratio=0.7)
+    >>> saltus.energy_gain(heavy, saltus.NewtonImpact(transfer=1.0))["upper"]  # the lower mass is heavier by that share
+    0.7
     """
     return {name: float(share) for name, share in energy_gains(model, impact).items()}
 

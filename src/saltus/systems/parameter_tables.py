@@ -17,8 +17,10 @@ MOST_CHECKED = 200  # rows of parameters; of more, those with a least or largest
 def parameter_table(system: System, parameters: Any) -> dict[str, Any]:
     """The parameters as given, by path; each path leads to a number of the system.
 
-    Raises:
-        ParameterError: no mapping, or a path that leads elsewhere.
+    Raises
+    ------
+    ParameterError
+        No mapping, or a path that leads elsewhere.
     """
     if parameters is None:
         return {}
@@ -37,8 +39,10 @@ def parameter_table(system: System, parameters: Any) -> dict[str, Any]:
 def check_parameters(system: System, columns: Mapping[str, np.ndarray]) -> None:
     """Refuse values that the system refuses, row by row.
 
-    Raises:
-        ParameterError: of the system; or orders of harmonics that are not whole.
+    Raises
+    ------
+    ParameterError
+        Of the system; or orders of harmonics that are not whole.
     """
     for path, values in columns.items():
         if path.endswith(".order") and not np.equal(values, np.round(values)).all():

@@ -48,8 +48,10 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
     Where a part and something below it are both given, the part is replaced first. Numbers become constant signals where
     signals stand.
 
-    Raises:
-        ParameterError: a path that leads nowhere, with the near ones; a value that the new whole refuses.
+    Raises
+    ------
+    ParameterError
+        A path that leads nowhere, with the near ones; a value that the new whole refuses.
     """
     parts, below = children(node), defaultdict[str, dict[str, Any]](dict)
     for path, value in changes.items():

@@ -105,10 +105,11 @@ def sinusoid(rate: Any, phase: Any, since: Any, n: int) -> Any:
 class HalfSine(Pulse):
     """amplitude sin(frequency s) for 0 <= s <= pi / frequency, s the time since `start`.
 
-    Examples:
-        >>> load = saltus.Load(force=saltus.HalfSine(amplitude=2.0, frequency=np.pi))
-        >>> float(load.force(0.5)), float(load.force(1.5))  # it is over at 1
-        (2.0, 0.0)
+    Examples
+    --------
+    >>> load = saltus.Load(force=saltus.HalfSine(amplitude=2.0, frequency=np.pi))
+    >>> float(load.force(0.5)), float(load.force(1.5))  # it is over at 1
+    (2.0, 0.0)
     """
 
     frequency: float = field(metadata=RATE)  # angular, of the sine
@@ -128,10 +129,11 @@ class HalfSine(Pulse):
 class OneSine(HalfSine):
     """amplitude sin(frequency s) for one period, 0 <= s <= 2 pi / frequency; of acceleration, a forward pulse of the velocity.
 
-    Examples:
-        >>> load = saltus.Load(force=saltus.OneSine(amplitude=2.0, frequency=np.pi))
-        >>> round(float(load.force(1.5)), 12), float(load.force(2.5))  # it is over at 2
-        (-2.0, -0.0)
+    Examples
+    --------
+    >>> load = saltus.Load(force=saltus.OneSine(amplitude=2.0, frequency=np.pi))
+    >>> round(float(load.force(1.5)), 12), float(load.force(2.5))  # it is over at 2
+    (-2.0, -0.0)
     """
 
     @property
@@ -145,10 +147,11 @@ class OneSine(HalfSine):
 class OneCosine(OneSine):
     """amplitude cos(frequency s) for one period; it jumps where it begins and where it ends.
 
-    Examples:
-        >>> load = saltus.Load(force=saltus.OneCosine(amplitude=2.0, frequency=np.pi))
-        >>> round(float(load.force(1.0)), 12), float(load.force(2.5))
-        (-2.0, 0.0)
+    Examples
+    --------
+    >>> load = saltus.Load(force=saltus.OneCosine(amplitude=2.0, frequency=np.pi))
+    >>> round(float(load.force(1.0)), 12), float(load.force(2.5))
+    (-2.0, 0.0)
     """
 
     def shape(self, since: Any, n: int) -> Any:
@@ -166,10 +169,11 @@ class MavroeidisPapageorgiou(Pulse):
     r is the time since its middle and `gamma` > 1 says how many oscillations it has. Of the ground it is a `velocity`, or, if
     asked, an `acceleration`. It begins and ends with the value 0.
 
-    Examples:
-        >>> load = saltus.Load(force=saltus.MavroeidisPapageorgiou(amplitude=2.0, frequency=np.pi, gamma=2.0))
-        >>> round(float(load.force(2.0)), 12)  # its middle is pi gamma / frequency after the start
-        2.0
+    Examples
+    --------
+    >>> load = saltus.Load(force=saltus.MavroeidisPapageorgiou(amplitude=2.0, frequency=np.pi, gamma=2.0))
+    >>> round(float(load.force(2.0)), 12)  # its middle is pi gamma / frequency after the start
+    2.0
     """
 
     frequency: float = field(metadata=RATE)
@@ -205,10 +209,11 @@ class Ricker(Pulse):
     Its peak is `7 (2 / frequency)` after `start`: before the start and after the end, abs(u) > 7, it is below 1e-19 of the
     amplitude and taken as 0. As a ground acceleration it leaves the ground where it was, at rest.
 
-    Examples:
-        >>> pulse = saltus.Load(force=saltus.Ricker(amplitude=2.0, frequency=2.0))
-        >>> float(pulse.force(7.0))  # its peak is 14 / frequency after the start
-        2.0
+    Examples
+    --------
+    >>> pulse = saltus.Load(force=saltus.Ricker(amplitude=2.0, frequency=2.0))
+    >>> float(pulse.force(7.0))  # its peak is 14 / frequency after the start
+    2.0
     """
 
     frequency: float = field(metadata=RATE)
@@ -232,10 +237,11 @@ class Ricker(Pulse):
 class Ramp(Pulse):
     """amplitude s / duration for 0 <= s <= duration, and `amplitude` for ever after.
 
-    Examples:
-        >>> load = saltus.Load(force=saltus.Ramp(amplitude=2.0, duration=4.0))
-        >>> float(load.force(1.0)), float(load.force(9.0))
-        (0.5, 2.0)
+    Examples
+    --------
+    >>> load = saltus.Load(force=saltus.Ramp(amplitude=2.0, duration=4.0))
+    >>> float(load.force(1.0)), float(load.force(9.0))
+    (0.5, 2.0)
     """
 
     duration: float = field(metadata=TIME)
@@ -262,10 +268,11 @@ class Chirp(Pulse):
     Of the ground its velocity and its displacement are no elementary functions: a model or an impact law that reads them is
     refused.
 
-    Examples:
-        >>> load = saltus.Load(force=saltus.Chirp(amplitude=1.0, frequency=1.0, end_frequency=3.0, duration=10.0))
-        >>> round(float(load.force(2.0) - np.sin(2.0 + 0.2 * 2.0)), 12)  # the phase s + (3 - 1) s^2 / (2 10)
-        0.0
+    Examples
+    --------
+    >>> load = saltus.Load(force=saltus.Chirp(amplitude=1.0, frequency=1.0, end_frequency=3.0, duration=10.0))
+    >>> round(float(load.force(2.0) - np.sin(2.0 + 0.2 * 2.0)), 12)  # the phase s + (3 - 1) s^2 / (2 10)
+    0.0
     """
 
     frequency: float = field(metadata=RATE)

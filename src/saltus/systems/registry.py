@@ -44,12 +44,15 @@ T = TypeVar("T", type[Model], type[ImpactLaw])
 def register(cls: T) -> T:
     """Make a model or an impact law of your own known by its class name, so that files can name it; use as a decorator.
 
-    Raises:
-        ParameterError: what is neither; a model whose sides and reset do not go together.
+    Raises
+    ------
+    ParameterError
+        What is neither; a model whose sides and reset do not go together.
 
-    Examples:
-        >>> saltus.register(saltus.WallOscillator) is saltus.WallOscillator
-        True
+    Examples
+    --------
+    >>> saltus.register(saltus.WallOscillator) is saltus.WallOscillator
+    True
     """
     if not isinstance(cls, type):
         raise ParameterError(f"register takes a Model or an ImpactLaw, got {shown(cls)}", "cls")

@@ -48,13 +48,16 @@ def reversed_system(system: System) -> System:
     a time T before it came to (q, v) at t, with the velocity's sign turned. Rest has no past: a motion that comes to rest forward
     comes from everywhere, so a backward one never meets it.
 
-    Raises:
-        ParameterError: an impact law without an inverse (`VelocityReduction` with e > 0 has one), or a reset of the model that
-            this law does not undo.
+    Raises
+    ------
+    ParameterError
+        An impact law without an inverse (`VelocityReduction` with e > 0 has one), or a reset of the model that
+        this law does not undo.
 
-    Examples:
-        >>> saltus.systems.reversed_system(system).model.damping
-        0.1
+    Examples
+    --------
+    >>> saltus.systems.reversed_system(system).model.damping
+    0.1
     """
     check_system(system, "reversed_system")
     impact = system.impact

@@ -27,12 +27,13 @@ class RockingBlock(Model):
     The block is taken to stay on the ground: for nu'' < -1 it would leave it, which nothing here says.
     A motion stops, `overturned`, when the block lies on its side: pi/2 - abs(theta) = 0.
 
-    Examples:
-        >>> block = saltus.System(model=saltus.RockingBlock(alpha=0.25))
-        >>> motion = saltus.simulate(block, theta=0.1, duration=10.0)
-        >>> period = motion.impacts.time[2] - motion.impacts.time[0]
-        >>> float(period / saltus.theory.rocking_period(0.1, alpha=0.25))
-        0.9999999999999871
+    Examples
+    --------
+    >>> block = saltus.System(model=saltus.RockingBlock(alpha=0.25))
+    >>> motion = saltus.simulate(block, theta=0.1, duration=10.0)
+    >>> period = motion.impacts.time[2] - motion.impacts.time[0]
+    >>> float(period / saltus.theory.rocking_period(0.1, alpha=0.25))
+    0.9999999999999871
     """
 
     alpha: float = field(metadata=RADIANS)  # slenderness angle, in (0, pi/2)

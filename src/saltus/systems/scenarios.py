@@ -18,9 +18,10 @@ Two = tuple[float, float]
 class Scenario(Enum):
     """What the impacting layer does (`impact_condition1` to `impact_condition3`).
 
-    Examples:
-        >>> sorted({row.scenario.name for row in saltus.systems.table_1()})
-        ['BOUNCING', 'NO_BOUNCING', 'PARTIAL_BOUNCING']
+    Examples
+    --------
+    >>> sorted({row.scenario.name for row in saltus.systems.table_1()})
+    ['BOUNCING', 'NO_BOUNCING', 'PARTIAL_BOUNCING']
     """
 
     NO_BOUNCING = "no bouncing"  # it stops
@@ -58,9 +59,10 @@ class TableRow:
 def table_1() -> tuple[TableRow, ...]:
     """Table 1 as erratum 16 corrects it: s the impacting layer, j the other one; angles are those at the impact.
 
-    Examples:
-        >>> [(row.before, row.after) for row in saltus.systems.table_1()][0]
-        ("theta_s = 0, theta_j = 0, theta_j'(-) = 0", "theta_s'(+) = 0, theta_j'(+) != 0")
+    Examples
+    --------
+    >>> [(row.before, row.after) for row in saltus.systems.table_1()][0]
+    ("theta_s = 0, theta_j = 0, theta_j'(-) = 0", "theta_s'(+) = 0, theta_j'(+) != 0")
     """
     one, two = "theta_s = 0, theta_j = 0, theta_j'(-) = 0", "theta_s = 0, theta_j != 0"
     stops, turns = "theta_s'(+) = 0", "theta_s'(-) theta_s'(+) < 0"
@@ -81,9 +83,11 @@ def name_impact(before: LayerState, after: LayerState, *, model: TwoLayer | None
     `model`, an impact on one layer while the other is open must keep the balance of `other_impulse`. An impact that
     stops everything, as in errata 25 outside 45 to 135 degrees, is no bouncing with no deformed layer after it.
 
-    Raises:
-        ParameterError: angles that jump (`controtrot`), no layer or both layers impacting, a layer that
-            closes further, or a balance that is not kept.
+    Raises
+    ------
+    ParameterError
+        Angles that jump (`controtrot`), no layer or both layers impacting, a layer that
+        closes further, or a balance that is not kept.
     """
     _check_states(before, after, tolerance)
     speed = tolerance * max(1e-300, *map(abs, before.velocity), *map(abs, after.velocity))

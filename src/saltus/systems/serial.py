@@ -64,8 +64,10 @@ def read_signal(data: Any, where: str) -> Signal | float:
 def signal_class(data: Mapping[str, Any], where: str) -> type[Signal]:
     """What a table of a signal is: the pulse that its `type` names; without one a `Record`, if it has samples, or a `Harmonic`.
 
-    Raises:
-        ParameterError: a type that is no pulse.
+    Raises
+    ------
+    ParameterError
+        A type that is no pulse.
     """
     if "type" not in data:
         return Record if "time" in data or "value" in data else Harmonic

@@ -27,13 +27,16 @@ class PhysicalCell:
     displacements U / l (`displ_ratio1`), the damping C = C2 T / (M2 l^2), all three as corrected by erratum 13; energies are
     per K2.
 
-    Raises:
-        ParameterError: a value out of range, or a lower damping without an upper one (c = C1 / C2 is then undefined).
+    Raises
+    ------
+    ParameterError
+        A value out of range, or a lower damping without an upper one (c = C1 / C2 is then undefined).
 
-    Examples:
-        >>> cell = saltus.PhysicalCell(length=0.1, upper_mass=0.5, upper_stiffness=2.0, upper_damping=0.01)
-        >>> cell.metainterface(beta0=1.4).damping  # C2 / sqrt(M2 l^2 K2) = 0.01 / 0.1
-        0.09999999999999998
+    Examples
+    --------
+    >>> cell = saltus.PhysicalCell(length=0.1, upper_mass=0.5, upper_stiffness=2.0, upper_damping=0.01)
+    >>> cell.metainterface(beta0=1.4).damping  # C2 / sqrt(M2 l^2 K2) = 0.01 / 0.1
+    0.09999999999999998
     """
 
     length: float  # l of the inclined bars, m

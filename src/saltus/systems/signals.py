@@ -62,10 +62,11 @@ class Harmonic(Signal):
 
     `Harmonic(amplitude=H)` is load (i) of the paper (`loadpatha`); a phase of pi/2 makes it a cosine (`loadpathb`).
 
-    Examples:
-        >>> load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=2.0, mean=1.0))
-        >>> float(load.force(np.pi / 2))
-        3.0
+    Examples
+    --------
+    >>> load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=2.0, mean=1.0))
+    >>> float(load.force(np.pi / 2))
+    3.0
     """
 
     amplitude: float
@@ -144,13 +145,16 @@ class Record(Signal):
 
     Outside its samples a ground record has no acceleration: the ground goes on with the velocity it has.
 
-    Raises:
-        ParameterError: fewer than 2 samples (4 for a spline), lengths that differ, times that do not increase, NaN.
+    Raises
+    ------
+    ParameterError
+        Fewer than 2 samples (4 for a spline), lengths that differ, times that do not increase, NaN.
 
-    Examples:
-        >>> load = saltus.Load(force=saltus.Record(time=[0.0, 1.0, 2.0], value=[0.0, 4.0, 0.0]))
-        >>> float(load.force(0.25))
-        1.0
+    Examples
+    --------
+    >>> load = saltus.Load(force=saltus.Record(time=[0.0, 1.0, 2.0], value=[0.0, 4.0, 0.0]))
+    >>> float(load.force(0.25))
+    1.0
     """
 
     time: np.ndarray

@@ -27,14 +27,17 @@ class System:
     `System(model=Metainterface(beta0=...), load=Load(...), impact=VelocityReduction(1.0))`. Every number has a dotted path:
     `model.damping`, `load.frequency`, `load.horizontal.amplitude`, `load.vertical`, `impact.e`.
 
-    Raises:
-        ParameterError: a load channel that the model does not read, or cannot as it is.
+    Raises
+    ------
+    ParameterError
+        A load channel that the model does not read, or cannot as it is.
 
-    Examples:
-        >>> system.get("load.frequency"), system.with_({"load.frequency": 0.9}).get("load.frequency")
-        (1.0, 0.9)
-        >>> saltus.System.from_json(system.to_json()) == system
-        True
+    Examples
+    --------
+    >>> system.get("load.frequency"), system.with_({"load.frequency": 0.9}).get("load.frequency")
+    (1.0, 0.9)
+    >>> saltus.System.from_json(system.to_json()) == system
+    True
     """
 
     model: Model
@@ -71,8 +74,10 @@ class System:
     def with_(self, changes: Mapping[str, Any] | None = None, **more: Any) -> System:
         """A copy with the parts at the given dotted paths replaced: `system.with_({"load.frequency": 1.1})`.
 
-        Raises:
-            ParameterError: a path that leads nowhere, with the near ones, or a value that is refused there.
+        Raises
+        ------
+        ParameterError
+            A path that leads nowhere, with the near ones, or a value that is refused there.
         """
         system: System = replace(self, {**(changes or {}), **more})
         return system
@@ -102,8 +107,10 @@ class System:
     def mirrored(self) -> System | None:
         """The system in which -theta moves as theta does in this one, or None without a mirror symmetry.
 
-        Raises:
-            ParameterError: a `mirror` of the model that is no such symmetry, as a state shows.
+        Raises
+        ------
+        ParameterError
+            A `mirror` of the model that is no such symmetry, as a state shows.
         """
         load = self.model.mirror(self.load)
         if load is None:
@@ -139,8 +146,10 @@ class System:
     def from_json(cls, text: str) -> System:
         """The inverse of `to_json`.
 
-        Raises:
-            ParameterError: text that is no JSON, or no system.
+        Raises
+        ------
+        ParameterError
+            Text that is no JSON, or no system.
         """
         return cls.from_dict(_parsed(text, _json, "JSON"))
 
@@ -154,8 +163,10 @@ class System:
     def from_toml(cls, text: str) -> System:
         """The inverse of `to_toml`.
 
-        Raises:
-            ParameterError: text that is no TOML, or no system.
+        Raises
+        ------
+        ParameterError
+            Text that is no TOML, or no system.
         """
         return cls.from_dict(_parsed(text, tomllib.loads, "TOML"))
 
@@ -223,8 +234,10 @@ def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:
 def check_system(system: Any, asking: str, *, coordinates: int | None = None, several_contacts: bool = False) -> None:
     """Refuse what is no System, or one whose model has more contacts or another number of coordinates than `asking` is for.
 
-    Raises:
-        ParameterError: with what `asking` takes.
+    Raises
+    ------
+    ParameterError
+        With what `asking` takes.
     """
     if not isinstance(system, System):
         raise ParameterError(f"{asking} takes a System(model=..., load=..., impact=...), got {shown(system)}", "system")

@@ -34,10 +34,11 @@ class TwoLayer(Model):
     Angles and velocities are pairs (lower, upper) of numbers or arrays; matrices have the shape (2, 2), or (2, 2, ...) for
     arrays. Energies are per K2. The load channels are those of `Metainterface`.
 
-    Examples:
-        >>> both = saltus.System(model=saltus.TwoLayer(beta0=1.4), load=saltus.Load(vertical=-0.1))
-        >>> saltus.simulate(both, theta_1=0.2, theta_2=0.0, duration=1.0).closed
-        ('upper',)
+    Examples
+    --------
+    >>> both = saltus.System(model=saltus.TwoLayer(beta0=1.4), load=saltus.Load(vertical=-0.1))
+    >>> saltus.simulate(both, theta_1=0.2, theta_2=0.0, duration=1.0).closed
+    ('upper',)
     """
 
     beta0: float = field(metadata=RADIANS)  # angle of the undeformed cell, in (0, pi)

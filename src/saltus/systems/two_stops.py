@@ -18,9 +18,10 @@ from saltus.systems.model import Model
 class TwoStops(Model):
     """x'' + c x' + k x = F(tau) for d_1 <= x <= d_2: contacts `left` and `right`, with an impact law such as `NewtonImpact`.
 
-    Examples:
-        >>> [contact.name for contact in saltus.TwoStops(left=-1.0, right=2.0).contacts]
-        ['left', 'right']
+    Examples
+    --------
+    >>> [contact.name for contact in saltus.TwoStops(left=-1.0, right=2.0).contacts]
+    ['left', 'right']
     """
 
     stiffness: float = 1.0  # k, at least 0

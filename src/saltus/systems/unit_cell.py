@@ -35,13 +35,16 @@ class UnitCell:
     With `physical`, a `PhysicalCell` of SI data, the cell makes its models (`metainterface`, `two_layer`);
     `physical.units` converts times, forces and displacements.
 
-    Raises:
-        ParameterError: angles outside alpha0 > 0, 0 < beta0 < pi, alpha0 + beta0 < pi (`restangle`).
+    Raises
+    ------
+    ParameterError
+        Angles outside alpha0 > 0, 0 < beta0 < pi, alpha0 + beta0 < pi (`restangle`).
 
-    Examples:
-        >>> cell = saltus.UnitCell(alpha0=0.3, beta0=1.4)
-        >>> float(cell.theta(cell.phi(0.1)))
-        0.10000000000000009
+    Examples
+    --------
+    >>> cell = saltus.UnitCell(alpha0=0.3, beta0=1.4)
+    >>> float(cell.theta(cell.phi(0.1)))
+    0.10000000000000009
     """
 
     alpha0: float = field(metadata=RADIANS)
@@ -96,8 +99,10 @@ class UnitCell:
     def line_condition(self, n: int = 1) -> float:
         """n pi - beta0, rad (`line_cond`).
 
-        Raises:
-            ParameterError: n >= 2, which lies past the kinematic limit (erratum 20).
+        Raises
+        ------
+        ParameterError
+            n >= 2, which lies past the kinematic limit (erratum 20).
         """
         if n != 1:
             raise ParameterError(
@@ -112,16 +117,20 @@ class UnitCell:
     def phi(self, theta: Numbers) -> Any:
         """abs(phi_j) from cos(beta_j) = cos(beta0) - psi tan(phi_j)^2 (`gen_conf`), rad.
 
-        Raises:
-            ParameterError: abs(theta) past the kinematic limit.
+        Raises
+        ------
+        ParameterError
+            abs(theta) past the kinematic limit.
         """
         return np.arctan(np.sqrt(self._lowering(theta) / self.psi))
 
     def theta(self, phi: Numbers, *, layer: int = 1, past_line: bool = False) -> Any:
         """theta_j = -(-1)^j (beta_j(phi_j) - beta0) (`gen_conf`, erratum 2), rad; `past_line` takes beta_j > pi.
 
-        Raises:
-            ParameterError: abs(phi) above `max_misalignment`, or a layer other than 1 and 2.
+        Raises
+        ------
+        ParameterError
+            abs(phi) above `max_misalignment`, or a layer other than 1 and 2.
         """
         if layer not in (1, 2):
             raise ParameterError(f"layer must be 1 (lower) or 2 (upper), got {layer!r}", "layer")
@@ -173,8 +182,10 @@ class UnitCell:
     def layout(self, theta_1: float = 0.0, theta_2: float = 0.0, *, misaligned: tuple[int, int] = (1, 1)) -> CellLayout:
         """Where every hinge, slider and mass is, in units of l from the lower left hinge; `misaligned` holds the signs of phi_j.
 
-        Raises:
-            ParameterError: theta_1 < 0 or theta_2 > 0 (`theta_conditions`), or either past the kinematic limit.
+        Raises
+        ------
+        ParameterError
+            theta_1 < 0 or theta_2 > 0 (`theta_conditions`), or either past the kinematic limit.
         """
         if not (isinstance(misaligned, tuple | list) and len(misaligned) == 2 and set(misaligned) <= {1, -1}):
             raise ParameterError(f"misaligned must be two signs, 1 or -1, got {shown(misaligned)}", "misaligned")

@@ -18,10 +18,11 @@ class WallOscillator(Model):
 
     It has one mode, ended at the wall and entered again, and rests on the wall while F - k d > 0.
 
-    Examples:
-        >>> ball = saltus.System(model=saltus.WallOscillator(stiffness=0.0, wall=0.0), load=saltus.Load(force=1.0))
-        >>> saltus.simulate(ball, x=-2.0, duration=3.0).impacts.time  # the fall from a height of 2 under an acceleration of 1
-        array([2.])
+    Examples
+    --------
+    >>> ball = saltus.System(model=saltus.WallOscillator(stiffness=0.0, wall=0.0), load=saltus.Load(force=1.0))
+    >>> saltus.simulate(ball, x=-2.0, duration=3.0).impacts.time  # the fall from a height of 2 under an acceleration of 1
+    array([2.])
     """
 
     stiffness: float = 1.0  # k, at least 0

@@ -26,8 +26,10 @@ FREQUENCY = "load.frequency"
 def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
     """The dotted paths to differentiate to, once each of them is known to name a number that can vary.
 
-    Raises:
-        ParameterError: a path that is not a number of the system, with the near ones; an order; a path given twice.
+    Raises
+    ------
+    ParameterError
+        A path that is not a number of the system, with the near ones; an order; a path given twice.
     """
     known = [path for path, _ in numbers(system)]
     for path in paths:

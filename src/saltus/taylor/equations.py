@@ -21,8 +21,10 @@ def equations_of(system: System) -> dict[str, str]:
     `names` (of coordinates, units, channels, sides and stops). What a model's Python reads from elsewhere, such as a constant of
     its module, stands in the expressions as a number.
 
-    Raises:
-        TraceError: a model that cannot be traced.
+    Raises
+    ------
+    TraceError
+        A model that cannot be traced.
     """
     key = structure_key(system)
     if key not in _digests:

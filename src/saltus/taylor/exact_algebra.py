@@ -33,8 +33,10 @@ class NoNormalForm(Exception):
 def normal_form(root: Expr, leaves: Mapping[Expr, Form] | None = None) -> Form:
     """The normal form of an expression, with some of its leaves replaced by normal forms.
 
-    Raises:
-        NoNormalForm: a number that is not finite, a division by 0, a polynomial that is too long.
+    Raises
+    ------
+    NoNormalForm
+        A number that is not finite, a division by 0, a polynomial that is too long.
     """
     forms: dict[int, Form] = {id(leaf): form for leaf, form in (leaves or {}).items()}
     for node in ordered([root]):

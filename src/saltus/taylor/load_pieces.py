@@ -21,8 +21,10 @@ SINCE, WITHIN, AFTER = 0, 1, 10
 def record_table(system: System, rows: list[tuple[str, int]]) -> tuple[np.ndarray, np.ndarray]:
     """The records and pulses that a trace reads, on their common breakpoints.
 
-    Returns:
-        breakpoints (m,) and coefficients (rows, m + 1, RECORD_WIDTH): piece i of a row holds between the breakpoints i - 1 and
+    Returns
+    -------
+    tuple[np.ndarray, np.ndarray]
+        Breakpoints (m,) and coefficients (rows, m + 1, RECORD_WIDTH): piece i of a row holds between the breakpoints i - 1 and
         i, in ascending powers of the time since breakpoint i - 1 (the first piece: since breakpoint 0). Scales are left out.
     """
     breaks, tables = record_tables(system, rows, {})
@@ -34,8 +36,10 @@ def record_tables(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same for many sets of numbers, given in flat columns by dotted path.
 
-    Returns:
-        breakpoints (n, m) and coefficients (n, rows, m + 1, RECORD_WIDTH); n is 1 where no column moves a breakpoint.
+    Returns
+    -------
+    tuple[np.ndarray, np.ndarray]
+        Breakpoints (n, m) and coefficients (n, rows, m + 1, RECORD_WIDTH); n is 1 where no column moves a breakpoint.
     """
     if not rows:
         return np.empty((1, 0)), np.empty((1, 0, 1, RECORD_WIDTH))

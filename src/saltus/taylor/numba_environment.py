@@ -10,8 +10,10 @@ from saltus.errors import SaltusError
 def check_environment() -> None:
     """Refuse what numba would answer in its own words when it is imported, or, without its compiler, much later.
 
-    Raises:
-        SaltusError: NUMBA_DISABLE_JIT is set, or NUMBA_NUM_THREADS is no count.
+    Raises
+    ------
+    SaltusError
+        NUMBA_DISABLE_JIT is set, or NUMBA_NUM_THREADS is no count.
     """
     disabled, threads = os.environ.get("NUMBA_DISABLE_JIT", "0"), os.environ.get("NUMBA_NUM_THREADS", "1")
     if disabled not in ("", "0"):

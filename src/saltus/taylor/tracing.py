@@ -126,9 +126,12 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
 
     Given dotted paths (maybe none), trace the tangent as well: the derivatives to the state at the start and to those numbers.
 
-    Raises:
-        TraceError: an operation without a Taylor recurrence, a branch on the state, a time used outside the load.
-        ParameterError: a margin that the model does not have; a path to no number.
+    Raises
+    ------
+    TraceError
+        An operation without a Taylor recurrence, a branch on the state, a time used outside the load.
+    ParameterError
+        A margin that the model does not have; a path to no number.
     """
     paths = None if sensitivities is None else tangent.check_paths(system, sensitivities)
     result = Trace(sides=len(system.model.sides), dof=len(system.model.coordinates))
@@ -159,8 +162,10 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
 def ask(model: Any, method: str, *arguments: Any) -> Any:
     """Call a model's method; a mistake in a user's own code becomes a sentence that names it.
 
-    Raises:
-        TraceError: any other exception than saltus's own, with its type and text (and itself as the cause).
+    Raises
+    ------
+    TraceError
+        Any other exception than saltus's own, with its type and text (and itself as the cause).
     """
     try:
         return getattr(model, method)(*arguments)

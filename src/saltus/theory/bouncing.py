@@ -21,10 +21,11 @@ from saltus.theory.loaded_equilibria import zeros_of_slope
 class Peaks:
     """The two peaks of a periodic motion through theta = 0, and the velocities between which the impacts change it.
 
-    Examples:
-        >>> peaks = saltus.theory.peaks(tristable, 0.1)
-        >>> round(peaks.theta_min + peaks.theta_max, 12)  # equal layers: as far to both sides
-        0.0
+    Examples
+    --------
+    >>> peaks = saltus.theory.peaks(tristable, 0.1)
+    >>> round(peaks.theta_min + peaks.theta_max, 12)  # equal layers: as far to both sides
+    0.0
     """
 
     theta_min: float  # rad, below 0
@@ -50,13 +51,16 @@ def peaks(system: System, theta0: float) -> Peaks:
 
     With m > 0 a constant velocity (e = 1) changes the energy at each impact and back again; r = 1 keeps it.
 
-    Raises:
-        ParameterError: damping; an impact law under which the motion does not repeat; theta0 = 0, or one from which theta = 0
-            is not reached; a peak beyond the kinematic limit; a load that varies in time.
+    Raises
+    ------
+    ParameterError
+        Damping; an impact law under which the motion does not repeat; theta0 = 0, or one from which theta = 0
+        is not reached; a peak beyond the kinematic limit; a load that varies in time.
 
-    Examples:
-        >>> round(saltus.theory.peaks(tristable, 0.1).theta_max, 12)
-        0.1
+    Examples
+    --------
+    >>> round(saltus.theory.peaks(tristable, 0.1).theta_max, 12)
+    0.1
     """
     check_number("theta0", theta0)
     lower, upper = layers(system)
@@ -79,8 +83,10 @@ def peaks(system: System, theta0: float) -> Peaks:
 def turning_point(layer: Layer, energy: float) -> float:
     """The opening x > 0 at which a motion that leaves contact with this kinetic energy turns back: the first P(x) = energy.
 
-    Raises:
-        ParameterError: energy <= 0, or so large that the layer passes its kinematic limit.
+    Raises
+    ------
+    ParameterError
+        Energy <= 0, or so large that the layer passes its kinematic limit.
     """
     from scipy.optimize import brentq
 
@@ -122,9 +128,10 @@ def unloaded_peak_ratio(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0, *, 
 
     It vanishes for k -> 0 and for k -> infinity; with e = 1 also for m -> infinity.
 
-    Examples:
-        >>> float(saltus.theory.unloaded_peak_ratio(4.0, energy_conserving=True))  # 1 / sqrt(k) or its inverse
-        0.5
+    Examples
+    --------
+    >>> float(saltus.theory.unloaded_peak_ratio(4.0, energy_conserving=True))  # 1 / sqrt(k) or its inverse
+    0.5
     """
     _check_ratios(stiffness_ratio, mass_ratio)
     ratio = np.sqrt((1 if energy_conserving else 1 + np.asarray(mass_ratio)) / np.asarray(stiffness_ratio))
@@ -134,10 +141,11 @@ def unloaded_peak_ratio(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0, *, 
 def unloaded_half_periods(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -> tuple[Any, float]:
     """Durations without loads on the lower and on the upper side (`period_case1`): pi sqrt((1+m)/k) and pi, any shape.
 
-    Examples:
-        >>> lower, upper = saltus.theory.unloaded_half_periods(1.0)
-        >>> float(lower), upper
-        (3.141592653589793, 3.141592653589793)
+    Examples
+    --------
+    >>> lower, upper = saltus.theory.unloaded_half_periods(1.0)
+    >>> float(lower), upper
+    (3.141592653589793, 3.141592653589793)
     """
     _check_ratios(stiffness_ratio, mass_ratio)
     return math.pi * np.sqrt((1 + np.asarray(mass_ratio)) / np.asarray(stiffness_ratio)), math.pi
@@ -148,9 +156,10 @@ def unloaded_period(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -> Any:
 
     It holds for e = 1 and for r = 1, since without loads the durations do not depend on the amplitude.
 
-    Examples:
-        >>> round(float(saltus.theory.unloaded_period(4.0) / np.pi), 12)  # (1 + 1 / sqrt(k)) half periods
-        1.5
+    Examples
+    --------
+    >>> round(float(saltus.theory.unloaded_period(4.0) / np.pi), 12)  # (1 + 1 / sqrt(k)) half periods
+    1.5
     """
     lower, upper = unloaded_half_periods(stiffness_ratio, mass_ratio)
     return lower + upper
@@ -163,13 +172,16 @@ def reciprocal(system: System, theta0: float) -> tuple[System, float]:
 
     Constant forces on the upper mass only, m = 0. P and M are divided by k, which rescales time by sqrt(k) and leaves the angles.
 
-    Raises:
-        ParameterError: m above 0, or forces on the lower mass, for which the exchange is not of this form.
+    Raises
+    ------
+    ParameterError
+        m above 0, or forces on the lower mass, for which the exchange is not of this form.
 
-    Examples:
-        >>> other, theta = saltus.theory.reciprocal(tristable, 0.1)
-        >>> round(abs(theta), 12)  # equal layers: the same motion
-        0.1
+    Examples
+    --------
+    >>> other, theta = saltus.theory.reciprocal(tristable, 0.1)
+    >>> round(abs(theta), 12)  # equal layers: the same motion
+    0.1
     """
     lower, upper = layers(system)
     if lower.mass != upper.mass or lower.vertical != upper.vertical or lower.outward != -upper.outward:

@@ -19,12 +19,15 @@ def potential_energy(system: System, theta: Numbers) -> Any:
 
     where V, H stand for (1+v)^P V, (1+h)^P H, and s for the sign of theta.
 
-    Raises:
-        ParameterError: another model, a smoothed sign, or a load that varies in time.
+    Raises
+    ------
+    ParameterError
+        Another model, a smoothed sign, or a load that varies in time.
 
-    Examples:
-        >>> float(saltus.theory.potential_energy(tristable, 0.0))
-        0.0
+    Examples
+    --------
+    >>> float(saltus.theory.potential_energy(tristable, 0.0))
+    0.0
     """
     return _by_side(system, theta, Layer.potential, odd=False)
 
@@ -32,10 +35,11 @@ def potential_energy(system: System, theta: Numbers) -> Any:
 def potential_slope(system: System, theta: Numbers) -> Any:
     """dP/dtheta, minus the moment on the open layer; at theta = 0 the mean of its two one-sided values. Any shape.
 
-    Examples:
-        >>> state = saltus.theory.equilibria(tristable)[0]
-        >>> round(abs(float(saltus.theory.potential_slope(tristable, state.theta))), 12)
-        0.0
+    Examples
+    --------
+    >>> state = saltus.theory.equilibria(tristable)[0]
+    >>> round(abs(float(saltus.theory.potential_slope(tristable, state.theta))), 12)
+    0.0
     """
     return _by_side(system, theta, Layer.slope, odd=True)
 
@@ -43,16 +47,22 @@ def potential_slope(system: System, theta: Numbers) -> Any:
 def total_energy(system: System, theta: Numbers, velocity: Numbers, side: Numbers | None = None) -> Any:
     """E = T + P over K2, with the kinetic energy of the moving layer, (1+m)^P theta'^2 / 2 on a ground at rest (`kin_eng`).
 
-    Args:
-        theta, velocity: numbers or arrays that broadcast, rad and rad per unit of tau.
-        side: +1 or -1 of the same shape; the sign of theta if not given.
+    Parameters
+    ----------
+    theta, velocity
+        Numbers or arrays that broadcast, rad and rad per unit of tau.
+    side
+        +1 or -1 of the same shape; the sign of theta if not given.
 
-    Raises:
-        ParameterError: theta = 0 without `side` where the layers' masses differ: the moving mass is then not known.
+    Raises
+    ------
+    ParameterError
+        theta = 0 without `side` where the layers' masses differ: the moving mass is then not known.
 
-    Examples:
-        >>> round(float(saltus.theory.total_energy(tristable, 0.0, 0.2)), 12)  # 0.2^2 / 2, at the contact
-        0.02
+    Examples
+    --------
+    >>> round(float(saltus.theory.total_energy(tristable, 0.0, 0.2)), 12)  # 0.2^2 / 2, at the contact
+    0.02
     """
     theta, velocity = np.asarray(theta, dtype=float), np.asarray(velocity, dtype=float)
     lower, upper = layers(system)

@@ -33,13 +33,16 @@ def high_frequency_onset(frequency: Numbers, *, beta0: float, vertical: float, d
 
     The amplitude there is theta = A pi^2 / (8 Omega^2), which must be small against 1.
 
-    Raises:
-        ParameterError: V cos(beta0) >= 0 or C <= 0 (no onset), Omega^2 <= max(kappa, C^2) (not fast), an order not 1 or 2.
+    Raises
+    ------
+    ParameterError
+        V cos(beta0) >= 0 or C <= 0 (no onset), Omega^2 <= max(kappa, C^2) (not fast), an order not 1 or 2.
 
-    Examples:
-        >>> onset = saltus.theory.high_frequency_onset(4.0, beta0=1.4, vertical=-0.5, damping=0.1)
-        >>> round(float(onset / (0.5 / np.tan(1.4) * 0.1 * np.pi**3 / 96)), 12)
-        1.0
+    Examples
+    --------
+    >>> onset = saltus.theory.high_frequency_onset(4.0, beta0=1.4, vertical=-0.5, damping=0.1)
+    >>> round(float(onset / (0.5 / np.tan(1.4) * 0.1 * np.pi**3 / 96)), 12)
+    1.0
     """
     check_number("beta0", beta0, above=0.0, below=math.pi, unit="rad")
     check_number("damping", damping, above=0.0)

@@ -35,10 +35,11 @@ class WallOrbits:
 
         trace = -e tr + alpha Delta {Omega^2 wall / v - [c (1 - beta) - (k - Omega^2) alpha]}
 
-    Examples:
-        >>> family = saltus.theory.wall_orbits(wall)
-        >>> round(float(family.amplitude(family.speeds(8.0)[-1])), 9)
-        8.0
+    Examples
+    --------
+    >>> family = saltus.theory.wall_orbits(wall)
+    >>> round(float(family.amplitude(family.speeds(8.0)[-1])), 9)
+    8.0
     """
 
     stiffness: float  # k
@@ -113,8 +114,10 @@ class WallOrbits:
     def orbit(self, speed: float) -> WallOrbit:
         """The orbit whose impact has the speed v > 0.
 
-        Raises:
-            ParameterError: a speed that is not positive.
+        Raises
+        ------
+        ParameterError
+            A speed that is not positive.
         """
         if not speed > 0:
             raise ParameterError(f"an orbit with an impact needs a speed above 0, got {speed!r}; at 0 it grazes")
@@ -152,10 +155,11 @@ class WallOrbits:
 class WallOrbit:
     """One of `WallOrbits`, admissible or not: its impact, its load, its multipliers, and the motion between two impacts.
 
-    Examples:
-        >>> family = saltus.theory.wall_orbits(wall)
-        >>> round(family.orbit(family.speeds(8.0)[-1]).amplitude, 9)
-        8.0
+    Examples
+    --------
+    >>> family = saltus.theory.wall_orbits(wall)
+    >>> round(family.orbit(family.speeds(8.0)[-1]).amplitude, 9)
+    8.0
     """
 
     family: WallOrbits = field(repr=False)
@@ -231,13 +235,16 @@ class WallOrbit:
 def wall_orbits(system: System, period: int = 1) -> WallOrbits:
     """The orbits of an impact oscillator with one impact in `period` forcing periods; the system's amplitude does not matter.
 
-    Raises:
-        ParameterError: another model, a force that is not one harmonic of order 1, damping that is not below critical,
-            a period below 1, an impact law that is not v+ = -e v-, a resonance without damping, at which no speed (or any) fits.
+    Raises
+    ------
+    ParameterError
+        Another model, a force that is not one harmonic of order 1, damping that is not below critical,
+        a period below 1, an impact law that is not v+ = -e v-, a resonance without damping, at which no speed (or any) fits.
 
-    Examples:
-        >>> len(saltus.theory.wall_orbits(wall).speeds(8.0))
-        1
+    Examples
+    --------
+    >>> len(saltus.theory.wall_orbits(wall).speeds(8.0))
+    1
     """
     model, load = system.model, system.load
     if not isinstance(model, WallOscillator):

@@ -21,9 +21,10 @@ class Layer:
 
     with the powers P taken: mass (1+m)^P, damping c^P C, stiffness k^P, outward s (1+h)^P H, vertical (1+v)^P V.
 
-    Examples:
-        >>> saltus.theory.open_layer(tristable, 1).mass
-        1.0
+    Examples
+    --------
+    >>> saltus.theory.open_layer(tristable, 1).mass
+    1.0
     """
 
     side: int
@@ -82,12 +83,15 @@ class Layer:
 def open_layer(system: System, side: int) -> Layer:
     """The layer of a metainterface that is open on `side` (+1 the lower one, -1 the upper one), under constant loads.
 
-    Raises:
-        ParameterError: another model, a smoothed sign, or a load that varies in time.
+    Raises
+    ------
+    ParameterError
+        Another model, a smoothed sign, or a load that varies in time.
 
-    Examples:
-        >>> saltus.theory.open_layer(tristable, 1).mass
-        1.0
+    Examples
+    --------
+    >>> saltus.theory.open_layer(tristable, 1).mass
+    1.0
     """
     model = metainterface(system)
     forces = constant_loads(system)
@@ -108,10 +112,11 @@ def open_layer(system: System, side: int) -> Layer:
 def layers(system: System) -> tuple[Layer, Layer]:
     """The lower layer (theta > 0) and the upper one (theta < 0).
 
-    Examples:
-        >>> lower, upper = saltus.theory.layers(tristable)
-        >>> lower.mass, upper.mass
-        (1.0, 1.0)
+    Examples
+    --------
+    >>> lower, upper = saltus.theory.layers(tristable)
+    >>> lower.mass, upper.mass
+    (1.0, 1.0)
     """
     return open_layer(system, 1), open_layer(system, -1)
 
@@ -129,8 +134,10 @@ def metainterface(system: System) -> Metainterface:
 def constant_loads(system: System) -> dict[str, float]:
     """The value of each force channel; a constant displacement of the ground does nothing.
 
-    Raises:
-        ParameterError: a channel that varies in time.
+    Raises
+    ------
+    ParameterError
+        A channel that varies in time.
     """
     for name, signal in system.load.channels.items():
         if not isinstance(signal, Constant):

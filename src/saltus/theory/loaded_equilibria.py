@@ -17,9 +17,10 @@ MOMENT_ROUNDING = 4e-15  # moments below this share of a layer's scale are zero
 class Stability(Enum):
     """Whether a small disturbance of an equilibrium grows.
 
-    Examples:
-        >>> saltus.theory.undeformed_stability(tristable).name
-        'STABLE'
+    Examples
+    --------
+    >>> saltus.theory.undeformed_stability(tristable).name
+    'STABLE'
     """
 
     STABLE = "stable"
@@ -31,9 +32,10 @@ class Stability(Enum):
 class LoadedEquilibrium:
     """A state of rest under constant loads.
 
-    Examples:
-        >>> [state.stable for state in saltus.theory.equilibria(tristable)]
-        [True, False, True, False, True]
+    Examples
+    --------
+    >>> [state.stable for state in saltus.theory.equilibria(tristable)]
+    [True, False, True, False, True]
     """
 
     theta: float  # rad
@@ -55,12 +57,15 @@ def equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
     They are the zeros of P'(theta) (`pot_balance0`), stable where P'' > 0, and theta = 0 while the loads hold both layers
     closed or push both open. Between the zeros of P'', known in closed form, P' is monotone, so none can be missed.
 
-    Raises:
-        ParameterError: another model, a smoothed sign, or a load that varies in time.
+    Raises
+    ------
+    ParameterError
+        Another model, a smoothed sign, or a load that varies in time.
 
-    Examples:
-        >>> [round(state.theta, 6) for state in saltus.theory.equilibria(tristable)]
-        [-1.422524, -0.549847, 0.0, 0.549847, 1.422524]
+    Examples
+    --------
+    >>> [round(state.theta, 6) for state in saltus.theory.equilibria(tristable)]
+    [-1.422524, -0.549847, 0.0, 0.549847, 1.422524]
     """
     lower, upper = layers(system)
     found = [_deformed(lower, x) for x in zeros_of_slope(lower)] + [_deformed(upper, x) for x in zeros_of_slope(upper)]
@@ -77,9 +82,10 @@ def undeformed_stability(system: System) -> Stability | None:
     both layers. If they push one open and the other closed the system leaves, and theta = 0 is no equilibrium.
     At V cos(beta0) = 0 the curvature decides, k^P + V sin(beta0).
 
-    Examples:
-        >>> saltus.theory.undeformed_stability(tristable).name
-        'STABLE'
+    Examples
+    --------
+    >>> saltus.theory.undeformed_stability(tristable).name
+    'STABLE'
     """
     lower, upper = layers(system)
     closing = (slope_sign(lower), slope_sign(upper))

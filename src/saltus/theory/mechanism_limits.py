@@ -14,9 +14,10 @@ from saltus.systems import Metainterface, System
 class AmplitudeLimit:
     """An amplitude that motions of the mechanism do not pass.
 
-    Examples:
-        >>> saltus.theory.amplitude_limits(system)[0].name
-        'line'
+    Examples
+    --------
+    >>> saltus.theory.amplitude_limits(system)[0].name
+    'line'
     """
 
     name: str
@@ -27,13 +28,17 @@ class AmplitudeLimit:
 def amplitude_limits(system: System, parameters: Mapping[str, Any] | None = None) -> tuple[AmplitudeLimit, ...]:
     """The limits of the metainterface (erratum 20), pi - beta0 and 2 (pi - beta0); none are known for other models.
 
-    Args:
-        system: what moves.
-        parameters: values, by dotted path, that take the place of those of the system; numbers or arrays.
+    Parameters
+    ----------
+    system
+        What moves.
+    parameters
+        Values, by dotted path, that take the place of those of the system; numbers or arrays.
 
-    Examples:
-        >>> [round(float(limit.value), 9) for limit in saltus.theory.amplitude_limits(system)]  # 100 and 200 degrees
-        [1.745329252, 3.490658504]
+    Examples
+    --------
+    >>> [round(float(limit.value), 9) for limit in saltus.theory.amplitude_limits(system)]  # 100 and 200 degrees
+    [1.745329252, 3.490658504]
     """
     if not isinstance(system.model, Metainterface):
         return ()

@@ -21,12 +21,15 @@ def pendulum_acceleration(system: System, tau: Numbers, theta: Numbers, velocity
     No sign of theta is left: sin(abs(theta) + pi/2) = cos(theta) and sgn(theta) cos(abs(theta) + pi/2) = -sin(theta),
     so with e = 1 there is no impact to speak of.
 
-    Raises:
-        ParameterError: beta0 other than pi/2, unequal layers, or forces on the lower mass.
+    Raises
+    ------
+    ParameterError
+        beta0 other than pi/2, unequal layers, or forces on the lower mass.
 
-    Examples:
-        >>> float(saltus.theory.pendulum_acceleration(linear, 0.0, 0.0, 0.0))
-        0.0
+    Examples
+    --------
+    >>> float(saltus.theory.pendulum_acceleration(linear, 0.0, 0.0, 0.0))
+    0.0
     """
     model, load = metainterface(system), system.load
     if abs(model.beta0 - math.pi / 2) > 1e-15 or (model.stiffness_ratio, model.mass_ratio, model.dissipation_ratio) != (1, 0, 1):

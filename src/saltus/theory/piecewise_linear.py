@@ -66,11 +66,12 @@ class Arc:
 class LinearMotion:
     """A motion of the piecewise-linear equation; call it for theta(tau) and theta'(tau).
 
-    Examples:
-        >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
-        >>> motion = saltus.theory.linear_motion(constant, 0.1, 3)
-        >>> [round(float(number), 12) for number in motion(0.0)]
-        [0.1, 0.0]
+    Examples
+    --------
+    >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
+    >>> motion = saltus.theory.linear_motion(constant, 0.1, 3)
+    >>> [round(float(number), 12) for number in motion(0.0)]
+    [0.1, 0.0]
     """
 
     impact_times: np.ndarray  # (n,) tau_*^[i]
@@ -82,8 +83,10 @@ class LinearMotion:
     def __call__(self, tau: Any) -> tuple[Any, Any]:
         """theta and theta' at `tau`, any shape, from 0 to `end`; just after an impact the velocity is the one after it.
 
-        Raises:
-            ParameterError: a time before 0 or after `end`.
+        Raises
+        ------
+        ParameterError
+            A time before 0 or after `end`.
         """
         tau = np.asarray(tau, dtype=float)
         if np.any((tau < 0) | (tau > self.end)):
@@ -107,15 +110,18 @@ def linear_motion(system: System, theta0: float, impacts: int) -> LinearMotion:
 
     Any k, m, c, e or r and either sign of theta0; a constant H acts through s H sin(beta0) and the stiffness -s H cos(beta0).
 
-    Raises:
-        ParameterError: theta0 = 0, a layer that is not subcritical (mu < 1 and k^P + V sin(beta0) > 0), no impacts asked for,
-            a load that varies in time.
+    Raises
+    ------
+    ParameterError
+        theta0 = 0, a layer that is not subcritical (mu < 1 and k^P + V sin(beta0) > 0), no impacts asked for,
+        a load that varies in time.
 
-    Examples:
-        >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
-        >>> times = saltus.simulate(constant, theta=1e-5, duration=10.0).impacts.time
-        >>> bool(np.allclose(times[:2], saltus.theory.linear_motion(constant, 1e-5, 2).impact_times, rtol=1e-4))
-        True
+    Examples
+    --------
+    >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
+    >>> times = saltus.simulate(constant, theta=1e-5, duration=10.0).impacts.time
+    >>> bool(np.allclose(times[:2], saltus.theory.linear_motion(constant, 1e-5, 2).impact_times, rtol=1e-4))
+    True
     """
     check_number("theta0", theta0)
     check_count("impacts", impacts, 1, 100_000)  # whose arcs are kept, each an object

@@ -22,12 +22,15 @@ def critical_horizontal(beta0: float, vertical: Numbers, swing: float = 0.0) -> 
     Hhat sin(tau), it is the ellipse that touches the border V cos(beta0) = -abs(H) sin(beta0) (errata 35): the largest of
     tan(beta0) Hhat sin(tau) + swing cos(tau) is sqrt((tan(beta0) Hhat)^2 + swing^2), which must reach abs(V).
 
-    Raises:
-        ParameterError: V cos(beta0) > 0, where the undeformed state is unstable for every H; a swing larger than V.
+    Raises
+    ------
+    ParameterError
+        V cos(beta0) > 0, where the undeformed state is unstable for every H; a swing larger than V.
 
-    Examples:
-        >>> round(float(saltus.theory.critical_horizontal(np.pi / 4, -0.5)), 12)  # abs(V) / tan(beta0)
-        0.5
+    Examples
+    --------
+    >>> round(float(saltus.theory.critical_horizontal(np.pi / 4, -0.5)), 12)  # abs(V) / tan(beta0)
+    0.5
     """
     _check_angle(beta0)
     if np.any(np.asarray(vertical) * math.cos(beta0) > 0):
@@ -50,15 +53,18 @@ def fold_curve(beta0: float, opening: Numbers) -> tuple[Any, Any]:
     These solve P' = x - H sin(beta0 + x) - V cos(beta0 + x) = 0 and P'' = 0, which are linear in H and V. The curve leaves the
     line V cos(beta0) = -H sin(beta0) at x = 0, V = -sin(beta0), tangent to it. Its mirror is H -> -H.
 
-    Raises:
-        ParameterError: an opening out of [0, pi - beta0]; at pi - beta0 the curve has a cusp, and beyond it bounds nothing new.
+    Raises
+    ------
+    ParameterError
+        An opening out of [0, pi - beta0]; at pi - beta0 the curve has a cusp, and beyond it bounds nothing new.
 
-    Examples:
-        >>> horizontal, vertical = saltus.theory.fold_curve(1.4, 0.1)
-        >>> load = saltus.Load(horizontal=horizontal, vertical=vertical)
-        >>> static = saltus.System(model=saltus.Metainterface(beta0=1.4), load=load)
-        >>> round(abs(float(saltus.theory.potential_slope(static, 0.1))), 12)  # an equilibrium
-        0.0
+    Examples
+    --------
+    >>> horizontal, vertical = saltus.theory.fold_curve(1.4, 0.1)
+    >>> load = saltus.Load(horizontal=horizontal, vertical=vertical)
+    >>> static = saltus.System(model=saltus.Metainterface(beta0=1.4), load=load)
+    >>> round(abs(float(saltus.theory.potential_slope(static, 0.1))), 12)  # an equilibrium
+    0.0
     """
     _check_angle(beta0)
     opening = np.asarray(opening, dtype=float)
@@ -71,9 +77,10 @@ def fold_curve(beta0: float, opening: Numbers) -> tuple[Any, Any]:
 def subcritical_vertical(beta0: float) -> float:
     """V = -sin(beta0), below which the buckling at Hcr is subcritical (errata 23), for beta0 < pi/2.
 
-    Examples:
-        >>> round(float(saltus.theory.subcritical_vertical(np.pi / 6)), 12)  # -sin(beta0)
-        -0.5
+    Examples
+    --------
+    >>> round(float(saltus.theory.subcritical_vertical(np.pi / 6)), 12)  # -sin(beta0)
+    -0.5
     """
     _check_angle(beta0, math.pi / 2)
     return -math.sin(beta0)
@@ -84,9 +91,10 @@ def unloaded_fold(beta0: float) -> tuple[float, float]:
 
     x = -cot(beta0 + x),   V = -1 / sin(beta0 + x),   the point H = 0 of `fold_curve`
 
-    Examples:
-        >>> len(saltus.theory.unloaded_fold(1.4))
-        2
+    Examples
+    --------
+    >>> len(saltus.theory.unloaded_fold(1.4))
+    2
     """
     from scipy.optimize import brentq
 
@@ -101,13 +109,16 @@ def fold_horizontal(beta0: float, vertical: Numbers) -> Any:
     It is `fold_curve` at the opening with dV/dx = -x sin(beta0 + x) < 0, found by bisection; 0 below `unloaded_fold`, where they
     exist without any H. It is never above Hcr.
 
-    Raises:
-        ParameterError: V above -sin(beta0): the buckling is then supercritical and Hcr itself is the border.
+    Raises
+    ------
+    ParameterError
+        V above -sin(beta0): the buckling is then supercritical and Hcr itself is the border.
 
-    Examples:
-        >>> horizontal, vertical = saltus.theory.fold_curve(1.4, 0.1)
-        >>> round(float(saltus.theory.fold_horizontal(1.4, vertical) / abs(horizontal)), 9)
-        1.0
+    Examples
+    --------
+    >>> horizontal, vertical = saltus.theory.fold_curve(1.4, 0.1)
+    >>> round(float(saltus.theory.fold_horizontal(1.4, vertical) / abs(horizontal)), 9)
+    1.0
     """
     _check_angle(beta0, math.pi / 2)
     vertical = np.asarray(vertical, dtype=float)
@@ -132,9 +143,10 @@ def is_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
     looking at: the other layer's push at beta0 + x is this one's at 2 pi - beta0 - x, so its equilibria come later.
     Broadcasts; arrays of bool.
 
-    Examples:
-        >>> bool(saltus.theory.is_monostable(1.4, 0.0, -0.5))
-        True
+    Examples
+    --------
+    >>> bool(saltus.theory.is_monostable(1.4, 0.0, -0.5))
+    True
     """
     _check_angle(beta0)
     size, vertical = np.abs(np.asarray(horizontal, dtype=float)), np.asarray(vertical, dtype=float)
@@ -148,9 +160,10 @@ def is_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
 def paper_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
     """The domain as Fig. 8 states it, V cos(beta0) < -abs(H) sin(beta0): the undeformed state is stable there, but not alone.
 
-    Examples:
-        >>> bool(saltus.theory.paper_monostable(1.4, 0.0, -0.5))
-        True
+    Examples
+    --------
+    >>> bool(saltus.theory.paper_monostable(1.4, 0.0, -0.5))
+    True
     """
     _check_angle(beta0)
     return np.asarray(vertical) * math.cos(beta0) < -np.abs(horizontal) * math.sin(beta0)
@@ -161,15 +174,18 @@ def static_angle(beta0: float, horizontal: float, vertical: float) -> float:
 
     The smallest positive zero of P', stable because the loads push open at contact.
 
-    Raises:
-        ParameterError: abs(H) <= Hcr, where the undeformed state holds and theta_st does not exist; no equilibrium
-            before the kinematic limit.
+    Raises
+    ------
+    ParameterError
+        abs(H) <= Hcr, where the undeformed state holds and theta_st does not exist; no equilibrium
+        before the kinematic limit.
 
-    Examples:
-        >>> theta = saltus.theory.static_angle(1.4, 0.2, -0.5)
-        >>> static = saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(horizontal=0.2, vertical=-0.5))
-        >>> round(abs(float(saltus.theory.potential_slope(static, theta))), 9)
-        0.0
+    Examples
+    --------
+    >>> theta = saltus.theory.static_angle(1.4, 0.2, -0.5)
+    >>> static = saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(horizontal=0.2, vertical=-0.5))
+    >>> round(abs(float(saltus.theory.potential_slope(static, theta))), 9)
+    0.0
     """
     size, critical = abs(horizontal), critical_horizontal(beta0, vertical)
     if size <= critical:
@@ -184,12 +200,15 @@ def static_angle(beta0: float, horizontal: float, vertical: float) -> float:
 def equivalent_angle(beta0: float, ground_amplitude: Numbers) -> Any:
     """theta_eq = arccos(cos(beta0) - zetahat) - beta0, the opening whose horizontal displacement is zetahat, any shape.
 
-    Raises:
-        ParameterError: zetahat out of [0, 1 + cos(beta0)], the largest displacement (`max_disp_condition`).
+    Raises
+    ------
+    ParameterError
+        Zetahat out of [0, 1 + cos(beta0)], the largest displacement (`max_disp_condition`).
 
-    Examples:
-        >>> float(saltus.theory.equivalent_angle(1.4, 0.0))  # on a ground that does not move
-        0.0
+    Examples
+    --------
+    >>> float(saltus.theory.equivalent_angle(1.4, 0.0))  # on a ground that does not move
+    0.0
     """
     _check_angle(beta0)
     amplitude, largest = np.asarray(ground_amplitude, dtype=float), 1 + math.cos(beta0)

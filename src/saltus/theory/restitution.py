@@ -19,10 +19,11 @@ from saltus.theory.layer import metainterface
 class InelasticContact:
     """A frictionless, perfectly inelastic impact that ends one side.
 
-    Examples:
-        >>> contact = saltus.theory.inelastic_contact(np.deg2rad(80), 0.0, 1)
-        >>> round(float(contact.factor + np.cos(np.deg2rad(160))), 12)
-        0.0
+    Examples
+    --------
+    >>> contact = saltus.theory.inelastic_contact(np.deg2rad(80), 0.0, 1)
+    >>> round(float(contact.factor + np.cos(np.deg2rad(160))), 12)
+    0.0
     """
 
     factor: float  # theta'+ / theta'-, 0 where the motion stops
@@ -43,12 +44,15 @@ def inelastic_contact(beta0: float, mass_ratio: float, side: int) -> InelasticCo
     Both keep r = cos^2(2 beta0) / (1+m) of the energy. Ground velocities are continuous, so they drop out of the jump. This
     opens the other layer the right way for pi/4 < beta0 < 3 pi/4; otherwise its constraint acts too, and both stop (factor 0).
 
-    Raises:
-        ParameterError: beta0 out of (0, pi), m below 0, a side other than +1 and -1.
+    Raises
+    ------
+    ParameterError
+        beta0 out of (0, pi), m below 0, a side other than +1 and -1.
 
-    Examples:
-        >>> round(saltus.theory.inelastic_contact(np.deg2rad(80), 0.0, 1).factor, 6)  # -cos(2 beta0)
-        0.939693
+    Examples
+    --------
+    >>> round(saltus.theory.inelastic_contact(np.deg2rad(80), 0.0, 1).factor, 6)  # -cos(2 beta0)
+    0.939693
     """
     check_number("beta0", beta0, above=0.0, below=math.pi, unit="rad")
     check_number("mass_ratio", mass_ratio, at_least=0.0)
@@ -71,12 +75,15 @@ def energy_factor(system: System, velocity: float, side: int, e: float, tau: flo
     the vertical ground velocity with one sign on both sides. On a ground at rest r = e^2 / (1+m)^s, with m = 0 the e^2
     of `rest_def_red`.
 
-    Raises:
-        ParameterError: T- = 0; a model without kinetic energy.
+    Raises
+    ------
+    ParameterError
+        T- = 0; a model without kinetic energy.
 
-    Examples:
-        >>> float(saltus.theory.energy_factor(tristable, 0.3, 1, 0.9))  # e^2 on a ground at rest
-        0.81
+    Examples
+    --------
+    >>> float(saltus.theory.energy_factor(tristable, 0.3, 1, 0.9))  # e^2 on a ground at rest
+    0.81
     """
     before = float(system.model.kinetic_energy(tau, system.model.contact, velocity, side, system.load))
     if before == 0:
@@ -87,12 +94,15 @@ def energy_factor(system: System, velocity: float, side: int, e: float, tau: flo
 def velocity_factor(system: System, velocity: float, side: int, r: float, tau: float = 0.0) -> float:
     """e = theta'+ / theta'- of an impact that ends `side` with T+ = r T- (`rest_def`): the inverse of `energy_factor`.
 
-    Raises:
-        ParameterError: velocity = 0, or none solves it (errata 26), with the instant and the velocity.
+    Raises
+    ------
+    ParameterError
+        Velocity = 0, or none solves it (errata 26), with the instant and the velocity.
 
-    Examples:
-        >>> round(float(saltus.theory.velocity_factor(tristable, 0.3, 1, 0.81)), 12)  # sqrt(r) on a ground at rest
-        0.9
+    Examples
+    --------
+    >>> round(float(saltus.theory.velocity_factor(tristable, 0.3, 1, 0.81)), 12)  # sqrt(r) on a ground at rest
+    0.9
     """
     if velocity == 0:
         raise ParameterError("e = theta'+ / theta'- has no meaning at velocity 0", "velocity")
@@ -112,12 +122,15 @@ def energy_jump(system: System, velocity: Numbers, side: int, e: Numbers, tau: N
 
     The energy decreases where this is below 0. With nu' other than 0 it changes even at e = 1, m = 0.
 
-    Raises:
-        ParameterError: another model.
+    Raises
+    ------
+    ParameterError
+        Another model.
 
-    Examples:
-        >>> round(float(saltus.theory.energy_jump(tristable, 0.1, 1, 0.5)), 12)  # -(1 - e^2) / 2 theta'^2
-        -0.00375
+    Examples
+    --------
+    >>> round(float(saltus.theory.energy_jump(tristable, 0.1, 1, 0.5)), 12)  # -(1 - e^2) / 2 theta'^2
+    -0.00375
     """
     model = metainterface(system)
     velocity, e = np.asarray(velocity, dtype=float), np.asarray(e, dtype=float)

@@ -21,13 +21,16 @@ def rocking_period(theta0: Numbers, *, alpha: float) -> Any:
     with R_F Carlson's symmetric elliptic integral: alpha - theta is an inverted pendulum (`EOM&Rock`). It is Legendre's
     F(chi | cos^2((alpha - theta0)/2)) with tan(chi) = u / (c s), in a form that keeps its digits as theta0 nears alpha.
 
-    Raises:
-        ParameterError: abs(theta0) >= alpha, from where the block overturns.
+    Raises
+    ------
+    ParameterError
+        abs(theta0) >= alpha, from where the block overturns.
 
-    Examples:
-        >>> exact = saltus.theory.rocking_period(0.005, alpha=0.01)
-        >>> round(float(exact / (4 * np.arccosh(2.0))), 4)  # half-way to overturning, a slender block
-        1.0
+    Examples
+    --------
+    >>> exact = saltus.theory.rocking_period(0.005, alpha=0.01)
+    >>> round(float(exact / (4 * np.arccosh(2.0))), 4)  # half-way to overturning, a slender block
+    1.0
     """
     from scipy.special import elliprf
 
@@ -40,12 +43,15 @@ def rocking_period(theta0: Numbers, *, alpha: float) -> Any:
 def short_rocking_period(theta0: Numbers, *, alpha: float) -> Any:
     """p T0 = 4 sqrt(2 abs(theta0) / sin(alpha)), for abs(theta0) << alpha (appendix A), any shape, in units of 1/p.
 
-    Raises:
-        ParameterError: abs(theta0) >= alpha.
+    Raises
+    ------
+    ParameterError
+        abs(theta0) >= alpha.
 
-    Examples:
-        >>> round(float(saltus.theory.short_rocking_period(1e-6, alpha=0.3) / saltus.theory.rocking_period(1e-6, alpha=0.3)), 4)
-        1.0
+    Examples
+    --------
+    >>> round(float(saltus.theory.short_rocking_period(1e-6, alpha=0.3) / saltus.theory.rocking_period(1e-6, alpha=0.3)), 4)
+    1.0
     """
     return 4 * np.sqrt(2 * _amplitude(theta0, alpha) / math.sin(alpha))
 
@@ -56,12 +62,15 @@ def slender_rocking_period(theta0: Numbers, *, alpha: float) -> Any:
     It holds for small alpha and every abs(theta0) < alpha, not only close to alpha as the paper says (errata 17); its relative
     error is of order alpha^2.
 
-    Raises:
-        ParameterError: abs(theta0) >= alpha.
+    Raises
+    ------
+    ParameterError
+        abs(theta0) >= alpha.
 
-    Examples:
-        >>> round(float(saltus.theory.slender_rocking_period(0.005, alpha=0.01) / (4 * np.arccosh(2.0))), 12)
-        1.0
+    Examples
+    --------
+    >>> round(float(saltus.theory.slender_rocking_period(0.005, alpha=0.01) / (4 * np.arccosh(2.0))), 12)
+    1.0
     """
     return 4 * np.arccosh(1 / (1 - _amplitude(theta0, alpha) / alpha))
 
@@ -71,13 +80,17 @@ def rocking_energy_jump(velocity: Numbers, *, alpha: float, e: float, ground_vel
 
         [[T]] = -(1 - e) / 2 {(1 + e) theta'^2 + 2 theta' zeta' cos(alpha)}
 
-    Args:
-        velocity: theta'- in the time p t, any shape.
-        ground_velocity: zeta' in the same time, zeta = 3 U_h / (4 R); it broadcasts.
+    Parameters
+    ----------
+    velocity
+        theta'- in the time p t, any shape.
+    ground_velocity
+        zeta' in the same time, zeta = 3 U_h / (4 R); it broadcasts.
 
-    Examples:
-        >>> round(float(saltus.theory.rocking_energy_jump(0.1, alpha=0.3, e=0.5)), 12)  # -(1 - e^2) / 2 theta'^2
-        -0.00375
+    Examples
+    --------
+    >>> round(float(saltus.theory.rocking_energy_jump(0.1, alpha=0.3, e=0.5)), 12)  # -(1 - e^2) / 2 theta'^2
+    -0.00375
     """
     _check(alpha, e)
     velocity, ground_velocity = np.asarray(velocity, dtype=float), np.asarray(ground_velocity, dtype=float)
@@ -91,9 +104,10 @@ def rocking_energy_decreases(velocity: Numbers, *, alpha: float, e: float, groun
 
     Broadcasts; arrays of bool.
 
-    Examples:
-        >>> bool(saltus.theory.rocking_energy_decreases(0.1, alpha=0.3, e=0.9))
-        True
+    Examples
+    --------
+    >>> bool(saltus.theory.rocking_energy_decreases(0.1, alpha=0.3, e=0.9))
+    True
     """
     _check(alpha, e)
     velocity, ground_velocity = np.asarray(velocity, dtype=float), np.asarray(ground_velocity, dtype=float)
@@ -106,12 +120,15 @@ def housner_restitution(alpha: float) -> float:
 
     The velocity factor is its root, above 0 for sin^2(alpha) < 2/3.
 
-    Raises:
-        ParameterError: sin^2(alpha) >= 2/3, where the block would have to bounce back.
+    Raises
+    ------
+    ParameterError
+        sin^2(alpha) >= 2/3, where the block would have to bounce back.
 
-    Examples:
-        >>> round(float(saltus.theory.housner_restitution(np.arcsin(0.5))), 12)  # (1 - 3/8)^2
-        0.390625
+    Examples
+    --------
+    >>> round(float(saltus.theory.housner_restitution(np.arcsin(0.5))), 12)  # (1 - 3/8)^2
+    0.390625
     """
     _check(alpha, 1.0)
     factor = 1 - 1.5 * math.sin(alpha) ** 2

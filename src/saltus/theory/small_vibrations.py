@@ -21,11 +21,12 @@ UPRIGHT = 1e-15  # moments V cos(beta0) below this are the rounding of cos(pi/2)
 class Vibration:
     """The small vibration of one open layer about its own (virtual) centre (`gov_beta_reduced`).
 
-    Examples:
-        >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
-        >>> lower, upper = saltus.theory.vibrations(constant)
-        >>> lower.frequency == upper.frequency
-        True
+    Examples
+    --------
+    >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
+    >>> lower, upper = saltus.theory.vibrations(constant)
+    >>> lower.frequency == upper.frequency
+    True
     """
 
     frequency: float  # apparent angular frequency Omega_0
@@ -40,13 +41,16 @@ def vibrations(system: System) -> tuple[Vibration, Vibration]:
 
     A constant H adds -s H cos(beta0) to kappa.
 
-    Raises:
-        ParameterError: kappa <= 0, where the layer does not vibrate; another model, or a load that varies in time.
+    Raises
+    ------
+    ParameterError
+        Kappa <= 0, where the layer does not vibrate; another model, or a load that varies in time.
 
-    Examples:
-        >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
-        >>> [round(vibration.frequency, 7) for vibration in saltus.theory.vibrations(constant)]
-        [0.7124578, 0.7124578]
+    Examples
+    --------
+    >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
+    >>> [round(vibration.frequency, 7) for vibration in saltus.theory.vibrations(constant)]
+    [0.7124578, 0.7124578]
     """
     return vibration(layers(system)[0]), vibration(layers(system)[1])
 
@@ -72,13 +76,16 @@ def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
 
     continued to kappa <= 0, where it is an arccosh and grows without bound as abs(theta0) nears the saddle of `non-trivial`.
 
-    Raises:
-        ParameterError: V cos(beta0) > 0 (theta = 0 is then unstable, `stabeunstabletrivial`), or theta0 at or past the saddle.
+    Raises
+    ------
+    ParameterError
+        V cos(beta0) > 0 (theta = 0 is then unstable, `stabeunstabletrivial`), or theta0 at or past the saddle.
 
-    Examples:
-        >>> motion = saltus.simulate(tristable, theta=1e-4, duration=1.0)
-        >>> round(float(motion.impacts.time[0] / (saltus.theory.linear_period(1e-4, beta0=np.deg2rad(80), vertical=-1.5) / 4)), 4)
-        1.0
+    Examples
+    --------
+    >>> motion = saltus.simulate(tristable, theta=1e-4, duration=1.0)
+    >>> round(float(motion.impacts.time[0] / (saltus.theory.linear_period(1e-4, beta0=np.deg2rad(80), vertical=-1.5) / 4)), 4)
+    1.0
     """
     kappa, closing = _linear(beta0, vertical)
     size = np.abs(np.asarray(theta0, dtype=float))
@@ -109,13 +116,16 @@ def short_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
 
         T0 = 4 sqrt(2 abs(theta0)) / sqrt(-V cos(beta0)), the next factor being 1 + 5/12 kappa abs(theta0) / (V cos(beta0))
 
-    Raises:
-        ParameterError: V cos(beta0) >= 0.
+    Raises
+    ------
+    ParameterError
+        V cos(beta0) >= 0.
 
-    Examples:
-        >>> short = saltus.theory.short_period(1e-6, beta0=1.4, vertical=-0.5)
-        >>> round(float(short / saltus.theory.linear_period(1e-6, beta0=1.4, vertical=-0.5)), 4)
-        1.0
+    Examples
+    --------
+    >>> short = saltus.theory.short_period(1e-6, beta0=1.4, vertical=-0.5)
+    >>> round(float(short / saltus.theory.linear_period(1e-6, beta0=1.4, vertical=-0.5)), 4)
+    1.0
     """
     closing = _linear(beta0, vertical)[1]
     if closing <= UPRIGHT:
@@ -128,13 +138,16 @@ def upright_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
 
         T0 = 4 / sqrt(1+V) arccos(1 / (1 - (1+V) / V abs(theta0) / (pi/2 - beta0)))
 
-    Raises:
-        ParameterError: V (pi/2 - beta0) >= 0, V = -1, or theta0 at or past the saddle V (pi/2 - beta0) / (1+V).
+    Raises
+    ------
+    ParameterError
+        V (pi/2 - beta0) >= 0, V = -1, or theta0 at or past the saddle V (pi/2 - beta0) / (1+V).
 
-    Examples:
-        >>> upright = saltus.theory.upright_period(1e-9, beta0=1.57, vertical=-0.5)
-        >>> round(float(upright / saltus.theory.short_period(1e-9, beta0=1.57, vertical=-0.5)), 3)
-        1.0
+    Examples
+    --------
+    >>> upright = saltus.theory.upright_period(1e-9, beta0=1.57, vertical=-0.5)
+    >>> round(float(upright / saltus.theory.short_period(1e-9, beta0=1.57, vertical=-0.5)), 3)
+    1.0
     """
     check_number("beta0", beta0, above=0.0, below=math.pi, unit="rad")
     check_number("vertical", vertical)
@@ -157,12 +170,15 @@ def decayed_amplitude(cycle: Numbers, *, theta0: float, e: float) -> Any:
 
     The paper prints e^(4n). Each impact takes e^2 off the energy, which is proportional to the amplitude while that is small.
 
-    Raises:
-        ParameterError: e out of (0, 1], or n below 1.
+    Raises
+    ------
+    ParameterError
+        e out of (0, 1], or n below 1.
 
-    Examples:
-        >>> float(saltus.theory.decayed_amplitude(2, theta0=1.0, e=0.5))  # e^4
-        0.0625
+    Examples
+    --------
+    >>> float(saltus.theory.decayed_amplitude(2, theta0=1.0, e=0.5))  # e^4
+    0.0625
     """
     return theta0 * _factor(cycle, e) ** 4
 
@@ -172,16 +188,22 @@ def decayed_period(cycle: Numbers, *, period: float, e: float) -> Any:
 
     Counted from impact to impact instead, the first lasts (1 + 2e) T0 / 4 from the start (errata 8).
 
-    Args:
-        cycle: n, a number or an array of them.
-        period: T0(theta0) without losses.
+    Parameters
+    ----------
+    cycle
+        n, a number or an array of them.
+    period
+        T0(theta0) without losses.
 
-    Raises:
-        ParameterError: e out of (0, 1], or n below 1.
+    Raises
+    ------
+    ParameterError
+        e out of (0, 1], or n below 1.
 
-    Examples:
-        >>> float(saltus.theory.decayed_period(1, period=4.0, e=0.5))
-        2.25
+    Examples
+    --------
+    >>> float(saltus.theory.decayed_period(1, period=4.0, e=0.5))
+    2.25
     """
     return (1 + e) ** 2 / 4 * period * _factor(cycle, e) ** 2
 
@@ -189,12 +211,15 @@ def decayed_period(cycle: Numbers, *, period: float, e: float) -> Any:
 def final_time(*, period: float, e: float) -> float:
     """The time at which small vibrations end (`finaltime`): (1+e) / (4 (1-e)) T0(theta0), the sum of all `decayed_period`.
 
-    Raises:
-        ParameterError: e out of [0, 1): without losses the vibration goes on for ever.
+    Raises
+    ------
+    ParameterError
+        e out of [0, 1): without losses the vibration goes on for ever.
 
-    Examples:
-        >>> saltus.theory.final_time(period=4.0, e=0.5)  # (1 + e) / (1 - e) quarters of the period
-        3.0
+    Examples
+    --------
+    >>> saltus.theory.final_time(period=4.0, e=0.5)  # (1 + e) / (1 - e) quarters of the period
+    3.0
     """
     check_number("e", e, at_least=0.0, below=1.0)
     return (1 + e) / (4 * (1 - e)) * period

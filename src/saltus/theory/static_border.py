@@ -21,11 +21,12 @@ LOAD_PLANE = ("load.horizontal.amplitude", "load.vertical")  # the two parameter
 class QuasiStaticBorder:
     """Both parts of the border over the vertical load V; the true border is the lesser of them (erratum 23).
 
-    Examples:
-        >>> plane = ("load.horizontal.amplitude", "load.vertical")
-        >>> border = saltus.theory.quasi_static_border(system, plane, -1.0)
-        >>> bool(np.allclose(border.critical, np.abs(border.vertical) / np.tan(system.model.beta0)))
-        True
+    Examples
+    --------
+    >>> plane = ("load.horizontal.amplitude", "load.vertical")
+    >>> border = saltus.theory.quasi_static_border(system, plane, -1.0)
+    >>> bool(np.allclose(border.critical, np.abs(border.vertical) / np.tan(system.model.beta0)))
+    True
     """
 
     vertical: np.ndarray
@@ -58,11 +59,12 @@ def quasi_static_border(system: System, plane: tuple[str, ...], lowest: float) -
     It is known for the metainterface with k = 1 and beta0 below 90 degrees, under H = Hhat sin and a constant V < 0 alone, in
     the plane of Hhat and V.
 
-    Examples:
-        >>> plane = ("load.horizontal.amplitude", "load.vertical")
-        >>> border = saltus.theory.quasi_static_border(system, plane, -1.0)
-        >>> float(border.vertical.min())
-        -1.0
+    Examples
+    --------
+    >>> plane = ("load.horizontal.amplitude", "load.vertical")
+    >>> border = saltus.theory.quasi_static_border(system, plane, -1.0)
+    >>> float(border.vertical.min())
+    -1.0
     """
     model, channels = system.model, system.load.channels
     if tuple(plane) != LOAD_PLANE or not isinstance(model, Metainterface):

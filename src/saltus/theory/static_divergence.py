@@ -14,9 +14,10 @@ from saltus.theory.loaded_equilibria import MOMENT_ROUNDING, LoadedEquilibrium, 
 class Divergence:
     """The theta(0), at rest, from which the linearised motion does not return to theta = 0 (bullets after `minmin`).
 
-    Examples:
-        >>> saltus.theory.divergence(linear).from_rest
-        False
+    Examples
+    --------
+    >>> saltus.theory.divergence(linear).from_rest
+    False
     """
 
     from_rest: bool  # from every small theta(0) of at least one sign: theta = 0 is unstable
@@ -33,12 +34,15 @@ def linear_equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
     V cos(beta0) < 0, both exist where V sin(beta0) < -max(1, k), one of them where V sin(beta0) < -min(1, k) (`minmin`,
     errata 15). They approximate the equilibria of the full equation only for beta0 close to pi/2. A constant H is included.
 
-    Raises:
-        ParameterError: another model, a smoothed sign, or a load that varies in time.
+    Raises
+    ------
+    ParameterError
+        Another model, a smoothed sign, or a load that varies in time.
 
-    Examples:
-        >>> len(saltus.theory.linear_equilibria(linear))
-        1
+    Examples
+    --------
+    >>> len(saltus.theory.linear_equilibria(linear))
+    1
     """
     found = [e for layer in layers(system) if (e := _linear_equilibrium(layer)) is not None]
     undeformed = undeformed_stability(system)
@@ -54,12 +58,15 @@ def divergence(system: System) -> Divergence:
     closed (V cos(beta0) < 0) it diverges when k^P + V sin(beta0) < 0 and theta(0) lies beyond theta_A or theta_B. At
     beta0 = pi/2 these are at 0: theta(0) > 0 diverges for V < -k, theta(0) < 0 for V < -1.
 
-    Raises:
-        ParameterError: another model, a smoothed sign, or a load that varies in time.
+    Raises
+    ------
+    ParameterError
+        Another model, a smoothed sign, or a load that varies in time.
 
-    Examples:
-        >>> saltus.theory.divergence(linear)
-        Divergence(from_rest=False, above=None, below=None)
+    Examples
+    --------
+    >>> saltus.theory.divergence(linear)
+    Divergence(from_rest=False, above=None, below=None)
     """
     lower, upper = layers(system)
     above, below = _threshold(lower), _threshold(upper)

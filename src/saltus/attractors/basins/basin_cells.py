@@ -53,15 +53,22 @@ class Grid:
 def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Labels and times of one block of a grid: what a sweep calls for each of its chunks.
 
-    Args:
-        arguments: as `cell_arguments` makes them, plain as JSON.
-        block: values along both axes, by the names of the state variables of the plane.
+    Parameters
+    ----------
+    arguments
+        As `cell_arguments` makes them, plain as JSON.
+    block
+        Values along both axes, by the names of the state variables of the plane.
 
-    Returns:
+    Returns
+    -------
+    dict[str, np.ndarray]
         {"label": int16 (rows, columns), "time": float (rows, columns)}.
 
-    Raises:
-        ParameterError: arguments that were made where the system has other equations, or saltus another version.
+    Raises
+    ------
+    ParameterError
+        Arguments that were made where the system has other equations, or saltus another version.
     """
     system = System.from_dict(arguments["system"])
     check_provenance(arguments, system, "this part of the basins")
@@ -84,13 +91,20 @@ def computed_cells(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same, as a sweep in chunks of `rows` of the grid if `where` says where they are kept or who computes them.
 
-    Args:
-        system: the system as it was given, whose load may be constant.
-        labelling: the attractors, and how motions are labelled by them.
-        grid: the initial states.
-        rows: of the grid, in a chunk.
-        progress: called with the share of the cells that are done.
-        where: `store`, `workers` and `scheduler` of `saltus.sweep.run`, or None.
+    Parameters
+    ----------
+    system
+        The system as it was given, whose load may be constant.
+    labelling
+        The attractors, and how motions are labelled by them.
+    grid
+        The initial states.
+    rows
+        Of the grid, in a chunk.
+    progress
+        Called with the share of the cells that are done.
+    where
+        `store`, `workers` and `scheduler` of `saltus.sweep.run`, or None.
     """
     from saltus.sweep import run
 

@@ -51,11 +51,16 @@ def basin_boundaries(found: Attractors, label: Label, labels: np.ndarray, along:
     are the stable manifolds of the saddle orbits, at most 4 and of up to 6 forcing periods, to which tracking of the edge leads.
     They are given in part where they are too long: those of a chaotic saddle have no end.
 
-    Args:
-        found: the attractors.
-        label: the labels of states.
-        labels: the labels of the grid, (velocities, coordinates).
-        along, velocity: the grid.
+    Parameters
+    ----------
+    found
+        The attractors.
+    label
+        The labels of states.
+    labels
+        The labels of the grid, (velocities, coordinates).
+    along, velocity
+        The grid.
     """
     bounds = (float(along[0]), float(along[-1])), (float(velocity[0]), float(velocity[-1]))
     window = check_window(bounds, found.system)

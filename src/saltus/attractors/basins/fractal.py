@@ -36,10 +36,11 @@ FRACTAL = FractalSettings()
 class BasinEntropy:
     """Basin entropy of a grid cut into boxes (Daza et al., Sci. Rep. 6 (2016) 31416).
 
-    Examples:
-        >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
-        >>> saltus.attractors.basin_entropy(halves).fractal
-        False
+    Examples
+    --------
+    >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
+    >>> saltus.attractors.basin_entropy(halves).fractal
+    False
     """
 
     entropy: float  # S_b: the mean over all boxes of sum_j p_j ln(1 / p_j), p_j the share of label j in the box
@@ -61,13 +62,16 @@ def basin_entropy(labels: Numbers, box: int = 5) -> BasinEntropy:
     Incomplete boxes at the far edges, and boxes with an undecided cell (-1), are left out. The criterion S_bb > ln 2 holds for
     boundaries that part two labels almost everywhere, in boxes of which few hold three.
 
-    Raises:
-        ParameterError: a grid smaller than a box.
+    Raises
+    ------
+    ParameterError
+        A grid smaller than a box.
 
-    Examples:
-        >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
-        >>> bool(saltus.attractors.basin_entropy(halves).boundary < np.log(2))  # no sign of a fractal boundary
-        True
+    Examples
+    --------
+    >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
+    >>> bool(saltus.attractors.basin_entropy(halves).boundary < np.log(2))  # no sign of a fractal boundary
+    True
     """
     grid = _labels(labels)
     check_count("box", box, 2)
@@ -98,10 +102,11 @@ def _boxes(grid: np.ndarray, box: int) -> np.ndarray:
 class UncertaintyExponent:
     """f(eps) ~ eps^alpha, the share of states with a different end within eps (Grebogi et al., Phys. Lett. A 99 (1983) 415).
 
-    Examples:
-        >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
-        >>> round(float(saltus.attractors.uncertainty_exponent(halves).dimension), 2)  # of a line
-        1.0
+    Examples
+    --------
+    >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
+    >>> round(float(saltus.attractors.uncertainty_exponent(halves).dimension), 2)  # of a line
+    1.0
     """
 
     alpha: float  # 1 for a smooth boundary, towards 0 the more fractal it is; nan without a boundary
@@ -125,13 +130,16 @@ def uncertainty_exponent(labels: Numbers, distances: Iterable[int] | None = None
     ln eps is fitted, with its standard error, over distances (1, 2, 3, 4, 6, 8, ... up to 1/16 of the grid) at which f is below
     0.5, unless fewer than three are.
 
-    Raises:
-        ParameterError: a grid too small for three distances; distances that are no whole numbers.
+    Raises
+    ------
+    ParameterError
+        A grid too small for three distances; distances that are no whole numbers.
 
-    Examples:
-        >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
-        >>> round(float(saltus.attractors.uncertainty_exponent(halves).alpha), 2)  # of a smooth boundary
-        1.0
+    Examples
+    --------
+    >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
+    >>> round(float(saltus.attractors.uncertainty_exponent(halves).alpha), 2)  # of a smooth boundary
+    1.0
     """
     from scipy.ndimage import maximum_filter, minimum_filter
 
@@ -191,10 +199,11 @@ class WadaVerdict(StrEnum):
 class Wada:
     """How near to the boundary all basins are (after Daza et al., Sci. Rep. 5 (2015) 16579).
 
-    Examples:
-        >>> thirds = np.repeat([np.arange(63) // 21], 63, axis=0)
-        >>> saltus.attractors.wada(thirds).labels
-        (0, 1, 2)
+    Examples
+    --------
+    >>> thirds = np.repeat([np.arange(63) // 21], 63, axis=0)
+    >>> saltus.attractors.wada(thirds).labels
+    (0, 1, 2)
     """
 
     labels: tuple[int, ...]
@@ -227,13 +236,16 @@ def wada(labels: Numbers, radius: int = FRACTAL.radius) -> Wada:
     `radius` cells, until it meets all labels. In a Wada picture nearly all do; where basins meet in threes only at single points,
     nearly none. Undecided cells (-1) are no label.
 
-    Raises:
-        ParameterError: labels that are no grid, a radius below 1.
+    Raises
+    ------
+    ParameterError
+        Labels that are no grid, a radius below 1.
 
-    Examples:
-        >>> thirds = np.repeat([np.arange(63) // 21], 63, axis=0)
-        >>> float(saltus.attractors.wada(thirds).shares[0])  # no cell of the boundary sees all three stripes
-        0.0
+    Examples
+    --------
+    >>> thirds = np.repeat([np.arange(63) // 21], 63, axis=0)
+    >>> float(saltus.attractors.wada(thirds).shares[0])  # no cell of the boundary sees all three stripes
+    0.0
     """
     from scipy.ndimage import distance_transform_cdt, maximum_filter, minimum_filter
 

@@ -111,34 +111,51 @@ def basins_of_attraction(
     that settle elsewhere give new attractors, with labels after the known ones. The time is that after which the motion stays
     within a distance of the attractor's points at phase 0, in forcing periods; to rest, at most that to the proof of capture.
 
-    Args:
-        system: what moves, as for `find_attractors`.
-        velocity: the velocities of the grid, increasing; by default 201 over the window of `found`, or of `find_attractors`.
-        found: the attractors and their labels; by default those that `find_attractors` finds, over the grid.
-        periods: the most forcing periods of each motion.
-        within: that distance, the largest of all coordinates and velocities.
-        curves: adds the curves at which basins meet, computed by the backward flow (see `basin_boundaries`), as `boundary_...`
-            over `boundary_point`, nan between curves.
-        tol: the error of a step.
-        rows: of the grid, in one chunk of a store, or of what a worker computes.
-        store, workers, scheduler: where the cells are kept and who computes them, see `saltus.sweep.run`; the attractors are
-            found first, and the curves at the end, at every run. Where none is given all cells are computed at once.
-        progress: called with the fraction done and what is being done.
-        coordinates: the coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201). With several coordinates two
-            state variables are lists, such as theta_1 and theta_1_velocity; the others are held fixed, closed or 0 if not given.
+    Parameters
+    ----------
+    system
+        What moves, as for `find_attractors`.
+    velocity
+        The velocities of the grid, increasing; by default 201 over the window of `found`, or of `find_attractors`.
+    found
+        The attractors and their labels; by default those that `find_attractors` finds, over the grid.
+    periods
+        The most forcing periods of each motion.
+    within
+        That distance, the largest of all coordinates and velocities.
+    curves
+        Adds the curves at which basins meet, computed by the backward flow (see `basin_boundaries`), as `boundary_...`
+        over `boundary_point`, nan between curves.
+    tol
+        The error of a step.
+    rows
+        Of the grid, in one chunk of a store, or of what a worker computes.
+    store, workers, scheduler
+        Where the cells are kept and who computes them, see `saltus.sweep.run`; the attractors are
+        found first, and the curves at the end, at every run. Where none is given all cells are computed at once.
+    progress
+        Called with the fraction done and what is being done.
+    coordinates
+        The coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201). With several coordinates two
+        state variables are lists, such as theta_1 and theta_1_velocity; the others are held fixed, closed or 0 if not given.
 
-    Returns:
+    Returns
+    -------
+    xarray.Dataset
         A Dataset over (velocity, coordinate), or the variables of the plane: `label`, `time` (nan where undecided), and the table
         of the attractors, in which `cells` is the share of the grid.
 
-    Raises:
-        ParameterError: as for `find_attractors`; a grid that does not increase; attractors of another system.
+    Raises
+    ------
+    ParameterError
+        As for `find_attractors`; a grid that does not increase; attractors of another system.
 
-    Examples:
-        >>> grid = np.linspace(-1.0, 1.0, 5)
-        >>> basins = saltus.basins_of_attraction(system, theta=grid, velocity=grid)
-        >>> np.unique(basins.label)
-        array([1], dtype=int16)
+    Examples
+    --------
+    >>> grid = np.linspace(-1.0, 1.0, 5)
+    >>> basins = saltus.basins_of_attraction(system, theta=grid, velocity=grid)
+    >>> np.unique(basins.label)
+    array([1], dtype=int16)
     """
     clock = with_clock(system)
     grid = _grid(clock, velocity, coordinates, found)

@@ -41,8 +41,10 @@ def uncertainty(series: np.ndarray) -> np.ndarray:
     honest as long as the correlation dies out within a sixteenth of the run; for regular motion, whose averages converge faster
     than their scatter shows, it is far too large.
 
-    Raises:
-        ValueError: fewer than 16 entries.
+    Raises
+    ------
+    ValueError
+        Fewer than 16 entries.
     """
     if len(series) < LYAPUNOV.batches:
         raise ValueError(f"an error bar takes a series of at least {LYAPUNOV.batches} entries, got {len(series)}")

@@ -42,27 +42,39 @@ def lyapunov_many(
     Arrays broadcast as those of `simulate_many` do. Motions that settle on an orbit are followed along it; those that rest at the
     contact for good have no exponents if impacts lose nothing, and -inf if they do.
 
-    Args:
-        system: a model with one coordinate, under constant or harmonic loads.
-        parameters: arrays by dotted path, such as {"load.frequency": np.linspace(1, 2, 201)}.
-        velocity, coordinates: the states at the start, at phase 0.
-        periods, transient: forcing periods to average over, at least 32, and to let pass first.
-        tol: the error that one step may make.
-        progress: called with the fraction done and what is being done.
+    Parameters
+    ----------
+    system
+        A model with one coordinate, under constant or harmonic loads.
+    parameters
+        Arrays by dotted path, such as {"load.frequency": np.linspace(1, 2, 201)}.
+    velocity, coordinates
+        The states at the start, at phase 0.
+    periods, transient
+        Forcing periods to average over, at least 32, and to let pass first.
+    tol
+        The error that one step may make.
+    progress
+        Called with the fraction done and what is being done.
 
-    Returns:
+    Returns
+    -------
+    xarray.Dataset
         A Dataset over the dimensions of the arguments: `exponent` and its `error`, `at_half` and `later_half` (from the halves of
         the run), each with a dimension `index` of 2; `resolution`, below which an exponent may be 0; `positive`,
         whether the largest is above both, in all and in both halves; `period`, the forcing periods after which the motion repeats
         itself at the end, 0 if it does not, `ending`, and the state at the end.
 
-    Raises:
-        ParameterError: an argument without meaning; several coordinates; a load by records.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning; several coordinates; a load by records.
 
-    Examples:
-        >>> many = saltus.lyapunov_many(system, theta=[0.3, 0.4], periods=200)
-        >>> sorted(many.data_vars)
-        ['at_half', 'end_theta', 'end_velocity', 'ending', 'error', 'exponent', 'later_half', 'period', 'positive', 'resolution']
+    Examples
+    --------
+    >>> many = saltus.lyapunov_many(system, theta=[0.3, 0.4], periods=200)
+    >>> sorted(many.data_vars)
+    ['at_half', 'end_theta', 'end_velocity', 'ending', 'error', 'exponent', 'later_half', 'period', 'positive', 'resolution']
     """
     check_run("lyapunov_many", system, periods, transient, tol)
     if len(system.model.coordinates) > 1:

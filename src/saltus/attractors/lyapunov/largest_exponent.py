@@ -57,8 +57,10 @@ def largest_exponents(
 
     The resolution is 2 ln(t) / t for the time t of one motion, as regular ones may part like t^2.
 
-    Args:
-        parameters: numbers by dotted path, (groups,) each, in place of the system's.
+    Parameters
+    ----------
+    parameters
+        Numbers by dotted path, (groups,) each, in place of the system's.
     """
     groups, size = states.shape[:2]
     frequency = parameters.get("load.frequency", np.array(system.load.frequency, dtype=float))

@@ -21,8 +21,10 @@ from saltus.systems import System, check_system
 def check_run(function: str, system: Any, periods: Any, transient: Any, tol: float, several_contacts: bool = False) -> None:
     """Refuse what has no exponents, and a run too short for error bars of its halves.
 
-    Raises:
-        ParameterError: with the name of the argument.
+    Raises
+    ------
+    ParameterError
+        With the name of the argument.
     """
     check_system(system, function, several_contacts=several_contacts)
     check_periodic(system)

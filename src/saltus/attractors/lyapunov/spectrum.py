@@ -28,10 +28,11 @@ class Exponents:
     They are -inf where the motion comes to rest with a loss at impacts: states beside it are at the same rest after a finite
     time. They are NaN where the motion has no derivative or ends; `note` then says why.
 
-    Examples:
-        >>> exponents = saltus.lyapunov_spectrum(system, theta=0.3, periods=200)
-        >>> round(float(exponents.values.sum()), 9)  # the sum is -C
-        -0.1
+    Examples
+    --------
+    >>> exponents = saltus.lyapunov_spectrum(system, theta=0.3, periods=200)
+    >>> round(float(exponents.values.sum()), 9)  # the sum is -C
+    -0.1
     """
 
     values: np.ndarray  # (2 n,) for n coordinates
@@ -102,24 +103,36 @@ def lyapunov_spectrum(
     times on each side. And the stroboscopic map must have the same largest exponent, from a second trajectory that starts 1e-7
     beside the motion and is moved back to that distance after every period.
 
-    Args:
-        system: what moves, under constant or harmonic loads. Under constant ones a unit of time stands for the period.
-        velocity, coordinates: the state at the start, at phase 0.
-        periods: over how many forcing periods to average, at least 32.
-        transient: how many to let pass first.
-        tol: the error that one step may make.
-        two_trajectories: False leaves out the stroboscopic map's exponent, and a half of the work. With several contacts it has
-            to be False; exponents are then -inf in the directions that closed contacts take away.
-        progress: called with the fraction done and what is being done.
+    Parameters
+    ----------
+    system
+        What moves, under constant or harmonic loads. Under constant ones a unit of time stands for the period.
+    velocity, coordinates
+        The state at the start, at phase 0.
+    periods
+        Over how many forcing periods to average, at least 32.
+    transient
+        How many to let pass first.
+    tol
+        The error that one step may make.
+    two_trajectories
+        False leaves out the stroboscopic map's exponent, and a half of the work. With several contacts it has
+        to be False; exponents are then -inf in the directions that closed contacts take away.
+    progress
+        Called with the fraction done and what is being done.
 
-    Raises:
-        ParameterError: an argument without meaning; a load by records, which has no period.
-        MotionError: as for `simulate`.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning; a load by records, which has no period.
+    MotionError
+        As for `simulate`.
 
-    Examples:
-        >>> exponents = saltus.lyapunov_spectrum(system, theta=0.3, periods=200)
-        >>> exponents.values.round(3)  # half of -C each, as the multipliers are complex
-        array([-0.05, -0.05])
+    Examples
+    --------
+    >>> exponents = saltus.lyapunov_spectrum(system, theta=0.3, periods=200)
+    >>> exponents.values.round(3)  # half of -C each, as the multipliers are complex
+    array([-0.05, -0.05])
     """
     check_run("lyapunov_spectrum", system, periods, transient, tol, several_contacts=not two_trajectories)
     run, start = _Run(system, periods), dict[str, Any](coordinates, velocity=velocity)

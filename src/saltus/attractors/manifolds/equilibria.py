@@ -37,10 +37,11 @@ SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # (step, weight) of the
 class Equilibrium:
     """An equilibrium under a constant load.
 
-    Examples:
-        >>> places = saltus.attractors.equilibria(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))
-        >>> bool(np.allclose([rest.place for rest in places], [rest.theta for rest in saltus.theory.equilibria(tristable)]))
-        True
+    Examples
+    --------
+    >>> places = saltus.attractors.equilibria(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))
+    >>> bool(np.allclose([rest.place for rest in places], [rest.theta for rest in saltus.theory.equilibria(tristable)]))
+    True
     """
 
     place: float  # the coordinate
@@ -60,13 +61,16 @@ def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
     They are the zeros of the acceleration at rest between 2001 points of the window: two that are nearer to one another than a
     thousandth of it, as beside a fold, may be missed.
 
-    Raises:
-        ParameterError: a load that is not constant, several coordinates, a window without meaning.
+    Raises
+    ------
+    ParameterError
+        A load that is not constant, several coordinates, a window without meaning.
 
-    Examples:
-        >>> rests = saltus.attractors.equilibria(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))
-        >>> [rest.stable for rest in rests]
-        [True, False, True, False, True]
+    Examples
+    --------
+    >>> rests = saltus.attractors.equilibria(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))
+    >>> [rest.stable for rest in rests]
+    [True, False, True, False, True]
     """
     check_constant(system)
     area = check_window(window, system)

@@ -44,11 +44,12 @@ class SeparatrixEnd(StrEnum):
 class Separatrix:
     """A branch of the stable manifold of a saddle, followed back in time from it; nan where an impact makes the velocity jump.
 
-    Examples:
-        >>> curve = saltus.separatrices(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))[0]
-        >>> energy = saltus.theory.total_energy(tristable, curve.theta[1:], curve.velocity[1:])
-        >>> bool(np.ptp(energy) < 1e-6)  # all of it has the energy of its saddle
-        True
+    Examples
+    --------
+    >>> curve = saltus.separatrices(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))[0]
+    >>> energy = saltus.theory.total_energy(tristable, curve.theta[1:], curve.velocity[1:])
+    >>> bool(np.ptp(energy) < 1e-6)  # all of it has the energy of its saddle
+    True
     """
 
     saddle: float
@@ -62,8 +63,10 @@ class Separatrix:
 def saddles(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
     """The saddle equilibria in a window of the phase plane, by their coordinate.
 
-    Raises:
-        ParameterError: a load that is not constant; a window without meaning.
+    Raises
+    ------
+    ParameterError
+        A load that is not constant; a window without meaning.
     """
     return tuple(point for point in equilibria(system, window) if point.saddle)
 
@@ -74,12 +77,15 @@ def separatrices(system: System, window: Box = PLANE, *, span: float = 60.0, ste
     Each branch is followed back for at most `span` of time, until it leaves the window for good (three half widths) or comes to
     a saddle, and given every `step` of time.
 
-    Raises:
-        ParameterError: a load that is not constant, an impact law without an inverse, numbers without meaning.
+    Raises
+    ------
+    ParameterError
+        A load that is not constant, an impact law without an inverse, numbers without meaning.
 
-    Examples:
-        >>> len(saltus.separatrices(tristable, window=((-2.0, 2.0), (-2.0, 2.0))))  # of two saddles
-        4
+    Examples
+    --------
+    >>> len(saltus.separatrices(tristable, window=((-2.0, 2.0), (-2.0, 2.0))))  # of two saddles
+    4
     """
     area = check_window(window, system)
     check_number("span", span, above=0.0)

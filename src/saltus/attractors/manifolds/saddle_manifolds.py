@@ -56,10 +56,11 @@ class ManifoldBranch:
 class Manifold:
     """The stable or unstable manifold of a saddle orbit.
 
-    Examples:
-        >>> saddle = next(o for o in branch.at(0.88) if not o.stable)
-        >>> saltus.stable_manifold(saddle, window=((-1.0, 1.0), (-1.0, 1.0))).stable
-        True
+    Examples
+    --------
+    >>> saddle = next(o for o in branch.at(0.88) if not o.stable)
+    >>> saltus.stable_manifold(saddle, window=((-1.0, 1.0), (-1.0, 1.0))).stable
+    True
     """
 
     orbit: PeriodicOrbit
@@ -97,23 +98,33 @@ def stable_manifold(
 ) -> Manifold:
     """The states that the flow takes to a saddle orbit, as curves in the section at phase 0: where basins meet.
 
-    Args:
-        orbit: with one multiplier inside the unit circle and one outside.
-        window: of the coordinate and of the velocity, in which the curves are wanted; they are followed outside it up to three
-            half widths from its middle.
-        periods: for how many forcing periods back.
-        step: the longest distance between neighbours in the window, in its half widths; they are closer in bends.
-        points: the most for each of the two sides.
+    Parameters
+    ----------
+    orbit
+        With one multiplier inside the unit circle and one outside.
+    window
+        Of the coordinate and of the velocity, in which the curves are wanted; they are followed outside it up to three
+        half widths from its middle.
+    periods
+        For how many forcing periods back.
+    step
+        The longest distance between neighbours in the window, in its half widths; they are closer in bends.
+    points
+        The most for each of the two sides.
 
-    Raises:
-        ParameterError: an orbit that is no saddle, or whose system cannot be run backward (v+ = e v- with e > 0 can).
-        MotionError: the orbit is at the contact at phase 0, where the map has no derivative.
+    Raises
+    ------
+    ParameterError
+        An orbit that is no saddle, or whose system cannot be run backward (v+ = e v- with e > 0 can).
+    MotionError
+        The orbit is at the contact at phase 0, where the map has no derivative.
 
-    Examples:
-        >>> saddle = next(o for o in branch.at(0.88) if not o.stable)
-        >>> curve = saltus.stable_manifold(saddle, window=((-1.0, 1.0), (-1.0, 1.0)))
-        >>> curve.states.shape[1]
-        2
+    Examples
+    --------
+    >>> saddle = next(o for o in branch.at(0.88) if not o.stable)
+    >>> curve = saltus.stable_manifold(saddle, window=((-1.0, 1.0), (-1.0, 1.0)))
+    >>> curve.states.shape[1]
+    2
     """
     return _manifold(orbit, True, window, periods, step, points)
 
@@ -129,11 +140,12 @@ def unstable_manifold(
 ) -> Manifold:
     """The states that the flow takes away from a saddle orbit: as `stable_manifold`, forward in time.
 
-    Examples:
-        >>> saddle = next(o for o in branch.at(0.88) if not o.stable)
-        >>> curve = saltus.attractors.unstable_manifold(saddle, window=((-1.0, 1.0), (-1.0, 1.0)))
-        >>> curve.states.shape[1]
-        2
+    Examples
+    --------
+    >>> saddle = next(o for o in branch.at(0.88) if not o.stable)
+    >>> curve = saltus.attractors.unstable_manifold(saddle, window=((-1.0, 1.0), (-1.0, 1.0)))
+    >>> curve.states.shape[1]
+    2
     """
     return _manifold(orbit, False, window, periods, step, points)
 

@@ -44,22 +44,34 @@ def classify(
       and a 0-1 test that sees order.
     * `undecided`: everything else, with the reason.
 
-    Args:
-        system: what moves, under constant or harmonic loads.
-        velocity, coordinates: the state at the start, at phase 0.
-        periods: how long it may take, in forcing periods: so many for settling, so many for the exponents; at least 96.
-        transient: how many to let pass first.
-        max_period: the longest period looked for, at least 16.
-        seed: of the companions' states and the frequencies of the 0-1 test.
-        tol: the error that one step may make.
-        progress: called with the fraction done and what is being done.
+    Parameters
+    ----------
+    system
+        What moves, under constant or harmonic loads.
+    velocity, coordinates
+        The state at the start, at phase 0.
+    periods
+        How long it may take, in forcing periods: so many for settling, so many for the exponents; at least 96.
+    transient
+        How many to let pass first.
+    max_period
+        The longest period looked for, at least 16.
+    seed
+        Of the companions' states and the frequencies of the 0-1 test.
+    tol
+        The error that one step may make.
+    progress
+        Called with the fraction done and what is being done.
 
-    Raises:
-        ParameterError: an argument without meaning.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning.
 
-    Examples:
-        >>> str(saltus.classify(system, theta=0.3).kind)
-        'periodic'
+    Examples
+    --------
+    >>> str(saltus.classify(system, theta=0.3).kind)
+    'periodic'
     """
     clock, start = with_clock(system), _start(system, velocity, coordinates)
     check_count("periods", periods, SETTINGS.thirds * 2 * LYAPUNOV.batches)
@@ -77,8 +89,10 @@ def classify(
 def _start(system: System, velocity: Any, coordinates: dict[str, float]) -> np.ndarray:
     """The state at the start as a row.
 
-    Raises:
-        ParameterError: names or values that are none.
+    Raises
+    ------
+    ParameterError
+        Names or values that are none.
     """
     names = system.model.coordinates
     if set(coordinates) != set(names):

@@ -29,12 +29,15 @@ def excludes_tori(system: System) -> str | None:
     Both are checked by interval bounds over all of the forcing period and all states. Sufficient, not necessary: a load of which
     the bounds do not decide is one that may have tori.
 
-    Raises:
-        ParameterError: what is no system; a load by records.
+    Raises
+    ------
+    ParameterError
+        What is no system; a load by records.
 
-    Examples:
-        >>> saltus.excludes_tori(system) is not None  # the damping shrinks areas
-        True
+    Examples
+    --------
+    >>> saltus.excludes_tori(system) is not None  # the damping shrinks areas
+    True
     """
     check_system(system, "excludes_tori", several_contacts=True)
     check_periodic(system)

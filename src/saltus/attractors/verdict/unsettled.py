@@ -140,12 +140,18 @@ def judge_unsettled(
     whose rate is estimated or bounded by that. If some settle, their places are taken by survivors, so that an attractor beside a
     transient becomes an ever larger share of the companions, and shows itself by three mean lives in which none settles.
 
-    Args:
-        system: what moves, under a load with a frequency.
-        states: (n, m, d), coordinates and velocities at phase 0; rows of nan are left out, a question needs one other.
-        parameters: numbers by dotted path, (n,) each, in place of the system's.
-        settings: how long is looked, and how surely.
-        progress: called with the fraction done.
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    states
+        (n, m, d), coordinates and velocities at phase 0; rows of nan are left out, a question needs one other.
+    parameters
+        Numbers by dotted path, (n,) each, in place of the system's.
+    settings
+        How long is looked, and how surely.
+    progress
+        Called with the fraction done.
     """
     run = _Judgement.begin(system, states, parameters, settings)
     run.follow(settings.first_periods, part_of(progress, 0.0, 0.2, "judging"))

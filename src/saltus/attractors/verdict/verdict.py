@@ -28,10 +28,11 @@ if TYPE_CHECKING:
 class Verdict:
     """Where a motion ends.
 
-    Examples:
-        >>> verdict = saltus.classify(system, theta=0.3)
-        >>> str(verdict.kind), verdict.period
-        ('periodic', 1)
+    Examples
+    --------
+    >>> verdict = saltus.classify(system, theta=0.3)
+    >>> str(verdict.kind), verdict.period
+    ('periodic', 1)
     """
 
     system: System

@@ -18,9 +18,10 @@ CONSTANT = 1e-9  # relative: a series that varies less does not vary
 class ZeroOne:
     """The outcome: near 0 for regular motion, near 1 for chaos.
 
-    Examples:
-        >>> bool(saltus.zero_one_test(np.sin(np.arange(2000.0))).K < 0.1)  # regular
-        True
+    Examples
+    --------
+    >>> bool(saltus.zero_one_test(np.sin(np.arange(2000.0))).K < 0.1)  # regular
+    True
     """
 
     K: float  # the median over the frequencies
@@ -39,20 +40,27 @@ def zero_one_test(series: Numbers, *, seed: int = 0, count: int = 100) -> ZeroOn
     The series must be sampled coarsely, as once a forcing period: of a finely sampled one the test says 0 whatever it is. Weak
     chaos takes long series, and a fine structure of many tori short of the noise is not resolved.
 
-    Args:
-        series: (samples,) numbers, at least 100.
-        seed: of the frequencies.
-        count: how many of them.
+    Parameters
+    ----------
+    series
+        (samples,) numbers, at least 100.
+    seed
+        Of the frequencies.
+    count
+        How many of them.
 
-    Raises:
-        ParameterError: a series of other shape, too short, or not finite; a count below 1.
+    Raises
+    ------
+    ParameterError
+        A series of other shape, too short, or not finite; a count below 1.
 
-    Examples:
-        >>> logistic = [0.3]
-        >>> for _ in range(2000):
-        ...     logistic.append(4 * logistic[-1] * (1 - logistic[-1]))
-        >>> saltus.zero_one_test(np.sin(np.arange(2000.0))).K < 0.1, saltus.zero_one_test(logistic).K > 0.9
-        (True, True)
+    Examples
+    --------
+    >>> logistic = [0.3]
+    >>> for _ in range(2000):
+    ...     logistic.append(4 * logistic[-1] * (1 - logistic[-1]))
+    >>> saltus.zero_one_test(np.sin(np.arange(2000.0))).K < 0.1, saltus.zero_one_test(logistic).K > 0.9
+    (True, True)
     """
     try:
         values = np.asarray(series, dtype=float)

@@ -27,8 +27,10 @@ class ContactState(KernelState):
     def at_start(cls, request: MotionRequest, run: Program) -> ContactState:
         """The state in which a motion starts: contacts that are at rest at their positions are decided on first.
 
-        Raises:
-            ParameterError: a state beyond a contact, or one that moves into a contact.
+        Raises
+        ------
+        ParameterError
+            A state beyond a contact, or one that moves into a contact.
         """
         start = super().at_start(request, run)
         names, position, speeds = request.system.model.coordinates, request.position, request.speeds

@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 def stop_names(dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
     """Why each motion ended, in the dimensions of the ensemble; the words are those of `Stop`.
 
-    Examples:
-        >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2], periods=2)
-        >>> saltus.flow.stop_names(ends)
-        array(['horizon', 'horizon'], dtype='<U10')
+    Examples
+    --------
+    >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2], periods=2)
+    >>> saltus.flow.stop_names(ends)
+    array(['horizon', 'horizon'], dtype='<U10')
     """
     check_dataset(dataset, "simulate_many", ("stop",))
     stop = dataset["stop"]
@@ -36,10 +37,11 @@ def stroboscopic(system: System, dataset: xarray.Dataset) -> np.ndarray[Any, Any
 
     The shape is that of the ensemble, then (periods, d); states are nan where a motion had fewer periods than were kept.
 
-    Examples:
-        >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2], periods=4, last=3)
-        >>> saltus.flow.stroboscopic(system, ends).shape
-        (2, 3, 2)
+    Examples
+    --------
+    >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2], periods=4, last=3)
+    >>> saltus.flow.stroboscopic(system, ends).shape
+    (2, 3, 2)
     """
     states = state_names(system.model.coordinates)
     check_dataset(dataset, "simulate_many with sample", [f"sampled_{name}" for name in states])

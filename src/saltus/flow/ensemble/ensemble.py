@@ -55,29 +55,42 @@ def simulate_many(
     `xarray.DataArray`s by the names of their dimensions, which the result then has. Results depend neither on the number of
     threads nor on what else is computed, to the last bit. What is computed is bounded in memory by what is asked for.
 
-    Args:
-        parameters: arrays by dotted path, such as {"load.horizontal.amplitude": np.linspace(0, 1, 101)}.
-        sample: what is kept of each of the `last` forcing periods, see `Sample`. Periods are counted from the start, and the one
-            in which the trajectory ends is kept, however short. Of "extrema" and "speed" the whole motion's are returned too.
-        last: of how many forcing periods, counted back from the end; "all" keeps every one.
-        until: ends a trajectory early, see `Until`.
-        sensitivities: dotted paths of parameters: adds the derivatives of the end state to the initial one and to them, at a
-            fixed time; but the end of n periods moves with "load.frequency", and that at a margin with the margin.
-        threads: how many cores to use; by default all.
-        velocity, periods, duration, tol, time, side, stop_at, progress, coordinates: as for `simulate`; velocity a tuple of
-            arrays where there are several coordinates.
+    Parameters
+    ----------
+    parameters
+        Arrays by dotted path, such as {"load.horizontal.amplitude": np.linspace(0, 1, 101)}.
+    sample
+        What is kept of each of the `last` forcing periods, see `Sample`. Periods are counted from the start, and the one
+        in which the trajectory ends is kept, however short. Of "extrema" and "speed" the whole motion's are returned too.
+    last
+        Of how many forcing periods, counted back from the end; "all" keeps every one.
+    until
+        Ends a trajectory early, see `Until`.
+    sensitivities
+        Dotted paths of parameters: adds the derivatives of the end state to the initial one and to them, at a
+        fixed time; but the end of n periods moves with "load.frequency", and that at a margin with the margin.
+    threads
+        How many cores to use; by default all.
+    velocity, periods, duration, tol, time, side, stop_at, progress, coordinates
+        As for `simulate`; velocity a tuple of
+        arrays where there are several coordinates.
 
-    Returns:
+    Returns
+    -------
+    xarray.Dataset
         A Dataset with the state at the end, `time`, `side`, `stop` (why it ended), `impact_count`, `grazings`, `periods` done
         (2.5 for two and a half), and what `sample` asks for, all over the dimensions of the arguments; see `ensemble_dataset.py`.
 
-    Raises:
-        ParameterError: an argument without meaning. A trajectory that cannot go on raises nothing: `stop` says so.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning. A trajectory that cannot go on raises nothing: `stop` says so.
 
-    Examples:
-        >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2, 0.3], periods=20)
-        >>> ends.impact_count.values, float(ends.theta[2])
-        (array([39, 39, 39]), -0.23568059529931645)
+    Examples
+    --------
+    >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2, 0.3], periods=20)
+    >>> ends.impact_count.values, float(ends.theta[2])
+    (array([39, 39, 39]), -0.23568059529931645)
     """
     check_system(system, "simulate_many", several_contacts=True)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
@@ -129,8 +142,10 @@ def _capture(system: System, columns: dict[str, np.ndarray], limits: tuple[str, 
 
     With several contacts it is asked only once all are closed and nothing moves: it is 0 or infinite.
 
-    Raises:
-        ParameterError: a margin to stop at besides the model's own, which a captured motion may still reach.
+    Raises
+    ------
+    ParameterError
+        A margin to stop at besides the model's own, which a captured motion may still reach.
     """
     from saltus.bounds import keeps_rest, proved_speeds
 

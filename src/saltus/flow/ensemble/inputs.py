@@ -41,9 +41,11 @@ class Inputs:
 def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coordinates: Mapping[str, Any]) -> Inputs:
     """Broadcast and check the arguments of an ensemble.
 
-    Raises:
-        ParameterError: names that the system does not have, numbers that are none or not finite, shapes that do not fit, values
-            that the system refuses, dimensions and coordinates with the name of a result.
+    Raises
+    ------
+    ParameterError
+        Names that the system does not have, numbers that are none or not finite, shapes that do not fit, values
+        that the system refuses, dimensions and coordinates with the name of a result.
     """
     given = parameter_table(system, parameters)
     arrays = {name: finite_array(name, value) for name, value in (_starts(system, velocity, time, coordinates) | given).items()}

@@ -101,8 +101,10 @@ class Lanes:
     def run(self, jobs: Jobs, threads: int, progress: Progress = silent, total: float = 0.0) -> Ends:
         """Run all jobs; `total` is how many forcing periods they are, for the progress.
 
-        Raises:
-            KeyboardInterrupt: after Ctrl-C, within a step of every lane.
+        Raises
+        ------
+        KeyboardInterrupt
+            After Ctrl-C, within a step of every lane.
         """
         n, own = len(jobs), self.own
         ends = Ends(

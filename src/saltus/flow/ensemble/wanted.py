@@ -55,8 +55,10 @@ class Wanted:
 def read_names(argument: str, given: Any, known: Iterable[str] | None = None) -> tuple[str, ...]:
     """One name or several; each of the known ones, where these are given.
 
-    Raises:
-        ParameterError: what is no name, or not known.
+    Raises
+    ------
+    ParameterError
+        What is no name, or not known.
     """
     known = None if known is None else tuple(known)
     try:
@@ -74,8 +76,10 @@ def read_names(argument: str, given: Any, known: Iterable[str] | None = None) ->
 def read_last(last: Any, periods: int) -> int:
     """Of how many of so many forcing periods something is kept.
 
-    Raises:
-        ParameterError: no whole number from 1 on, and not "all".
+    Raises
+    ------
+    ParameterError
+        No whole number from 1 on, and not "all".
     """
     if isinstance(last, str) and last == "all":
         return periods
@@ -87,8 +91,10 @@ def read_last(last: Any, periods: int) -> int:
 def read_side(side: Any) -> int:
     """The side to leave by, or 0.
 
-    Raises:
-        ParameterError: neither +1 nor -1 nor None.
+    Raises
+    ------
+    ParameterError
+        Neither +1 nor -1 nor None.
     """
     if side is not None and (np.ndim(side) or side not in (1, -1)):
         raise ParameterError(f"side must be +1 or -1, got {side!r}", "side")
@@ -98,8 +104,10 @@ def read_side(side: Any) -> int:
 def read_threads(threads: Any) -> int:
     """How many threads to use, by default as many as there are cores.
 
-    Raises:
-        ParameterError: no whole number from 1 on.
+    Raises
+    ------
+    ParameterError
+        No whole number from 1 on.
     """
     threads = available_cores() if threads is None else threads
     check_count("threads", threads, 1)

@@ -97,8 +97,10 @@ def with_fields(fields: Mapping[str, Any], measures: Mapping[str, Measured]) -> 
 def judge(part: str, measures: Measures) -> list[Claim]:
     """The claims of a part of the paper, such as "fig04", in the order of its table; without those that rest on other claims.
 
-    Raises:
-        SaltusError: a claim of the table that was not measured, or a measured one that is in no table.
+    Raises
+    ------
+    SaltusError
+        A claim of the table that was not measured, or a measured one that is in no table.
     """
     entries = {id: entry for id, entry in claim_tables().get(part, {}).items() if not entry.rests_on}
     to_measure = {id for id, entry in entries.items() if entry.is_measured}

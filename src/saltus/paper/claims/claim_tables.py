@@ -103,9 +103,12 @@ class ClaimEntry:
 def claim_tables() -> dict[str, dict[str, ClaimEntry]]:
     """All claims by part and id.
 
-    Raises:
-        TypeError: a claim without a place or statement, or with an unknown key.
-        ValueError: a source or listing that there is none of.
+    Raises
+    ------
+    TypeError
+        A claim without a place or statement, or with an unknown key.
+    ValueError
+        A source or listing that there is none of.
     """
     return _read()[1]
 

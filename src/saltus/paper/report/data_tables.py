@@ -54,8 +54,10 @@ class DataTables:
 def data_tables(path: Path) -> DataTables:
     """The tables of a netCDF file that saltus has written; its checksum is compared first.
 
-    Raises:
-        ParameterError: the file is damaged, or another program wrote it.
+    Raises
+    ------
+    ParameterError
+        The file is damaged, or another program wrote it.
     """
     import h5netcdf
 

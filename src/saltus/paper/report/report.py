@@ -46,8 +46,10 @@ def report_from_results(folder: Path | str) -> list[str]:
     Parts that other sources have made are shown too, and said to be so. A part whose files are not those of its record, or whose
     record cannot be read, is left out.
 
-    Raises:
-        ParameterError: there are no results in the folder, or it cannot be written to.
+    Raises
+    ------
+    ParameterError
+        There are no results in the folder, or it cannot be written to.
     """
     from saltus.paper.parts import FIGURES
 

@@ -96,8 +96,10 @@ class ReportContent:
 def report_content(all_figures: Iterable[PaperFigure], present: Mapping[PaperFigure, list[Claim]], folder: Path) -> ReportContent:
     """Gather what is in `folder` of these figures, each with its claims.
 
-    Raises:
-        ParameterError: a data file that is damaged.
+    Raises
+    ------
+    ParameterError
+        A data file that is damaged.
     """
     claims = with_summaries(claim for group in present.values() for claim in group)
     parts = [_part(figure, here, folder) for figure, here in present.items()]

@@ -46,9 +46,10 @@ KEY = ("row", "column", "amplitude_nrad", "to_row", "to_column")
 class Borders:
     """Curves through the plane of a chart, each a Dataset along `point`, and what becomes of its changes.
 
-    Examples:
-        >>> len(saltus.studies.Borders().curves)
-        0
+    Examples
+    --------
+    >>> len(saltus.studies.Borders().curves)
+    0
     """
 
     curves: list[xarray.Dataset] = field(default_factory=list)
@@ -102,22 +103,32 @@ def with_borders(
     From the ends on the widest borders, above all those beside rest alone, the orbit is continued to its special point, and the
     curve of LP, PD, BPC or GR through it followed through the plane of the chart.
 
-    Args:
-        system: that of the chart.
-        chart: as `stability_chart` returns it.
-        curves: how many curves at most.
-        store: the chart's own; the work on its borders is kept in chunks in it, and a run that was stopped goes on.
-        workers, scheduler: who computes them, see `saltus.sweep.run`.
-        progress: called with the fraction done and what is being done.
+    Parameters
+    ----------
+    system
+        That of the chart.
+    chart
+        As `stability_chart` returns it.
+    curves
+        How many curves at most.
+    store
+        The chart's own; the work on its borders is kept in chunks in it, and a run that was stopped goes on.
+    workers, scheduler
+        Who computes them, see `saltus.sweep.run`.
+    progress
+        Called with the fraction done and what is being done.
 
-    Returns:
+    Returns
+    -------
+    tuple[xarray.Dataset, Borders]
         The chart, whose attribute `added_by_continuation` is the number of motions added, and its borders.
 
-    Examples:
-        >>> chart = saltus.stability_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4)
-        >>> _, borders = saltus.studies.with_borders(system, chart)
-        >>> len(borders.curves)  # no border passes between these cells
-        0
+    Examples
+    --------
+    >>> chart = saltus.stability_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4)
+    >>> _, borders = saltus.studies.with_borders(system, chart)
+    >>> len(borders.curves)  # no border passes between these cells
+    0
     """
     check_system(system, "the borders of a chart", coordinates=1)
     check_count("curves", curves, 0)

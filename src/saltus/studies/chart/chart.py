@@ -59,28 +59,44 @@ def stability_chart(
     is followed to where its stability ends, even where next to nothing leads to it. Deformed equilibria, under no horizontal
     load, are motions too. docs/charts.md lists the variables of the result.
 
-    Args:
-        system: what moves, under a load with a frequency.
-        horizontal, vertical: the values along the two axes, by default 101 from 0 to 0.5 and from -2 to 0.
-        paths: the dotted paths of the parameters along them.
-        max_period: the longest period of a motion, in forcing periods; what repeats later counts as unsettled.
-        starts, window, seed: initial states, as `search_orbits` takes them.
-        least: the smallest amplitude that counts: below Hcr small motions of 6, 10, 14, ... impacts accumulate towards rest.
-        periods: forcing periods after which a motion that has not settled counts as unsettled; by default what the damping takes.
-        tol: the error of a step; with larger ones than 1e-10 motions beside an equilibrium do not come to a halt.
-        rows: how many rows are one chunk, within which neighbours know of one another.
-        store, workers, scheduler, progress: where the chunks are kept and who computes them, see `saltus.sweep.run`.
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    horizontal, vertical
+        The values along the two axes, by default 101 from 0 to 0.5 and from -2 to 0.
+    paths
+        The dotted paths of the parameters along them.
+    max_period
+        The longest period of a motion, in forcing periods; what repeats later counts as unsettled.
+    starts, window, seed
+        Initial states, as `search_orbits` takes them.
+    least
+        The smallest amplitude that counts: below Hcr small motions of 6, 10, 14, ... impacts accumulate towards rest.
+    periods
+        Forcing periods after which a motion that has not settled counts as unsettled; by default what the damping takes.
+    tol
+        The error of a step; with larger ones than 1e-10 motions beside an equilibrium do not come to a halt.
+    rows
+        How many rows are one chunk, within which neighbours know of one another.
+    store, workers, scheduler, progress
+        Where the chunks are kept and who computes them, see `saltus.sweep.run`.
 
-    Returns:
+    Returns
+    -------
+    xarray.Dataset
         A Dataset over (vertical, horizontal), and for the up to 8 largest motions of each cell over `motion`.
 
-    Raises:
-        ParameterError: an argument without meaning, or one that the system refuses.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning, or one that the system refuses.
 
-    Examples:
-        >>> chart = saltus.stability_chart(system, horizontal=[0.0, 0.2], vertical=[-0.5], starts=4)
-        >>> chart["count"].values  # without a horizontal load there is rest alone
-        array([[0, 1]], dtype=int16)
+    Examples
+    --------
+    >>> chart = saltus.stability_chart(system, horizontal=[0.0, 0.2], vertical=[-0.5], starts=4)
+    >>> chart["count"].values  # without a horizontal load there is rest alone
+    array([[0, 1]], dtype=int16)
     """
     from saltus.sweep import run
 
@@ -107,23 +123,35 @@ def _check_bordered(system: System, curves: int, progress: object, **options: An
 def bordered_chart(system: System, *, curves: int = 12, progress: Progress = silent, **options: Any) -> xarray.DataTree:
     """`stability_chart` with what bounds its motions (Figs. 14, 15).
 
-    Args:
-        system: what moves, under a load with a frequency.
-        curves: how many curves on which motions end are followed at most, see `with_borders`.
-        progress: called with the fraction done and what is being done, first when all arguments have been checked.
-        options: those of `stability_chart`.
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    curves
+        How many curves on which motions end are followed at most, see `with_borders`.
+    progress
+        Called with the fraction done and what is being done, first when all arguments have been checked.
+    options
+        Those of `stability_chart`.
 
-    Returns:
+    Returns
+    -------
+    xarray.DataTree
         A DataTree of the groups `chart`, `borders` (see `Borders.to_xarray`), `disagreements` and, where theory knows it,
         `static`, the quasi-static border (see `saltus.theory.quasi_static_border`).
 
-    Raises:
-        ParameterError, SweepError: as `stability_chart`.
+    Raises
+    ------
+    ParameterError
+        As `stability_chart`.
+    SweepError
+        As `stability_chart`.
 
-    Examples:
-        >>> made = saltus.studies.bordered_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4, curves=0)
-        >>> sorted(made.children)
-        ['borders', 'chart', 'disagreements', 'static']
+    Examples
+    --------
+    >>> made = saltus.studies.bordered_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4, curves=0)
+    >>> sorted(made.children)
+    ['borders', 'chart', 'disagreements', 'static']
     """
     import xarray as xr
 

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     """Where chart and curves do not agree, away from the cells through which the curves run.
 
-    Returns:
+    Returns
+    -------
+    xarray.Dataset
         A Dataset with the changes along `change` of which it is not known what becomes of the motion, nor any curve explains
         them: `horizontal` and `vertical` halfway between the cells, `amplitude` and `period` of the motion that ends, `cells` of
         its family, whether the neighbour has rest alone, `beside_rest`; and along `unseen` the places on the curves of folds
@@ -35,11 +37,12 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
         `chaos_beside_rest` counts pairs of neighbouring cells, one with rest alone and one with chaos alone, between which no
         motion ends but chaos.
 
-    Examples:
-        >>> chart = saltus.stability_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4)
-        >>> chart, borders = saltus.studies.with_borders(system, chart)
-        >>> saltus.studies.disagreements(chart, borders).attrs["located"]
-        0
+    Examples
+    --------
+    >>> chart = saltus.stability_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4)
+    >>> chart, borders = saltus.studies.with_borders(system, chart)
+    >>> saltus.studies.disagreements(chart, borders).attrs["located"]
+    0
     """
     import xarray as xr
 

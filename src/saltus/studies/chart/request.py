@@ -54,8 +54,10 @@ DURATION = DurationSettings()
 class ChartRequest:
     """The arguments of `stability_chart` that decide what is computed.
 
-    Raises:
-        ParameterError: an argument without meaning, or one that the system refuses.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning, or one that the system refuses.
     """
 
     system: System
@@ -121,8 +123,10 @@ class ChartRequest:
     def from_arguments(cls, arguments: Mapping[str, Any], block: Mapping[str, Any]) -> ChartRequest:
         """The request for a block of the plane, with these values along its axes.
 
-        Raises:
-            ParameterError: arguments that were made where the system has other equations, or saltus another version.
+        Raises
+        ------
+        ParameterError
+            Arguments that were made where the system has other equations, or saltus another version.
         """
         system, paths = System.from_json(arguments["system"]), tuple(arguments["paths"])
         check_provenance(arguments, system, "this chart")

@@ -29,21 +29,29 @@ def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed
     """How many cells of a sample are wrong: cells at random are computed again with four times the starts, other ones, and beside
     eight more cells about each, half as far away as its neighbours, so that motions which begin there are found.
 
-    Args:
-        system: that of the chart.
-        chart: as `stability_chart` or `with_borders` returns it.
-        cells: how many cells the sample has; all of the chart's if it has no more.
-        seed: of the sample and of the starts.
+    Parameters
+    ----------
+    system
+        That of the chart.
+    chart
+        As `stability_chart` or `with_borders` returns it.
+    cells
+        How many cells the sample has; all of the chart's if it has no more.
+    seed
+        Of the sample and of the starts.
 
-    Returns:
+    Returns
+    -------
+    dict[str, float]
         `checked_cells`; of these `wrong_cells`, which are `wrong_rest`, where the chart has rest alone and there is something
         else, `wrong_motions`, where it lacks a stable motion, or `wrong_chaos`, where it has chaos and the sample none or the
         other way round; and the `wrong_share` of the wrong ones with its 95 % interval, `wrong_share_low` to `wrong_share_high`.
 
-    Examples:
-        >>> chart = saltus.stability_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4)
-        >>> saltus.studies.wrong_cells(system, chart, cells=4)["wrong_share"]
-        0.0
+    Examples
+    --------
+    >>> chart = saltus.stability_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4)
+    >>> saltus.studies.wrong_cells(system, chart, cells=4)["wrong_share"]
+    0.0
     """
     check_count("cells", cells, 1)
     check_count("seed", seed, 0)

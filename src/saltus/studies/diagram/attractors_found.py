@@ -99,10 +99,14 @@ class AttractorsFound:
     def seeds(self, grid: np.ndarray, known: np.ndarray, since: int) -> tuple[np.ndarray, np.ndarray]:
         """Further starts, values (n,) and states (n, d): attractors, at neighbours of their value that have none alike.
 
-        Args:
-            grid: the values whose neighbours are meant.
-            known: attractors that need no simulation, as records of a chart whose cells are the values of the grid.
-            since: only attractors that were first found by the motion of this row, or later.
+        Parameters
+        ----------
+        grid
+            The values whose neighbours are meant.
+        known
+            Attractors that need no simulation, as records of a chart whose cells are the values of the grid.
+        since
+            Only attractors that were first found by the motion of this row, or later.
         """
         rows = self.rows[np.isin(self.motions.value[self.rows], grid)]
         mine = as_chart_motions(self.motions.only(rows))

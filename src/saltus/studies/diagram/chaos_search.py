@@ -68,21 +68,31 @@ def chaotic_bands(
     narrower than a thousandth of the range are seen by chance only; attractors whose basins hold no start, and that end before
     the next value, are not.
 
-    Args:
-        system: what moves, under a load with a frequency.
-        path, bounds: dotted path of the parameter, and its range.
-        count: of values, evenly from the first bound to the last, at least 2.
-        starts, window, seed: initial states, as `search_orbits` takes them.
-        special: special points of branches, beside which more is looked for.
-        progress: called with the fraction done.
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    path, bounds
+        Dotted path of the parameter, and its range.
+    count
+        Of values, evenly from the first bound to the last, at least 2.
+    starts, window, seed
+        Initial states, as `search_orbits` takes them.
+    special
+        Special points of branches, beside which more is looked for.
+    progress
+        Called with the fraction done.
 
-    Raises:
-        ParameterError: an argument without meaning.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning.
 
-    Examples:
-        >>> bands = saltus.chaotic_bands(system, "load.frequency", (0.98, 1.0), count=3)
-        >>> len(bands.bands)
-        0
+    Examples
+    --------
+    >>> bands = saltus.chaotic_bands(system, "load.frequency", (0.98, 1.0), count=3)
+    >>> len(bands.bands)
+    0
     """
     values, area = np.linspace(*bounds, count), check_window(window, system)
     states = starts_at(system, values, starts, area, seed).reshape(-1, system.dimension)

@@ -99,28 +99,43 @@ def bifurcation_diagram(
     every PD and BPC, are followed besides, those of more than one forcing period beyond the bounds, to where they close or end.
     Every orbit is confirmed by the event-driven flow over a period, stable ones over 20.
 
-    Args:
-        system: what moves.
-        path, bounds, effort: dotted path of the parameter, its range, and how much is tried, see `Effort`.
-        max_period: the longest period, in forcing periods, that is followed.
-        values: where is simulated, by default evenly, as many as the effort says. If given, what is random is not followed.
-        starts, window, seed: how many initial states at each value, by default as the effort says, where, and their seed.
-        repelling, switch: up to which period repelling orbits are searched for; whether what is born at special points is.
-        step, bands: the longest step along a branch; whether chaos is looked for.
-        store: where all that takes long is kept, so that a search that was stopped, or one of more values or starts, goes on.
-        workers, scheduler, progress: who computes it, and what is told of it, see `saltus.sweep.run`.
+    Parameters
+    ----------
+    system
+        What moves.
+    path, bounds, effort
+        Dotted path of the parameter, its range, and how much is tried, see `Effort`.
+    max_period
+        The longest period, in forcing periods, that is followed.
+    values
+        Where is simulated, by default evenly, as many as the effort says. If given, what is random is not followed.
+    starts, window, seed
+        How many initial states at each value, by default as the effort says, where, and their seed.
+    repelling, switch
+        Up to which period repelling orbits are searched for; whether what is born at special points is.
+    step, bands
+        The longest step along a branch; whether chaos is looked for.
+    store
+        Where all that takes long is kept, so that a search that was stopped, or one of more values or starts, goes on.
+    workers, scheduler, progress
+        Who computes it, and what is told of it, see `saltus.sweep.run`.
 
-    Returns:
+    Returns
+    -------
+    xarray.DataTree
         A DataTree: the branches in `branches`, `points`, `special` and `orbits` (`branch_of` gives one), `attractors`,
         `unplaced`, `bands`, `exponents`, `stroboscopic` and `search`; docs/orbits.md lists their variables and attributes.
 
-    Raises:
-        ParameterError: an argument without meaning; SweepError: as `saltus.sweep.run`.
+    Raises
+    ------
+    ParameterError
+        An argument without meaning; SweepError: as `saltus.sweep.run`.
 
-    Examples:
-        >>> diagram = saltus.bifurcation_diagram(system, bounds=(0.45, 0.55), max_period=1, values=[0.5], starts=4, bands=False)
-        >>> sorted(diagram.children)
-        ['attractors', 'bands', 'branches', 'orbits', 'points', 'search', 'special', 'unplaced']
+    Examples
+    --------
+    >>> diagram = saltus.bifurcation_diagram(system, bounds=(0.45, 0.55), max_period=1, values=[0.5], starts=4, bands=False)
+    >>> sorted(diagram.children)
+    ['attractors', 'bands', 'branches', 'orbits', 'points', 'search', 'special', 'unplaced']
     """
     low, high = check_bounds(bounds)
     tried = EFFORTS[read_effort(effort)]
@@ -158,11 +173,12 @@ def response_spectrum(
 ) -> xarray.DataTree:
     """`bifurcation_diagram` along the forcing frequency, with the same options (the paper's Figs. 9 and 10).
 
-    Examples:
-        >>> spectrum = saltus.response_spectrum(system, bounds=(0.8, 1.0), max_period=1, values=[0.9], starts=4, bands=False)
-        >>> first = saltus.branch_of(spectrum, 0)
-        >>> first.special_parameter.values[first.kind.values == "LP"].round(6)
-        array([0.908811, 0.848485])
+    Examples
+    --------
+    >>> spectrum = saltus.response_spectrum(system, bounds=(0.8, 1.0), max_period=1, values=[0.9], starts=4, bands=False)
+    >>> first = saltus.branch_of(spectrum, 0)
+    >>> first.special_parameter.values[first.kind.values == "LP"].round(6)
+    array([0.908811, 0.848485])
     """
     return bifurcation_diagram(system, path, bounds, **options)
 

@@ -167,8 +167,12 @@ def diagram_work(
 ) -> Iterator[DiagramWork]:
     """The work of a diagram, remembered in a store if one is given, and computed by other processes or by a cluster.
 
-    Raises:
-        ParameterError, SweepError: as `saltus.sweep.run`.
+    Raises
+    ------
+    ParameterError
+        As `saltus.sweep.run`.
+    SweepError
+        As `saltus.sweep.run`.
     """
     from saltus.sweep import Parts, SweepInterrupted, Workers, opened
 

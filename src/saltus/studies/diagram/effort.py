@@ -67,8 +67,10 @@ EFFORTS = {
 def read_effort(effort: Any) -> Effort:
     """The effort of this name.
 
-    Raises:
-        ParameterError: there is none.
+    Raises
+    ------
+    ParameterError
+        There is none.
     """
     try:
         return Effort(effort)

@@ -139,10 +139,14 @@ def stable_motions(branches: list[PlacedBranch], grid: np.ndarray, dimension: in
 def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bool) -> np.ndarray:
     """Which of the motions that repeat themselves lie on a stable part of one of the branches, (n,).
 
-    Args:
-        motions: what is looked for.
-        branches: where.
-        mirrored: whether mirror images count as one.
+    Parameters
+    ----------
+    motions
+        What is looked for.
+    branches
+        Where.
+    mirrored
+        Whether mirror images count as one.
     """
     result = np.zeros(len(motions), dtype=bool)
     for branch in branches:
