@@ -117,7 +117,7 @@ def _place_of_change(branch: Any, quantity: str, cut: int, kinds: tuple[str, ...
     known = np.isin(branch["kind"].values, kinds)
     places = np.stack([branch[f"special_{name}"].values[known] for name in names], axis=1)
     if not len(places):
-        return middle
+        return np.asarray(middle)
     detour = np.linalg.norm((places - a) / size, axis=1) + np.linalg.norm((places - b) / size, axis=1)
     best = int(detour.argmin())
     near = detour[best] < 3 * np.linalg.norm((b - a) / size) + 1e-3

@@ -298,7 +298,7 @@ class Window(Box):
     @property
     def centre(self) -> np.ndarray:
         """Its middle, (d,) for d state variables."""
-        return np.asarray(self).mean(axis=1)
+        return np.asarray(np.asarray(self).mean(axis=1))
 
     @property
     def half(self) -> np.ndarray:

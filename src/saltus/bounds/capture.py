@@ -199,7 +199,7 @@ class _Law:
             speed = self._proved(always, np.zeros((1, n)), np.full((1, n), CLIMB.widest))
             if self.by_speed:  # the factors of the slowest impacts, then those of all that are slower than what they give
                 speed = self._proved(always, speed, speed)
-        return speed[0]
+        return np.asarray(speed[0])
 
     def _time(self, leaves: Leaves, cells: int) -> Interval:
         """The forcing period in cells, (cells, n); all time if there is none."""

@@ -28,7 +28,7 @@ class Leaves:
 
     def __call__(self, node: Expr) -> Interval:
         if node.op in ("parameter", "record"):
-            return getattr(self, node.op + "s")[node.value]
+            return (self.parameters if node.op == "parameter" else self.records)[int(node.value)]
         return {"time": self.time, "coordinate": self.opening, "velocity": self.speed, "stretch": self.stretch}[node.op]
 
     def only(self, chosen: np.ndarray) -> Leaves:

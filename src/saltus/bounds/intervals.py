@@ -54,13 +54,13 @@ class Interval:
         return Interval(-self.hi, -self.lo)
 
     def __radd__(self, other: Any) -> Interval:
-        return self + other
+        return self.__add__(other)
 
     def __rsub__(self, other: Any) -> Interval:
-        return as_interval(other) - self
+        return as_interval(other).__sub__(self)
 
     def __rmul__(self, other: Any) -> Interval:
-        return self * other
+        return self.__mul__(other)
 
     def inverse(self) -> Interval:
         """1 / x; NaN where x may be 0."""

@@ -71,7 +71,7 @@ class Continuation:
             if self.end is None and len(self.points) > self.steps.most_points:
                 self.end = End(CurveEnd.MOST_POINTS, ahead.parameter, detail=str(self.steps.most_points))
 
-    def course(self, start: End) -> Course:
+    def course(self, start: End) -> Course[Any, Any]:
         """The curve as it was followed, which began with an end for a reason of its own."""
         assert self.end is not None
         return Course(tuple(self.points), tuple(self.special), (start, self.end), tuple(self.missed))
@@ -209,7 +209,7 @@ class Continuation:
 
 def both_ways(
     first: Any, events: Callable[[], Events], bounds: Bounds, steps: StepSettings = STEPS, progress: Progress = silent
-) -> Course:
+) -> Course[Any, Any]:
     """The curve through a point, followed against its tangent and then along it, or once if it closes."""
     watch: Watch = Watch(progress, bounds, steps.most_points)
     halves = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -15,14 +15,17 @@ from saltus.continuation.solved_between import solved_between
 from saltus.continuation.step_length import STEPS
 from saltus.public_functions import answering
 
+Point = TypeVar("Point", bound=Any)
+Special = TypeVar("Special")
+
 
 @answering("is_joined", "solved_at", "solved_between")
 @dataclass(frozen=True, eq=False)
-class Course:
+class Course(Generic[Point, Special]):
     """A curve as it was followed: its points in order, the special ones, the reasons for both ends."""
 
-    points: tuple[Any, ...]
-    special: tuple[Any, ...]
+    points: tuple[Point, ...]
+    special: tuple[Special, ...]
     ends: tuple[End, End]
     missed: tuple[Missed, ...]  # what is between neighbouring points and was not located
 
@@ -49,7 +52,7 @@ class Course:
         closing = self.closed and before == len(self.points) - 2 and a.place.size == b.place.size
         return bool(closing and a.curve.norm(b.place - a.place) <= 2.0 * STEPS.longest)
 
-    def solved_at(self, value: float, index: int = -1) -> list[Any]:
+    def solved_at(self, value: float, index: int = -1) -> list[Point]:
         """All its points at a value of one number of their places, solved there, in order."""
         found = [point for i in self._around(value, index) for point in self.solved_between(i, value, index)]
         return found + [point for point in self.points[-1:] if point.place[index] == value]
@@ -64,7 +67,7 @@ class Course:
     def _last(self) -> tuple[np.ndarray, np.ndarray]:
         return _numbers(self.points, -1)
 
-    def solved_between(self, before: int, value: float, index: int = -1) -> list[Any]:
+    def solved_between(self, before: int, value: float, index: int = -1) -> list[Point]:
         """The points at a value of one number of the places, from the point of this number up to before the next."""
         check_count("before", before, 0, len(self.points) - 2)
         a, b = self.points[before], self.points[before + 1]

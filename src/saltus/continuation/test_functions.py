@@ -68,7 +68,8 @@ def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero 
         known.sort(key=lambda place: place.share)
     best = min(known, key=lambda place: abs(place.value))
     evidence = Evidence(best.point.residual, _brackets(best.point, before, known), before, after, best.value)
-    return best.point.zero_type(test.kind, best.point, evidence)
+    zero: Zero = best.point.zero_type(test.kind, best.point, evidence)
+    return zero
 
 
 def _bracket(known: list[KnownPlace], before: float) -> int:

@@ -80,7 +80,7 @@ def _maps(steps: np.ndarray, length: np.ndarray) -> np.ndarray:
     both = np.einsum("nij,njk->nik", np.stack([two, three], axis=2), inverse) / area[:, None, None]
     single = np.einsum("ni,nj->nij", three, two) / (length[:, 1] ** 2)[:, None, None]
     parallel = np.abs(area) <= SETTINGS.parallel * length[:, 0] * length[:, 1]
-    return np.where(parallel[:, None, None], single, both)
+    return np.asarray(np.where(parallel[:, None, None], single, both))
 
 
 def _det(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -92,4 +92,4 @@ def _radius(m: np.ndarray) -> np.ndarray:
     """The largest absolute values of the eigenvalues of matrices (n, 2, 2)."""
     half, det = 0.5 * (m[:, 0, 0] + m[:, 1, 1]), _det(m[:, :, 0], m[:, :, 1])
     spread = half**2 - det
-    return np.where(spread >= 0.0, np.abs(half) + np.sqrt(np.maximum(spread, 0.0)), np.sqrt(np.maximum(det, 0.0)))
+    return np.asarray(np.where(spread >= 0.0, np.abs(half) + np.sqrt(np.maximum(spread, 0.0)), np.sqrt(np.maximum(det, 0.0))))

@@ -156,7 +156,7 @@ def _end_shift(followed: Followed, paths: tuple[str, ...], periods: float | None
     """How the time at the end moves with each column: with a margin that ends the motion, or with the forcing period."""
     motion, shift = followed.motion, np.zeros(followed.columns.shape[1])
     if motion.stop is Stop.LIMIT:
-        return followed.shifts[-1]
+        return np.asarray(followed.shifts[-1])
     if periods is not None and FREQUENCY in paths:
         frequency = motion.system.load.frequency
         assert frequency is not None

@@ -134,7 +134,7 @@ def _sign_change(
             inside, like_low = (x >= low) & (x <= high), (at_x < 0) == (at_low < 0)
             low, at_low = np.where(inside & like_low, x, low), np.where(inside & like_low, at_x, at_low)
             high, at_high = np.where(inside & ~like_low, x, high), np.where(inside & ~like_low, at_x, at_high)
-    return root
+    return np.asarray(root)
 
 
 def _grid(dense: DenseOutput, moving: np.ndarray) -> list[np.ndarray]:

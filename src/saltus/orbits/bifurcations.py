@@ -96,7 +96,7 @@ def touching(point: OrbitPoint) -> float:
     """How far an orbit is from touching a contact that is no singularity; its sign turns with each pair of passages more."""
     orbit, looks = point.orbit, point.equations.looks
     pairs = int(looks[:, at.CROSSINGS].sum()) // 2
-    return (-1) ** pairs * min(NEAREST, orbit.clearance, orbit.shallowest)
+    return float((-1) ** pairs * min(NEAREST, orbit.clearance, orbit.shallowest))
 
 
 ROUNDING = 1e-12  # by which a product of multipliers may differ from 1 where nothing is lost

@@ -12,18 +12,21 @@ from saltus.checks import check_number
 from saltus.continuation import Course, End
 from saltus.notebook import html_table
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.special_point import OrbitEnd
+from saltus.orbits.orbit_curve import OrbitPoint
+from saltus.orbits.resting_family import RestingPoint
+from saltus.orbits.special_point import OrbitEnd, SpecialPoint
 from saltus.public_functions import answering
 
 if TYPE_CHECKING:
     import xarray
+
 
 START = End(OrbitEnd.START)
 
 
 @answering("at")
 @dataclass(frozen=True, eq=False)
-class Branch(Course):
+class Branch(Course[OrbitPoint | RestingPoint, SpecialPoint]):
     """A branch: its points in order, the special ones among them, and why it ends on both sides.
 
     A family of resting orbits is a branch as well: `special` then holds grazings (GR), the zeros of margins and functions, and

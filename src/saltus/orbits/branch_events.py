@@ -165,7 +165,9 @@ def _accumulate(run: Run, following: OrbitPoint) -> bool:
         return False
     span = float(np.ptp([point.parameter for point in grazings]))
     small = following.orbit.amplitude < SETTINGS.shrunk * max(point.orbit.amplitude for point in run.points)
-    return span < SETTINGS.accumulation_width * following.curve.scales[0] or (small and counts[-1] > SETTINGS.shrunk_impacts)
+    return bool(
+        span < SETTINGS.accumulation_width * following.curve.scales[0] or (small and counts[-1] > SETTINGS.shrunk_impacts)
+    )
 
 
 def _same_place(a: Zero, b: Zero) -> bool:

@@ -154,7 +154,7 @@ class Problem:
     @property
     def margins(self) -> tuple[str, ...]:
         """The model's margins, in the order of `looks`."""
-        return self._run.limits
+        return tuple(self._run.limits)
 
     @cached_property
     def closing(self) -> float:

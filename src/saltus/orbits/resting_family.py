@@ -124,7 +124,7 @@ def _followed(orbit: RestingOrbit, path: str, value: float, index: int = 0) -> R
     assert frequency is not None
 
     def apart(release: Release) -> float:
-        return abs((release.time * frequency - phase + math.pi) % (2.0 * math.pi) - math.pi)
+        return float(abs((release.time * frequency - phase + math.pi) % (2.0 * math.pi) - math.pi))
 
     nearest = min((release for release in load_releases(system) if release.side == side), key=apart, default=None)
     if nearest is None or apart(nearest) > SETTINGS.most_change:

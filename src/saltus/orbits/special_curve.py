@@ -14,6 +14,7 @@ from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitCurve, OrbitPoint
 from saltus.orbits.problem import Equations
+from saltus.orbits.special_point import SpecialPoint
 from saltus.provenance import provenance
 from saltus.public_functions import answering
 
@@ -92,7 +93,7 @@ class ConditionedCurve(OrbitCurve):
 
 @answering("at")
 @dataclass(frozen=True, eq=False)
-class SpecialCurve(Course):
+class SpecialCurve(Course[SpecialCurvePoint, SpecialPoint]):
     """A curve of special points in two parameters: its points in order, its codimension-two points, and why it ends.
 
     Examples

@@ -163,7 +163,7 @@ def _start(special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[flo
     if known is None:
         raise ParameterError(f"the motion beside this {special.kind} cannot be followed, so its curve cannot; choose another")
     first = curve.along_kernel(known)
-    exact = curve.solve(first.place, first.tangent)
+    exact: SpecialCurvePoint | None = curve.solve(first.place, first.tangent)
     if exact is None:
         raise ParameterError(
             f"Newton's method does not find this {special.kind} again; locate it on its branch with a smaller step"

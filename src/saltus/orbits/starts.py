@@ -63,7 +63,7 @@ def is_still(system: System, highest: np.ndarray, lowest: np.ndarray, within: fl
     """Whether motions with these extrema stay within a distance of one place of contact, or of 0 without one."""
     model = system.model
     places = [float(contact.position) for contact in model.contacts] or [float(model.contact) if model.sides else 0.0]
-    return np.any([np.maximum(np.abs(highest - place), np.abs(lowest - place)) <= within for place in places], axis=0)
+    return np.asarray(np.any([np.maximum(np.abs(highest - place), np.abs(lowest - place)) <= within for place in places], axis=0))
 
 
 def on_this_side(system: System, states: np.ndarray) -> np.ndarray:

@@ -82,6 +82,6 @@ def arc(
 def cell_edges(middles: np.ndarray) -> np.ndarray:
     """The edges of cells about their middles, (n + 1,), halfway between them."""
     if len(middles) == 1:
-        return middles[0] + np.array([-0.5, 0.5])
+        return np.asarray(middles[0] + np.array([-0.5, 0.5]))
     inner = (middles[1:] + middles[:-1]) / 2
     return np.concatenate([[2 * middles[0] - inner[0]], inner, [2 * middles[-1] - inner[-1]]])

@@ -55,7 +55,7 @@ def _hidden(data: Any) -> np.ndarray:
             floor = float(data["equilibrium_energy"][i]) + (PORTRAIT.eye if points[i] else PORTRAIT.core)
             hidden |= (theta > low) & (theta < high) & (energy < floor)
     decays = np.nanmax(energy, axis=1) - np.nanmin(energy, axis=1) > 1e-9
-    return hidden & decays[:, None]
+    return np.asarray(hidden & decays[:, None])
 
 
 def _first_return(x: np.ndarray, y: np.ndarray) -> int:

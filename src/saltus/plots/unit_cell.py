@@ -157,7 +157,7 @@ def _misalignments(ax: Any, points: Any, alpha: Any, phi: Any) -> None:
 
 def _partner(cell: Any, name: str) -> str:
     """The hinge at the other end of the half diagonal that ends at the slider point `name`."""
-    return next(a if b == name else b for a, b in cell["bar"].values.tolist() if name in (a, b))
+    return str(next(a if b == name else b for a, b in cell["bar"].values.tolist() if name in (a, b)))
 
 
 def _slider(ax: Any, first: np.ndarray, last: np.ndarray, hinge: np.ndarray) -> None:

@@ -67,9 +67,10 @@ def resolve(function: str) -> Callable[[Any, dict[str, np.ndarray]], Mapping[str
         raise ParameterError(f"function {function!r}: the module {module!r} cannot be imported ({error})") from error
     if not hasattr(found, name):
         raise ParameterError(f"function {function!r}: {module!r} has no {name!r}; {near(name, vars(found))}")
-    if not callable(getattr(found, name)):
-        raise ParameterError(f"function {function!r} is of type {type(getattr(found, name)).__name__}, not a function")
-    return getattr(found, name)
+    computes: Callable[[Any, dict[str, np.ndarray]], Mapping[str, Any]] = getattr(found, name)
+    if not callable(computes):
+        raise ParameterError(f"function {function!r} is of type {type(computes).__name__}, not a function")
+    return computes
 
 
 def attempt(function: str, arguments: Mapping[str, Any], block: dict[str, np.ndarray]) -> Any:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError, SweepError
+from saltus.files import write_durably
 from saltus.public_functions import answered
 from saltus.sweep import store_files as files
 from saltus.sweep.chunk_grid import Index
@@ -98,7 +99,7 @@ class Store:
         file = self.path / files.FAILURES
         with contextlib.suppress(OSError):  # a full disk is told where a chunk is written
             if entries:
-                files.write_durably(file, json.dumps(entries).encode())
+                write_durably(file, json.dumps(entries).encode())
             else:
                 file.unlink(missing_ok=True)
 
@@ -220,7 +221,7 @@ def _restore(plan: Plan, path: Path) -> None:
     for name, content in _restorable(plan, path).items():
         log.warning("%s is damaged; it is written again", path / name)
         try:
-            files.write_durably(path / name, content)
+            write_durably(path / name, content)
         except OSError as error:
             raise SweepError(f"{path / name} is damaged and cannot be written again ({reason(error)})") from error
 
@@ -279,7 +280,8 @@ def _dataset(store: Any) -> xarray.Dataset:
     import xarray
 
     # Nothing is decoded: a variable in seconds is no time difference, and a fill value is a value.
-    return xarray.open_zarr(store, chunks=None, consolidated=True, zarr_format=3, decode_cf=False)
+    dataset: xarray.Dataset = xarray.open_zarr(store, chunks=None, consolidated=True, zarr_format=3, decode_cf=False)
+    return dataset
 
 
 def _create(plan: Plan, path: Path) -> None:
@@ -330,4 +332,4 @@ def _sort(metadata: Path) -> None:
     """Give the arrays' metadata an order: Zarr before 3.1.3 takes them as the disk lists them, which is another each time."""
     group = json.loads(metadata.read_text(encoding="utf-8"))
     group["consolidated_metadata"]["metadata"] = dict(sorted(group["consolidated_metadata"]["metadata"].items()))
-    files.write_durably(metadata, json.dumps(group, indent=2).encode())
+    write_durably(metadata, json.dumps(group, indent=2).encode())

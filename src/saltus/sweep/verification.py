@@ -45,7 +45,7 @@ def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, 
 
 def _row_size(array: Any, rows: slice) -> float:
     """The bytes of some rows, by what the array says of itself."""
-    return float(rows.stop - rows.start) * math.prod(map(float, array.shape[1:])) * array.dtype.itemsize
+    return float(float(rows.stop - rows.start) * math.prod(map(float, array.shape[1:])) * array.dtype.itemsize)
 
 
 def _can_be_read(array: Any, cut: tuple[slice, ...]) -> bool:

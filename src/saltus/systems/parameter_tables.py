@@ -58,7 +58,7 @@ def _chosen(rows: np.ndarray) -> Iterable[int]:
     if len(rows) <= MOST_CHECKED:
         return range(len(rows))
     even = np.linspace(0, len(rows) - 1, MOST_CHECKED).astype(int)
-    return np.unique(np.concatenate([rows.argmin(axis=0), rows.argmax(axis=0), even])).tolist()
+    return map(int, np.unique(np.concatenate([rows.argmin(axis=0), rows.argmax(axis=0), even])))
 
 
 def finite_array(name: str, given: Any) -> Any:

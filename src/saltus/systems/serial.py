@@ -49,7 +49,7 @@ def from_dict(kind: str, data: Any) -> Any:
     return build(find(kind, name), fields, kind)
 
 
-def read_signal(data: Any, where: str) -> Signal | float:
+def read_signal(data: Any, where: str) -> Any:
     """A number, a table of a `Harmonic`, a `Record` or (with its `type`) a pulse, or a list of them (their sum)."""
     if isinstance(data, (list, tuple)):
         if not data:

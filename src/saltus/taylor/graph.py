@@ -248,7 +248,7 @@ def _apply(name: str, inputs: tuple[Any, ...]) -> Expr:
     if name == "positive":
         return as_expr(inputs[0])
     if name == "square":
-        return as_expr(inputs[0]) * inputs[0]
+        return as_expr(inputs[0]) * as_expr(inputs[0])
     if name == "pow":
         return power(*inputs)
     if name == "tan":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from saltus.taylor.graph import LEAVES
@@ -10,7 +11,7 @@ from saltus.taylor.rules import FUNCTIONS
 from saltus.taylor.tapes import Tape
 from saltus.taylor.vectors import Vec, add, multiply, subtract
 
-ARITHMETIC = {"add": add, "sub": subtract, "mul": multiply, "div": lambda a, b: a / b}
+ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {"add": add, "sub": subtract, "mul": multiply, "div": lambda a, b: a / b}
 SIGNS = {"greater": ">", "less": "<", "greater_equal": ">=", "less_equal": "<="}
 MIRRORED = str.maketrans("<>", "><")
 

@@ -71,7 +71,7 @@ class Memory:
             return float(index[0])
         if op == "record":
             coefficients, since = self._piece(index[0]), self._since()
-            value = coefficients[-1]
+            value: Vec = coefficients[-1]
             for coefficient in coefficients[-2::-1]:
                 value = value * since + coefficient
             return value

@@ -262,7 +262,7 @@ def register_type(kind: type, llvm: Any) -> None:
 
     class Model(models.PrimitiveModel):
         def __init__(self, manager: Any, each: Any) -> None:
-            super().__init__(manager, each, llvm)
+            super().__init__(manager, each, llvm)  # type: ignore[no-untyped-call]
 
     register_model(kind)(Model)
 

@@ -22,7 +22,8 @@ from saltus.taylor.vectors import add, multiply, subtract
 
 if TYPE_CHECKING:
     from saltus.taylor.series import Series
-    from saltus.taylor.sums import Coefficient, Row
+    from saltus.taylor.sums import Row
+    from saltus.taylor.vectors import Coefficient
 
 Rule = Callable[..., None]  # of the writer, the node's own series, which lacks the coefficient of this order, and its operands'
 

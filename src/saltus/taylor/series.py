@@ -20,9 +20,9 @@ from saltus.taylor.graph import LEAVES, RECORD_WIDTH, degree
 from saltus.taylor.memory import Memory, Place
 from saltus.taylor.private_numba import constant_table
 from saltus.taylor.rules import ARITHMETIC, FUNCTIONS, by_slope
-from saltus.taylor.sums import SETTINGS, Coefficient, InnerLoop, Row
+from saltus.taylor.sums import SETTINGS, InnerLoop, Row
 from saltus.taylor.tapes import Node, Tape
-from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Vec, add, dot, multiply, subtract
+from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Coefficient, Vec, add, dot, multiply, subtract
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,7 @@ class Series:
     def now(self, row: Row) -> Coefficient:
         """The coefficient of this order."""
         if self.ahead is None:
-            return row.first[self.order]
+            return row.first[int(self.order)]
         return row.pair[self.ahead] if row.degree is None else None
 
     def scaled(self, u: Row, newest: bool = True) -> Row:

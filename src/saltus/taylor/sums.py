@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from saltus.taylor.vectors import LONG, Vec
+from saltus.taylor.vectors import LONG, Coefficient, Vec
 
 if TYPE_CHECKING:
     from saltus.taylor.series import Series
-
-Coefficient = Vec | float | None  # None: zero
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 from llvmlite import binding, ir
 
@@ -188,6 +189,8 @@ class Vec:
         return self.builder.icmp_unsigned("!=", self.builder.and_(numbers, one), zero)
 
 
+Coefficient = Vec | float | None  # of a series; None: zero
+
 SINE = (
     -1.66666666666666324348e-01,
     8.33333333332248946124e-03,
@@ -213,22 +216,22 @@ def _polynomial(z: Vec, coefficients: tuple[float, ...]) -> Vec:
     return value
 
 
-def add(a: Any, b: Any) -> Any:
+def add(a: Coefficient, b: Coefficient) -> Coefficient:
     """a + b, where None is zero."""
     return b if a is None else a if b is None else a + b
 
 
-def subtract(a: Any, b: Any) -> Any:
+def subtract(a: Coefficient, b: Coefficient) -> Coefficient:
     """a - b, where None is zero."""
     return a if b is None else negative(b) if a is None else a - b
 
 
-def negative(a: Any) -> Any:
+def negative(a: Coefficient) -> Coefficient:
     """-a, where None is zero."""
     return None if a is None else -a
 
 
-def multiply(a: Any, b: Any) -> Any:
+def multiply(a: Coefficient, b: Coefficient) -> Coefficient:
     """a b, where None is zero and a factor of one costs nothing."""
     if a is None or b is None:
         return None
@@ -238,9 +241,10 @@ def multiply(a: Any, b: Any) -> Any:
     return a * b
 
 
-def dot(pairs: list[tuple[Any, Any]], start: Any = None) -> Any:
+def dot(pairs: Iterable[tuple[Coefficient, Coefficient]], start: Coefficient = None) -> Coefficient:
     """start + the sum of the products; None stands for zero."""
     for a, b in pairs:
         if a is not None and b is not None:
-            start = multiply(a, b) if start is None else (a.fma(b, start) if isinstance(a, Vec) else b.fma(a, start))
+            vector, factor = (a, b) if isinstance(a, Vec) else (b, a)
+            start = multiply(a, b) if start is None else cast(Vec, vector).fma(factor, start)  # two known numbers come first
     return start

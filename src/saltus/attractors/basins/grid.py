@@ -281,7 +281,7 @@ def _over(system: System, window: Window, place: int) -> np.ndarray:
     for contact in model.contacts:
         if place < len(model.coordinates) and contact.coordinate == model.coordinates[place]:
             values = values[np.asarray(contact.gap(values)) >= 0.0]
-    return values
+    return np.asarray(values)
 
 
 def _dataset(found: Attractors, grid: Grid, label: np.ndarray, time: np.ndarray, numbers: dict[str, Any]) -> xarray.Dataset:

@@ -47,7 +47,7 @@ class Level:
 
 def has_left(window: Window, points: np.ndarray) -> np.ndarray:
     """Which points have left a window for good, (n,)."""
-    return ~(np.abs(window.scaled(points)) <= SETTINGS.reach).all(axis=1)
+    return np.asarray(~(np.abs(window.scaled(points)) <= SETTINGS.reach).all(axis=1))
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ class Growth:
             bent[1:] |= turn
             bent &= length > SETTINGS.short * self.step
         crossing = ~near & long & _may_cross(scaled)
-        return ((near & (long | bent)) | crossing) & (np.diff(places) > SETTINGS.narrowest)
+        return np.asarray(((near & (long | bent)) | crossing) & (np.diff(places) > SETTINGS.narrowest))
 
 
 def _may_cross(scaled: np.ndarray) -> np.ndarray:
@@ -134,4 +134,4 @@ def _may_cross(scaled: np.ndarray) -> np.ndarray:
     beyond = np.stack([scaled[:, 0] > 1, scaled[:, 0] < -1, scaled[:, 1] > 1, scaled[:, 1] < -1], axis=1)
     same = (beyond[:-1] & beyond[1:]).any(axis=1)
     known = np.isfinite(scaled).all(axis=1)
-    return ~same & known[:-1] & known[1:]
+    return np.asarray(~same & known[:-1] & known[1:])

@@ -138,4 +138,4 @@ def _sampled(motion: Motion, begin: float, step: float) -> np.ndarray:
         rows.append(np.stack([impacts.time, np.where(np.isnan(values), np.nan, at), values]))
     joined = np.concatenate(rows, axis=1)
     joined = joined[:, np.argsort(joined[0], kind="stable")]
-    return joined + np.array([[begin], [0.0], [0.0]])
+    return np.asarray(joined + np.array([[begin], [0.0], [0.0]]))

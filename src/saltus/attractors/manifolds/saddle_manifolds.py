@@ -205,7 +205,7 @@ def _flow(system: System, backward: bool) -> Any:
         result = motions_from(system, states * sign, periods=periods, sample=(), tol=MANIFOLDS.tolerance)
         ends = sign * last_states(system, result)
         ends[result["periods"].values < periods] = np.nan
-        return ends
+        return np.asarray(ends)
 
     return flow
 

@@ -28,7 +28,7 @@ def stop_names(dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
     """
     check_dataset(dataset, "simulate_many", ("stop",))
     stop = dataset["stop"]
-    return np.array(stop.attrs["flag_meanings"].split())[stop.values]
+    return np.asarray(np.array(stop.attrs["flag_meanings"].split())[stop.values])
 
 
 @answered

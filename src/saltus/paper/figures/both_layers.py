@@ -16,6 +16,7 @@ from saltus.paper.figures import fig04, fig05
 from saltus.paper.figures.both_layers_panels import MEANINGS, draw
 from saltus.paper.figures.figure import paper_figure
 from saltus.paper.figures.harmonic_loads import AMPLITUDE, FREQUENCY, under_force
+from saltus.paper.figures.phase_portraits import constant_load
 from saltus.systems import NewtonImpact, System, TwoLayer
 
 # Of the full model: m, e of both layers, and the transfer g. With m = 0 and (e, g) = (0, 1) it has the paper's crossing.
@@ -159,7 +160,7 @@ def portraits() -> Any:
     """The motions of Figs. 4 and 5 with both layers: for how long the reduced motion is theirs, and what they do at the end."""
     rows = []
     cases = [("fig04", fig04.systems(), fig04.STARTS, fig04.DURATIONS)]
-    soft = {name: fig05.constant_load(stiffness=k) for name, k in fig05.STIFFNESS.items()}
+    soft = {name: constant_load(stiffness=k) for name, k in fig05.STIFFNESS.items()}
     cases.append(("fig05", soft, fig05.STARTS, dict.fromkeys(soft, fig05.MOTION_DURATION)))
     for figure, systems, starts, durations in cases:
         for panel, system in systems.items():
@@ -201,7 +202,7 @@ def stable_states() -> Any:
     """Where damped motions of both layers come to rest, Figs. 4 and 5: both closed, one of them open, both open."""
     found = []
     for stiffness in (1.0, 0.5, 1.1):
-        system = full(fig05.constant_load(stiffness=stiffness, damping=0.1), SETTINGS.portrait_mass, 0.0, 0.0)
+        system = full(constant_load(stiffness=stiffness, damping=0.1), SETTINGS.portrait_mass, 0.0, 0.0)
         for theta in ((0.02, -0.02), (1.3, 0.0), (0.0, -1.3), (1.3, -1.3)):
             state: dict[str, Any] = {"theta": theta, "velocity": (0.0, 0.0)}
             motion = simulate(system, **state, duration=SETTINGS.settle_time, dense=False)

@@ -173,7 +173,7 @@ def _extremes(data: Any) -> dict[str, Measured]:
 
 def _ratio(panel: Any) -> np.ndarray:
     ratio = panel["peak"].values / -THETA0
-    return np.minimum(ratio, 1 / ratio)
+    return np.asarray(np.minimum(ratio, 1 / ratio))
 
 
 FIGURE = paper_figure("fig06", compute=compute, draw=draw, measure=measure)

@@ -197,7 +197,7 @@ def _integrated(sharpness: float, rtol: float) -> tuple[int, float, float]:
         return [y[1], push - DAMPING * y[1] - y[0]]
 
     def crossing(t: float, y: np.ndarray, side: float) -> float:
-        return y[0] * side + (1e-9 if t - time < 1e-6 else 0.0)  # the start of a piece is no crossing
+        return float(y[0] * side + (1e-9 if t - time < 1e-6 else 0.0))  # the start of a piece is no crossing
 
     crossing.terminal, crossing.direction = True, -1  # type: ignore[attr-defined]
     side = 1.0

@@ -59,7 +59,7 @@ def _kinetic_residual(model: Any, load: Any, t: float, theta: Any, velocity: Any
     def places(s: float) -> np.ndarray:
         layout = cell.layout(theta[0] + velocity[0] * s, theta[1] + velocity[1] * s)
         ground = np.array([load.ground_horizontal(t + s), load.ground_vertical(t + s)])
-        return np.array([layout.points["mass_1"], layout.points["mass_2"]]) + ground
+        return np.asarray(np.array([layout.points["mass_1"], layout.points["mass_2"]]) + ground)
 
     h = 1e-3
     speeds = (8 * (places(h) - places(-h)) - (places(2 * h) - places(-2 * h))) / (12 * h)
@@ -163,7 +163,9 @@ def _equivalence(rng: np.random.Generator) -> dict[str, float]:
 
     def gap(model: Any, **force: Any) -> float:
         other = Load(frequency=omega, vertical=-0.5, **force)
-        return max(abs(model.acceleration(t, theta, 0.1, 1, ground) - model.acceleration(t, theta, 0.1, 1, other)) for t in times)
+        return float(
+            max(abs(model.acceleration(t, theta, 0.1, 1, ground) - model.acceleration(t, theta, 0.1, 1, other)) for t in times)
+        )
 
     symmetric, unequal = Metainterface(beta0=1.4), Metainterface(beta0=1.4, mass_ratio=0.7)
     size = omega**2 * zeta
@@ -192,9 +194,8 @@ def _symmetry(rng: np.random.Generator) -> dict[str, Any]:
             )
 
         states = rng.uniform(0.05, 1, (20, 3))
-        return max(
-            abs(model.acceleration(t, q, v, 1, load(1)) + model.acceleration(t, -q, -v, -1, load(-1))) for t, q, v in states
-        )
+        sums = [model.acceleration(t, q, v, 1, load(1)) + model.acceleration(t, -q, -v, -1, load(-1)) for t, q, v in states]
+        return float(max(map(abs, sums)))
 
     symmetric = gap(Metainterface(beta0=1.4, damping=0.1), 0.0)
     scaled = gap(Metainterface(beta0=1.4, damping=0.1, stiffness_ratio=1.7, mass_ratio=0.7, dissipation_ratio=1.7), 0.7)

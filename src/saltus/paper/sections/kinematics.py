@@ -47,7 +47,7 @@ def _cos_alpha(cell: Any, angle: np.ndarray, chi: float) -> np.ndarray:
     """cos(alpha_j) of `configalpha` with the given argument of its cosine and the given chi."""
     lowering = math.cos(cell.beta0) - np.cos(angle)
     root = np.sqrt(np.abs(cell.psi / (lowering + cell.psi)))
-    return root * (lowering + 2 * cell.lambda_ * chi + cell.psi) / (2 * cell.lambda_)
+    return np.asarray(root * (lowering + 2 * cell.lambda_ * chi + cell.psi) / (2 * cell.lambda_))
 
 
 def _drawn(cell: Any, openings: np.ndarray) -> dict[str, float]:

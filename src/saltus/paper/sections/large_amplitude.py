@@ -49,7 +49,7 @@ def _is_saddle(energy: Any, place: np.ndarray) -> bool:
     """Whether a small step within theta_1 >= 0 >= theta_2 lowers the energy: the search may stop on a ridge."""
     steps = [np.array([x, y]) for x in (-1e-3, 0.0, 1e-3) for y in (-1e-3, 0.0, 1e-3)]
     allowed = [place + step for step in steps if place[0] + step[0] >= 0.0 >= place[1] + step[1]]
-    return min(energy(near) for near in allowed) < energy(place) - 1e-12
+    return bool(min(energy(near) for near in allowed) < energy(place) - 1e-12)
 
 
 def _mirrors(rng: np.random.Generator, motions: int) -> dict[str, float]:

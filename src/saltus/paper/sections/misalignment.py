@@ -26,7 +26,7 @@ def compute(loads: int = 30) -> Any:
 def _energy(cell: Any, phi: np.ndarray, layer: int, horizontal: float, vertical: float) -> np.ndarray:
     """Spring energy less the work of both forces, from the places of the mass as functions of phi_j alone (m = 0, k = 1)."""
     theta = cell.theta(phi, layer=layer)
-    return theta**2 / 2 - horizontal * cell.xi(theta) - vertical * (cell.eta(theta) - math.sin(cell.beta0))
+    return np.asarray(theta**2 / 2 - horizontal * cell.xi(theta) - vertical * (cell.eta(theta) - math.sin(cell.beta0)))
 
 
 def _minima(cell: Any, layer: int, horizontal: float, vertical: float) -> tuple[list[float], list[float]]:

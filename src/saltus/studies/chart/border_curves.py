@@ -25,7 +25,7 @@ def curve_dataset(curve: Any, paths: Sequence[str]) -> xarray.Dataset:
     order = [list(curve.paths).index(path) for path in paths]
     for name, i in zip(("horizontal", "vertical"), order, strict=True):
         data[name] = ("point", curve.parameters[:, i])
-    kept = data[["horizontal", "vertical", "amplitude", "residual", "special_kind"]]
+    kept: xarray.Dataset = data[["horizontal", "vertical", "amplitude", "residual", "special_kind"]]
     kept["special_place"] = (("special", "axis"), data["special_parameter"].values[:, order])
     kept.attrs = {**data.attrs, "impact_count": curve.orbits[0].signature.impact_count, "path": list(paths)}
     return kept

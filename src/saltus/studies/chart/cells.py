@@ -210,7 +210,7 @@ def joined(motions: np.ndarray) -> np.ndarray:
     number = np.zeros(len(into), dtype=np.int64)
     np.add.at(number, into, motions["starts"])
     motions["starts"] = number
-    return motions[kept]
+    return np.asarray(motions[kept])
 
 
 def _is_near(one: np.ndarray, other: np.ndarray, amplitude: np.ndarray) -> np.ndarray:

@@ -74,7 +74,7 @@ def is_same(one: np.ndarray, other: np.ndarray, tolerance: float = ALIKE.same) -
 
 def is_alike(one: np.ndarray, other: np.ndarray, tolerance: float) -> np.ndarray:
     """Whether motions have the same period and number of impacts, and about the same extrema."""
-    return is_same(one, other, tolerance) & (one["impact_count"] == other["impact_count"])
+    return np.asarray(is_same(one, other, tolerance) & (one["impact_count"] == other["impact_count"]))
 
 
 def has_alike(known: np.ndarray, cell: np.ndarray, motions: np.ndarray, tolerance: float) -> np.ndarray:
