@@ -22,6 +22,7 @@ ROOMS = sorted(path.parent.name for path in SOURCE.glob("*/__init__.py"))
 
 SHARED = {
     "errors",
+    "enumerations",
     "notebook",
     "checks",
     "files",
@@ -207,7 +208,9 @@ def test_functions_are_short() -> None:
 
 def test_docstrings_have_the_sections_of_numpy() -> None:
     """One style for all: a heading with a line under it, and never a heading with a colon."""
-    files = [path for path in FILES if re.search(r"^ *(Args|Parameters|Returns|Yields|Raises|Examples):$", path.read_text(), re.M)]
+    files = [
+        path for path in FILES if re.search(r"^ *(Args|Parameters|Returns|Yields|Raises|Examples):$", path.read_text(), re.M)
+    ]
     assert not files
 
 

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
+
+from saltus.enumerations import Sentence
 
 
-class EndReason(Enum):
+class EndReason(Sentence):
     """A reason for which a curve ends. Its value is the sentence, in which the numbers of an `End` are filled in."""
-
-    @property
-    def code(self) -> str:
-        """The reason as a word for files."""
-        return self.name.lower()
 
 
 class CurveEnd(EndReason):

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
+from saltus.enumerations import Sentence
 
-class MissedReason(Enum):
+
+class MissedReason(Sentence):
     """Why something is missing between two points. Its value is the text, in which a `Missed` fills in its numbers."""
-
-    @property
-    def code(self) -> str:
-        """The reason as a word for files."""
-        return self.name.lower()
 
 
 class CurveMissed(MissedReason):

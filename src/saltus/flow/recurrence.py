@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.enumerations import NumberedSentence
 from saltus.flow.ensemble.dataset_reading import stop_names, stroboscopic
 from saltus.flow.ensemble.ensemble import simulate_many
 from saltus.flow.ensemble.ensemble_dataset import extrema_names
@@ -47,26 +47,14 @@ class RecurrenceSettings:
 RECURRENCE = RecurrenceSettings()
 
 
-class Outcome(IntEnum):
+class Outcome(NumberedSentence):
     """How a motion ends that was followed for some forcing periods."""
 
-    MOVING = 0
-    HELD = 1
-    REST = 2
-    PERIODIC = 3
-    ENDED = 4
-
-    def __str__(self) -> str:
-        return SENTENCES[self]
-
-
-SENTENCES = {
-    Outcome.MOVING: "it goes on moving without repeating itself",
-    Outcome.HELD: "it is at rest at the contact, from where a later load may pull it",
-    Outcome.REST: "it is at rest at the contact for all later loads",
-    Outcome.PERIODIC: "it repeats itself",
-    Outcome.ENDED: "it is ended by a margin of the model, or cannot go on",
-}
+    MOVING = 0, "it goes on moving without repeating itself"
+    HELD = 1, "it is at rest at the contact, from where a later load may pull it"
+    REST = 2, "it is at rest at the contact for all later loads"
+    PERIODIC = 3, "it repeats itself"
+    ENDED = 4, "it is ended by a margin of the model, or cannot go on"
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,13 +9,13 @@ what it adds to the velocity on the way in it takes away on the way out, as the 
 
 from __future__ import annotations
 
-from enum import Enum
 from functools import lru_cache
 
+from saltus.enumerations import Sentence
 from saltus.taylor import Expr, Form, NoNormalForm, Trace, constant, constant_value, normal_form
 
 
-class ContactRegularity(Enum):
+class ContactRegularity(Sentence):
     """What passing the contact does to a motion.
 
     Examples

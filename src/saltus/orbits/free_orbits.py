@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.checks import check_number
+from saltus.enumerations import Sentence
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import Motion, Stop, simulate
 from saltus.progress import Progress, silent
@@ -38,7 +38,7 @@ class FreeOrbitSettings:
 SETTINGS = FreeOrbitSettings()
 
 
-class FreeOutcome(Enum):
+class FreeOutcome(Sentence):
     """What becomes of a free motion that begins at rest."""
 
     PERIODIC = "it comes back to where it began"
@@ -46,9 +46,6 @@ class FreeOutcome(Enum):
     LOST = "it does not come back to where it began: energy is lost or gained"
     ENDED = "it is ended by a margin of the model, or cannot go on"
     AWAY = "it does not turn round within a time of 1e5"
-
-    def __str__(self) -> str:
-        return str(self.value)
 
 
 @dataclass(frozen=True)

@@ -7,56 +7,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
 
 from saltus.attractors.lyapunov.largest_exponent import largest_exponents
+from saltus.enumerations import NumberedSentence
 from saltus.flow import RECURRENCE, Outcome, Recurrence, find_recurrence, return_period
 from saltus.orbits import states_beside
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
 
 
-class Unsettled(IntEnum):
+class Unsettled(NumberedSentence):
     """What motions are that have neither come to rest nor repeated themselves so far."""
 
-    UNDECIDED = 0
-    CHAOTIC = 1
-    TRANSIENT = 2
-    PERIODIC = 3
-
-    def __str__(self) -> str:
-        return SENTENCES[self]
+    UNDECIDED = 0, "the numbers do not bear out a verdict"
+    CHAOTIC = 1, "neighbouring motions part for good, and none of them settles"
+    TRANSIENT = 2, "motions from the same states settle after a while"
+    PERIODIC = 3, "neighbouring motions come together: it settles slowly, or on an orbit of a long period"
 
 
-SENTENCES = {
-    Unsettled.UNDECIDED: "the numbers do not bear out a verdict",
-    Unsettled.CHAOTIC: "neighbouring motions part for good, and none of them settles",
-    Unsettled.TRANSIENT: "motions from the same states settle after a while",
-    Unsettled.PERIODIC: "neighbouring motions come together: it settles slowly, or on an orbit of a long period",
-}
-
-
-class Doubt(IntEnum):
+class Doubt(NumberedSentence):
     """Why no verdict is borne out."""
 
-    NONE = 0
-    NEAR_ZERO = 1
-    FEW_SETTLED = 2
-    NO_EXPONENT = 3
-
-    def __str__(self) -> str:
-        return DOUBTS[self]
-
-
-DOUBTS = {
-    Doubt.NONE: "there is a verdict",
-    Doubt.NEAR_ZERO: "the largest exponent is not surely above or below 0",
-    Doubt.FEW_SETTLED: "some motions settled, too few to tell a long transient from chaos beside one",
-    Doubt.NO_EXPONENT: "the motions rest or end before an exponent is known",
-}
+    NONE = 0, "there is a verdict"
+    NEAR_ZERO = 1, "the largest exponent is not surely above or below 0"
+    FEW_SETTLED = 2, "some motions settled, too few to tell a long transient from chaos beside one"
+    NO_EXPONENT = 3, "the motions rest or end before an exponent is known"
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from saltus.branch_lines import border_curves
+from saltus.paper.claims.claim import Measures
 from saltus.paper.figure_data import joined
+from saltus.paper.figures.figure import PaperFigure, paper_figure
 from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.panel_work import Panels
 from saltus.plots import DOUBLE_COLUMN, chart_legend, draw_chart, draw_closed_form, draw_lines, new_figure, panel_label, styled
@@ -19,20 +21,32 @@ from saltus.theory import high_frequency_onset
 
 CHART_WINDOW = ((-2.0, 2.0), (-2.0, 2.0))  # of the initial states
 LOWEST_LOAD = -2.0  # V
-WIDEST = 0.5  # Hhat
 CLOSED_FORM_FROM = 2.0  # Omega from which the closed form of the onset is drawn too
 CHECKED = 100  # cells of a chart that are computed again, with more starts on a finer grid
-CURVES = 20  # largest number of curves on which motions end, for one chart
+CURVES = 8  # largest number of curves on which motions end, for one chart: more would bury the border beside rest
 
 
-def panels(charts: Mapping[str, Mapping[str, Any]], size: int, **options: Any) -> Panels:
-    """A chart of `size` x `size` cells for each panel; options are those of `stability_chart`."""
+def chart_figure(
+    name: str,
+    charts: Mapping[str, Mapping[str, float]],
+    measure: Callable[[Any], Measures],
+    *,
+    height: float,
+    module: str,
+) -> PaperFigure:
+    """A figure with a chart of `size` x `size` cells for each system; options of its panels are those of `stability_chart`."""
+    return paper_figure(
+        name,
+        panels=partial(_panels, charts=charts),
+        join=partial(joined, what="stability charts under load (i)"),
+        draw=partial(_draw, height=height),
+        measure=measure,
+        module=module,
+    )
+
+
+def _panels(charts: Mapping[str, Mapping[str, float]], size: int = 101, **options: Any) -> Panels:
     return {name: partial(panel, size=size, **{**values, **options}) for name, values in charts.items()}
-
-
-def join(made: Mapping[str, Any]) -> Any:
-    """The charts of a figure."""
-    return joined(made, what="stability charts under load (i)")
 
 
 def panel(
@@ -49,11 +63,11 @@ def panel(
 
 
 @styled
-def draw(data: Any, columns: int, height: float) -> Any:
-    """A chart for each panel, `columns` in a row, all in one scale of colours."""
+def _draw(data: Any, height: float) -> Any:
+    """A chart for each panel, two in a row, all in one scale of colours."""
     panels = list(data.children.items())
     figure = new_figure(DOUBLE_COLUMN, height)
-    axes = np.atleast_1d(figure.subplots(-(-len(panels) // columns), columns, squeeze=False)).ravel()
+    axes = figure.subplots(-(-len(panels) // 2), 2, squeeze=False).ravel()
     top = max(float(np.nanmax(tree["chart"]["amplitude"].values, initial=1e-3)) for _, tree in panels)
     cells, fast = None, False
     for ax, (name, tree) in zip(axes, panels, strict=False):

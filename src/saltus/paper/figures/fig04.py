@@ -83,7 +83,7 @@ def measure(data: Any) -> dict[str, Measured]:
             circled=rounds_a,
         ),
         "fig04a-one-layer": measured(bool(wrong.max() == 0), shares=wrong.round(3).tolist()),
-        "fig04a-energy": measured(_energy_drift(a), duration=DURATIONS["a"]),
+        "fig04a-energy": measured(max(_drift(a, i) for i in range(len(STARTS["a"]))), duration=DURATIONS["a"]),
         "fig04-corner": measured(_corner_error(a), jump=float(np.nanmax(a["corner"]))),
         "fig04b-loops": measured(
             _loop_shift(a, b) + max(_drift(b, i) for i in inner_b), motions=len(inner_b), impacts=int(b["impacts"][inner_b].sum())
@@ -104,10 +104,6 @@ def measure(data: Any) -> dict[str, Measured]:
 def _drift(panel: Any, i: int) -> float:
     energy = panel["energy"][i].values
     return float(np.nanmax(energy) - np.nanmin(energy))
-
-
-def _energy_drift(panel: Any) -> float:
-    return max(_drift(panel, i) for i in range(panel.sizes["motion"]))
 
 
 def _loop_shift(first: Any, second: Any) -> float:

@@ -39,16 +39,13 @@ ZOOMED = {"a": (0.1, 0.46), "b": (0.1, 0.34)}  # Omega of the superharmonic reso
 
 def panels(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Panels:
     """One spectrum for each amplitude, those that take longest first; options are those of `response_spectrum`."""
-    return {name: partial(_panel, amplitude, **options) for name, amplitude in reversed(list(amplitudes.items()))}
+    systems = {name: under_force(amplitude=amplitude) for name, amplitude in reversed(list(amplitudes.items()))}
+    return {name: partial(spectrum, system, FREQUENCY_RANGE, **options) for name, system in systems.items()}
 
 
 def join(made: Mapping[str, Any]) -> Any:
     """The spectra in the order of the figure."""
     return joined(dict(sorted(made.items())), what="response spectrum under load (i)")
-
-
-def _panel(amplitude: float, **options: Any) -> Any:
-    return spectrum(under_force(amplitude=amplitude), FREQUENCY_RANGE, **options)
 
 
 @styled

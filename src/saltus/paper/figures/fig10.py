@@ -28,7 +28,8 @@ MOTIONS, HORIZONS = 96, (500, 2000, 8000)  # for how many forcing periods wander
 
 def panels(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Panels:
     """One spectrum for each amplitude, and what becomes of chaos; options are those of `response_spectrum`."""
-    spectra = {name: partial(_panel, amplitude, **options) for name, amplitude in reversed(list(amplitudes.items()))}
+    systems = {name: on_ground(amplitude=amplitude) for name, amplitude in reversed(list(amplitudes.items()))}
+    spectra = {name: partial(spectrum, system, FREQUENCY_RANGE, **options) for name, system in systems.items()}
     return {**spectra, "transients": transients}
 
 
@@ -36,10 +37,6 @@ def join(made: Mapping[str, Any]) -> Any:
     """The spectra in the order of the figure, then what becomes of chaos."""
     spectra = {name: tree for name, tree in sorted(made.items()) if name in AMPLITUDES}
     return with_groups(joined(spectra, what="response spectrum under load (ii)"), {"transients": made["transients"]})
-
-
-def _panel(amplitude: float, **options: Any) -> Any:
-    return spectrum(on_ground(amplitude=amplitude), FREQUENCY_RANGE, **options)
 
 
 def transients() -> Any:

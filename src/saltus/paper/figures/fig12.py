@@ -2,35 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
-from saltus.paper.claims.claim import Measured
-from saltus.paper.figures import load_diagrams
-from saltus.paper.figures.figure import paper_figure
-from saltus.paper.measures import chaos_measures, response_measures
-from saltus.paper.measures.validity_measures import validity
-from saltus.paper.panel_work import Panels
+from saltus.paper.claims.claim import Measures
+from saltus.paper.figures.load_diagrams import force_figure
+from saltus.paper.measures.chaos_measures import shifts
 
-FREQUENCIES = {"a": 2.0, "b": 4.0}  # Omega
-LARGEST = {2.0: 5.0, 4.0: 9.0}  # Hhat, by Omega: beyond the first chaos
+# Omega of each panel, and Hhat beyond the first chaos.
+FREQUENCIES = {"a": 2.0, "b": 4.0}
+LARGEST = {2.0: 5.0, 4.0: 9.0}
 
 
-def panels(frequencies: Mapping[str, float] = FREQUENCIES, **options: Any) -> Panels:
-    """One diagram for each frequency; options are those of `bifurcation_diagram`."""
-    return load_diagrams.panels(frequencies, LARGEST, **options)
+def _chaos(panels: Any) -> Measures:
+    return {"fig12-shift": shifts(panels)}
 
 
-def draw(data: Any) -> Any:
-    """(a) and (b), a panel for each frequency."""
-    return load_diagrams.draw(data, FREQUENCIES, zoomed=0.6)
-
-
-def measure(data: Any) -> dict[str, Measured | None]:
-    """Every feature that the text names."""
-    panels = {FREQUENCIES[name]: tree for name, tree in data.children.items()}
-    found = {**response_measures.force_diagrams("fig12", panels), "fig12-shift": chaos_measures.shifts(panels)}
-    return {**found, "fig12-validity": validity("Fig. 12", data.children)}
-
-
-FIGURE = paper_figure("fig12", panels=panels, join=load_diagrams.join, draw=draw, measure=measure)
+FIGURE = force_figure("fig12", FREQUENCIES, LARGEST, _chaos, zoomed=0.6, module=__name__)

@@ -58,7 +58,7 @@ def paper_figure(name: str, *, compute: Callable[..., Any] | None = None, **part
     if compute is not None:
         parts |= {"panels": partial(_only, name, compute), "join": itemgetter(name), "module": compute.__module__}
     else:
-        parts["module"] = parts["panels"].__module__
+        parts.setdefault("module", parts["panels"].__module__)
     return PaperFigure(name=name, title=words["title"], caption=words["caption"], section=words.get("section", ""), **parts)
 
 

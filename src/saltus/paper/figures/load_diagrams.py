@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from saltus.flow import simulate_many
+from saltus.paper.claims.claim import Measures
 from saltus.paper.figure_data import joined, scalar_dataset, with_groups
+from saltus.paper.figures.figure import PaperFigure, paper_figure
 from saltus.paper.figures.harmonic_loads import AMPLITUDE, under_force
 from saltus.paper.figures.knots_and_jumps import birth
 from saltus.paper.figures.response_panels import diagram
+from saltus.paper.measures import response_measures
+from saltus.paper.measures.validity_measures import validity
 from saltus.paper.panel_work import Panels
 from saltus.plots import (
     DOUBLE_COLUMN,
@@ -33,17 +37,42 @@ NEAR = 1e-3  # relative distance from Hcr at which rest is tried
 WAIT, LAST = 300, 10  # forcing periods
 
 
-def panels(frequencies: Mapping[str, float], largest: Mapping[float, float], **options: Any) -> Panels:
-    """One diagram under load (i) for each frequency, up to the amplitude for it, with the fate of rest on both sides of Hcr."""
+def force_figure(
+    name: str,
+    frequencies: Mapping[str, float],
+    largest: Mapping[float, float],
+    chaos: Callable[[Any], Measures],
+    *,
+    zoomed: float,
+    module: str,
+) -> PaperFigure:
+    """A figure with a diagram under load (i) for each frequency Omega, up to the amplitude for it; `chaos` measures its bands.
+
+    Beside each panel stands what happens up to the amplitude `zoomed`, about Hcr. Options of its panels are those of
+    `bifurcation_diagram`.
+    """
+
+    def measure(data: Any) -> Measures:
+        panels = {frequencies[label]: tree for label, tree in data.children.items()}
+        shares = validity(f"Fig. {name[3:]}", data.children)
+        return {**response_measures.force_diagrams(name, panels), **chaos(panels), f"{name}-validity": shares}
+
+    return paper_figure(
+        name,
+        panels=partial(_panels, frequencies=frequencies, largest=largest),
+        join=partial(joined, what="bifurcation diagram under load (i)"),
+        draw=partial(_draw, frequencies=frequencies, zoomed=zoomed),
+        measure=measure,
+        module=module,
+    )
+
+
+def _panels(frequencies: Mapping[str, float], largest: Mapping[float, float], **options: Any) -> Panels:
     return {name: partial(_panel, frequency, largest[frequency], **options) for name, frequency in frequencies.items()}
 
 
-def join(made: Mapping[str, Any]) -> Any:
-    """The diagrams of a figure."""
-    return joined(made, what="bifurcation diagram under load (i)")
-
-
 def _panel(frequency: float, largest: float, **options: Any) -> Any:
+    """A diagram, with the fate of rest on both sides of Hcr."""
     system = under_force(frequency=frequency)
     tree = diagram(system, (LEAST, largest), **options)
     return with_groups(tree, {"undeformed": undeformed(system, tree.attrs["critical"]), "birth": birth(tree)})
@@ -60,7 +89,7 @@ def undeformed(system: Any, critical: float) -> Any:
 
 
 @styled
-def draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
+def _draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
     """A row for each frequency; beside it what happens up to the amplitude `zoomed`, about Hcr."""
     panels = {name: tree for name, tree in data.children.items() if name in frequencies}
     figure = new_figure(DOUBLE_COLUMN, 25.0 + 75.0 * len(panels))

@@ -338,11 +338,6 @@ def _means(values: np.ndarray, number: np.ndarray, edges: np.ndarray) -> np.ndar
     return np.array([float(number[here].mean()) if here.any() else 0.0 for here in inside])
 
 
-def _or_last(value: float) -> float:
-    """A value to sort by, one that is not known behind all others."""
-    return value if np.isfinite(value) else np.inf
-
-
 def border_of_rest(data: Any) -> Measured:
     """As printed: theta = 0 is held up to abs(V / tan(beta0)) under load (iii). Erratum 35: while the ellipse lies inside."""
     rest, disturbed, critical = data["undeformed"], data["disturbed"], _critical(data["a"])
@@ -371,7 +366,7 @@ def both_diagram(spectrum: Any, mirror: Any) -> dict[str, Measured]:
     values, number = range_counts(spectrum, CRITERIA.samples)
     most, shared = int(number.max()), float((number > 1).mean())
     doubled = sorted({int(branch["period"][0]) for _, branch in branches_of(spectrum) if branch.attrs["end_kinds"].count("PD")})
-    fold = min((first_fold(branch)[0] for _, branch in branches_of(spectrum) if int(branch["period"][0]) == 1), key=_or_last)
+    fold = np.fmin.reduce([first_fold(branch)[0] for _, branch in branches_of(spectrum) if int(branch["period"][0]) == 1])
     same = fold < _critical(spectrum) and {2, 4} <= set(doubled) and spectrum["bands"].sizes["band"] > 0
     symmetric = max(gaps["(i)"], gaps["(ii)"]) < CRITERIA.confirmed and gaps["(iii)"] > CRITERIA.apart and not any(own)
     return {

@@ -119,7 +119,10 @@ def report_content(all_figures: Iterable[PaperFigure], present: Mapping[PaperFig
         claims=claims,
         sections=[section for section in sections if section.parts or section.statements],
         missing=[figure.name for figure in all_figures if figure not in present],
-        errata=[_erratum(number, erratum, claims) for number, erratum in errata().items()],
+        errata=[
+            ErratumContent(number=number, erratum=erratum, claims=[claim for claim in claims if claim.erratum == number])
+            for number, erratum in errata().items()
+        ],
         diagrams=diagram_features(folder, titles),
         charts=chart_features(folder, titles),
         **(_both_layers(folder) if "both_layers" in titles else {}),
@@ -143,10 +146,6 @@ def _part(figure: PaperFigure, claims: list[Claim], folder: Path) -> ReportPart:
         if figure.table is not None
         else [],
     )
-
-
-def _erratum(number: int, erratum: Erratum, claims: list[Claim]) -> ErratumContent:
-    return ErratumContent(number=number, erratum=erratum, claims=[claim for claim in claims if claim.erratum == number])
 
 
 def _both_layers(folder: Path) -> dict[str, Any]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import scalar_dataset, scalars
+from saltus.paper.sections.differences import derivative
 from saltus.systems import Harmonic, Load, Metainterface, System, TwoLayer, UnitCell
 from saltus.theory import pendulum_acceleration
 
@@ -61,25 +63,23 @@ def _kinetic_residual(model: Any, load: Any, t: float, theta: Any, velocity: Any
         ground = np.array([load.ground_horizontal(t + s), load.ground_vertical(t + s)])
         return np.asarray(np.array([layout.points["mass_1"], layout.points["mass_2"]]) + ground)
 
-    h = 1e-3
-    speeds = (8 * (places(h) - places(-h)) - (places(2 * h) - places(-2 * h))) / (12 * h)
+    speeds = derivative(places)
     energy = (model.mass_ratio * speeds[0] @ speeds[0] + speeds[1] @ speeds[1]) / 2
     return abs(float(energy - model.kinetic_energy(t, theta, velocity, 0, load)))
 
 
 def _virtual_work_residual(model: Any, load: Any, t: float, theta: Any) -> float:
     """`ext_forces_beta` against the work of the forces on both masses of the drawn cell over small rotations."""
-    cell, h, worst = UnitCell(alpha0=0.3, beta0=model.beta0), 1e-3, 0.0
+    cell, worst = UnitCell(alpha0=0.3, beta0=model.beta0), 0.0
     upper = np.array([load.horizontal(t), load.vertical(t)])
     lower = np.array([load.lower_horizontal(t), load.lower_vertical(t)])
 
-    def work(angles: list[float]) -> float:
-        points = cell.layout(*angles).points
+    def work(j: int, turn: float) -> float:
+        points = cell.layout(*(q + turn * (i == j) for i, q in enumerate(theta))).points
         return float(lower @ np.array(points["mass_1"]) + upper @ np.array(points["mass_2"]))
 
     for j, force in enumerate(model.generalised_forces(t, theta, load)):
-        w = [work([q + n * h * (i == j) for i, q in enumerate(theta)]) for n in (-2, -1, 1, 2)]
-        worst = max(worst, abs((8 * (w[2] - w[1]) - (w[3] - w[0])) / (12 * h) - force))
+        worst = max(worst, abs(derivative(partial(work, j)) - force))
     return worst
 
 
@@ -119,16 +119,16 @@ def _lagrange_residual(model: Any, load: Any, t: float, theta: Any, velocity: An
         shifted[j] += step
         return float(np.imag(function(tuple(shifted))) / step.imag)
 
-    def momentum(s: float, j: int) -> float:
+    def momentum(j: int, s: float) -> float:
         where = tuple(q + v * s + a * s * s / 2 for q, v, a in zip(theta, velocity, acceleration, strict=True))
         speed = tuple(v + a * s for v, a in zip(velocity, acceleration, strict=True))
         return slope(lambda v: model.kinetic_energy(t + s, where, v, 0, load), speed, j)
 
-    force, worst, h = model.generalised_forces(t, theta, load), 0.0, 1e-3
+    force, worst = model.generalised_forces(t, theta, load), 0.0
     for j in (0, 1):
-        rate = (8 * (momentum(h, j) - momentum(-h, j)) - (momentum(2 * h, j) - momentum(-2 * h, j))) / (12 * h)
         potential = slope(lambda q: model.kinetic_energy(t, q, velocity, 0, load) - model.potential_energy(q), theta, j)
-        worst = max(worst, abs(rate - potential + slope(model.dissipation, velocity, j) - force[j]))
+        balance = derivative(partial(momentum, j)) - potential + slope(model.dissipation, velocity, j)
+        worst = max(worst, abs(balance - force[j]))
     return worst
 
 

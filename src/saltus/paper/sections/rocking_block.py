@@ -10,6 +10,7 @@ import numpy as np
 from saltus.flow import simulate
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import scalars
+from saltus.paper.sections.differences import derivative
 from saltus.systems import Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction
 from saltus.theory import decayed_amplitude, final_time, housner_restitution, rocking_energy_jump, rocking_period
 
@@ -90,13 +91,12 @@ def _lagrange_residual(alpha: float, theta: float, velocity: float, shake: float
     def at(s: float) -> np.ndarray:
         return _places(alpha, theta + velocity * s + acceleration * s * s / 2, shake * s * s / 2)[0]
 
-    def turned(n: int) -> np.ndarray:
-        return _places(alpha, theta + n * h, 0.0)[0]
+    def turned(angle: float) -> np.ndarray:
+        return _places(alpha, angle, 0.0)[0]
 
     shares = _places(alpha, theta, 0.0)[1]
     second = (16 * (at(h) + at(-h)) - at(2 * h) - at(-2 * h) - 30 * at(0.0)) / (12 * h * h)
-    lever = (8 * (turned(1) - turned(-1)) - turned(2) + turned(-2)) / (12 * h)
-    return abs(float(shares @ ((second + np.array([0.0, 4 / 3])) * lever).sum(axis=1)))
+    return abs(float(shares @ ((second + np.array([0.0, 4 / 3])) * derivative(turned, theta)).sum(axis=1)))
 
 
 def _housner(rng: np.random.Generator, n: int = 40) -> dict[str, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from saltus.flow import simulate
 from saltus.paper.claims.claim import Measured, measured, with_fields
 from saltus.paper.figure_data import TOLERANCE, scalar_dataset, scalars
+from saltus.paper.sections.differences import derivative
 from saltus.systems import Load, Metainterface, System, VelocityReduction
 from saltus.theory import (
     Stability,
@@ -90,13 +92,8 @@ def _decay(e: float) -> dict[str, float]:
         "first_interval": float(impact[0]) / period,
         "second_interval": float(impact[1] - impact[0]) / period,
         "third_interval": float(impact[2] - impact[1]) / period,
-        "end": _rest(motion) / final_time(period=period, e=e) - 1,
+        "end": (math.nan if motion.rest_time is None else motion.rest_time) / final_time(period=period, e=e) - 1,
     }
-
-
-def _rest(motion: Any) -> float:
-    """The time of rest, or NaN if it never comes."""
-    return math.nan if motion.rest_time is None else float(motion.rest_time)
 
 
 def _equilibria() -> dict[str, float]:
@@ -111,10 +108,9 @@ def _equilibria() -> dict[str, float]:
 
 def _potential() -> dict[str, float]:
     """dP/dtheta by differences against the equation of motion's moments; stability of theta = 0 by the sign of V cos(beta0)."""
-    system, worst, h = free(-1.3, stiffness=0.7), 0.0, 1e-3
+    system, worst = free(-1.3, stiffness=0.7), 0.0
     for theta in (-1.2, -0.4, 0.3, 1.1):
-        p = [potential_energy(system, theta + n * h) for n in (-2, -1, 1, 2)]
-        slope = (8 * (p[2] - p[1]) - (p[3] - p[0])) / (12 * h)
+        slope = derivative(partial(potential_energy, system), theta)
         worst = max(worst, abs(slope + system.model.acceleration(0.0, theta, 0.0, math.copysign(1, theta), system.load)))
     signs = [(v, b) for v in (-0.5, 0.5) for b in (1.2, 2.0)]
     right = all((undeformed_stability(free(v, beta0=b)) is Stability.STABLE) == (v * math.cos(b) < 0) for v, b in signs)

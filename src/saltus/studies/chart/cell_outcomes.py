@@ -2,41 +2,27 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
 
 from saltus.attractors import Unsettled
+from saltus.enumerations import NumberedSentence
 
 
-class CellOutcome(IntEnum):
+class CellOutcome(NumberedSentence):
     """What there is in a cell."""
 
-    REST = 0
-    ONE_MOTION = 1
-    SEVERAL_MOTIONS = 2
-    CHAOS = 3
-    MOTIONS_AND_CHAOS = 4
-    LONG = 5
-    UNDECIDED = 6
-
-    def __str__(self) -> str:
-        return SENTENCES[self]
+    REST = 0, "every motion comes to rest"
+    ONE_MOTION = 1, "one stable motion"
+    SEVERAL_MOTIONS = 2, "several stable motions"
+    CHAOS = 3, "chaos, and no stable motion"
+    MOTIONS_AND_CHAOS = 4, "chaos beside stable motions"
+    LONG = 5, "a motion of a longer period than is looked for, or a slow one"
+    UNDECIDED = 6, "motions of which it is not decided what they are"
 
 
-SENTENCES = {
-    CellOutcome.REST: "every motion comes to rest",
-    CellOutcome.ONE_MOTION: "one stable motion",
-    CellOutcome.SEVERAL_MOTIONS: "several stable motions",
-    CellOutcome.CHAOS: "chaos, and no stable motion",
-    CellOutcome.MOTIONS_AND_CHAOS: "chaos beside stable motions",
-    CellOutcome.LONG: "a motion of a longer period than is looked for, or a slow one",
-    CellOutcome.UNDECIDED: "motions of which it is not decided what they are",
-}
-
-
-def flags(kind: type[IntEnum]) -> dict[str, Any]:
+def flags(kind: type[NumberedSentence]) -> dict[str, Any]:
     """The attributes that say what the numbers of a variable mean, after the CF conventions."""
     return {"flag_values": [int(member) for member in kind], "flag_meanings": " ".join(member.name.lower() for member in kind)}
 

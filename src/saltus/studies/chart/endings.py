@@ -9,28 +9,25 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import IntEnum
 
 import numpy as np
 
+from saltus.enumerations import NumberedSentence
 from saltus.flow import approached, find_recurrence, return_period
 from saltus.studies.chart.motions import ALIKE
 from saltus.systems import System
 
 
-class ChangeOutcome(IntEnum):
+class ChangeOutcome(NumberedSentence):
     """What becomes of a motion between two cells."""
 
-    UNKNOWN = 0
-    JUMP = 1
-    DOUBLING = 2
-    SYMMETRY = 3
-    SHRINKS = 4
-    CONTINUED = 5
-    MISSED = 6
-
-    def __str__(self) -> str:
-        return SENTENCES[self]
+    UNKNOWN = 0, "not known"
+    JUMP = 1, "jumps to another motion"
+    DOUBLING = 2, "passes into one of twice or half its period"
+    SYMMETRY = 3, "gains or loses its symmetry"
+    SHRINKS = 4, "becomes too small to count"
+    CONTINUED = 5, "goes on"
+    MISSED = 6, "goes on, but no start of the neighbour has led to it"
 
     @property
     def is_end(self) -> bool:
@@ -44,15 +41,6 @@ class ChangeOutcome(IntEnum):
 
 
 ENDS = (ChangeOutcome.JUMP, ChangeOutcome.DOUBLING, ChangeOutcome.SYMMETRY)
-SENTENCES = {
-    ChangeOutcome.UNKNOWN: "not known",
-    ChangeOutcome.JUMP: "jumps to another motion",
-    ChangeOutcome.DOUBLING: "passes into one of twice or half its period",
-    ChangeOutcome.SYMMETRY: "gains or loses its symmetry",
-    ChangeOutcome.SHRINKS: "becomes too small to count",
-    ChangeOutcome.CONTINUED: "goes on",
-    ChangeOutcome.MISSED: "goes on, but no start of the neighbour has led to it",
-}
 
 # A motion on the way: at which share of it, its state at phase 0, period, impacts, extrema; a period of 0 if it does not settle.
 WAY = np.dtype(

@@ -3,37 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import IntEnum
 
 import numpy as np
 
+from saltus.enumerations import NumberedSentence
 from saltus.studies.chart.cells import seeds
 from saltus.studies.chart.motions import ALIKE, by_cell, is_alike, is_same, motion_type
 from saltus.studies.diagram.simulated import SimulatedMotions
 
 
-class Place(IntEnum):
+class Place(NumberedSentence):
     """Where a simulated motion that repeats itself stands with the branches; its `str` is the sentence."""
 
-    OPEN = 0
-    ON_BRANCH = 1
-    LONGER = 2
-    NO_ORBIT = 3
-    UNSTABLE = 4
-    ELSEWHERE = 5
-
-    def __str__(self) -> str:
-        return SENTENCES[self]
-
-
-SENTENCES = {
-    Place.OPEN: "it has not been looked at",
-    Place.ON_BRANCH: "it lies on a stable part of a branch",
-    Place.LONGER: "its period is longer than the longest that is followed",
-    Place.NO_ORBIT: "Newton's method finds no orbit near it",
-    Place.UNSTABLE: "the orbit near it is not called stable: it grazes, or is about to lose its stability",
-    Place.ELSEWHERE: "the branch of the orbit near it does not come back to it",
-}
+    OPEN = 0, "it has not been looked at"
+    ON_BRANCH = 1, "it lies on a stable part of a branch"
+    LONGER = 2, "its period is longer than the longest that is followed"
+    NO_ORBIT = 3, "Newton's method finds no orbit near it"
+    UNSTABLE = 4, "the orbit near it is not called stable: it grazes, or is about to lose its stability"
+    ELSEWHERE = 5, "the branch of the orbit near it does not come back to it"
 
 
 @dataclass

@@ -1,0 +1,34 @@
+"""Enumerations whose members have a sentence: code compares the members, a reader gets the sentences."""
+
+from __future__ import annotations
+
+from enum import Enum, IntEnum
+from typing import Self
+
+
+class NumberedSentence(IntEnum):
+    """Members that stand in arrays as numbers and whose `str` is a sentence: `HELD = 1, "it is at rest at the contact"`."""
+
+    _value_: int
+    sentence: str
+
+    def __new__(cls, number: int, sentence: str = "") -> Self:
+        """A member is its number, by which it is looked up."""
+        member = int.__new__(cls, number)
+        member._value_, member.sentence = number, sentence
+        return member
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+class Sentence(Enum):
+    """Members whose value and whose `str` is a sentence, in which what names them may fill in numbers."""
+
+    @property
+    def code(self) -> str:
+        """The member as a word for files."""
+        return self.name.lower()
+
+    def __str__(self) -> str:
+        return str(self.value)
