@@ -40,6 +40,7 @@ python_use_unqualified_type_names = True
 maximum_signature_line_length = 100
 napoleon_google_docstring = False
 napoleon_use_rtype = False
+napoleon_custom_sections = [("Attributes", "params_style")]  # of results, whose fields are shown as arguments are
 
 sphinx_gallery_conf = {
     "examples_dirs": ["../examples"],

@@ -1,5 +1,6 @@
 """The reference, written from the code: public names, the command line, the keys of studies, the paper's known errata."""
 
+import enum
 import inspect
 import re
 import tomllib
@@ -47,6 +48,8 @@ def room_page(room, names):
         found = getattr(saltus, name.removeprefix("saltus.")) if name.count(".") == 1 else _inside(name)
         if inspect.isclass(found):
             lines += ["", f".. autoclass:: {name}", "   :members:"]
+            if issubclass(found, enum.Enum):
+                lines += ["   :undoc-members:"]
             if issubclass(found, (tuple, str)) or issubclass(found, Exception):
                 lines += ["   :exclude-members: count, index, with_traceback, add_note"]
         else:

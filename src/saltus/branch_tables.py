@@ -70,6 +70,13 @@ def branches_of(diagram: Any) -> Iterator[tuple[int, xarray.Dataset]]:
 def branch_of(diagram: xarray.DataTree, number: int) -> xarray.Dataset:
     """The branch of this number of a diagram, as `Branch.to_xarray` gives it; `orbits_of` makes its orbits again.
 
+    Parameters
+    ----------
+    diagram
+        What `bifurcation_diagram` or `response_spectrum` gave.
+    number
+        The number of the branch, from 0 on.
+
     Raises
     ------
     ParameterError

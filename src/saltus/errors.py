@@ -24,6 +24,13 @@ class ParameterError(SaltusError, ValueError):
 
     `parameter` is the dotted path of what is wrong, such as "load.frequency" or "max_period", or None where it is no single one.
 
+    Parameters
+    ----------
+    message
+        One sentence: what was wrong, where, and what would be right.
+    parameter
+        The dotted path of what is wrong, or None where it is no single one.
+
     Examples
     --------
     >>> saltus.Metainterface(beta0=80.0)
@@ -37,7 +44,13 @@ class ParameterError(SaltusError, ValueError):
         self.parameter = parameter
 
     def inside(self, owner: str) -> ParameterError:
-        """The error with the path of the parameter as a part of `owner`: "model.beta0 must ..." for "beta0 must ..."."""
+        """The error with the path of the parameter as a part of `owner`: "model.beta0 must ..." for "beta0 must ...".
+
+        Parameters
+        ----------
+        owner
+            What it is a part of, such as "model".
+        """
         message = str(self)
         if self.parameter is None:
             return ParameterError(f"{owner}: {message}", owner)
@@ -73,6 +86,15 @@ class SweepError(SaltusError, RuntimeError):
     """A sweep that cannot go on, or that ended without some of its chunks; what was computed is kept.
 
     `failures` are the chunks that failed (`saltus.sweep.Failure`); `dataset` is what there is where no store keeps it, else None.
+
+    Parameters
+    ----------
+    message
+        One sentence.
+    failures
+        The chunks that failed, each a `saltus.sweep.Failure`.
+    dataset
+        What there is where no store keeps it.
 
     Examples
     --------

@@ -21,6 +21,13 @@ def silent(fraction: float, what: str) -> None:
 def show_progress(fraction: float, what: str) -> None:
     """The progress of work in one line on stderr, written over itself: for terminals and notebooks, `progress=show_progress`.
 
+    Parameters
+    ----------
+    fraction
+        The share that is done, in [0, 1].
+    what
+        What is being done.
+
     Examples
     --------
     >>> ends = saltus.simulate_many(system, theta=[0.1, 0.3], periods=10, progress=saltus.show_progress)

@@ -75,6 +75,25 @@ class Target:
 class Attractor:
     """One attractor, with its evidence.
 
+    Attributes
+    ----------
+    target
+        Its label, its kind and the states at which it meets phase 0 of the load.
+    highest
+        The largest coordinate on it; with several the largest of all.
+    lowest
+        The smallest one.
+    orbit
+        The orbit of a periodic one, solved by its own equations and stable by its multipliers; else None.
+    starts
+        How many of the initial states end there.
+    of
+        The number of initial states in all.
+    mirror
+        The label of its mirror image: its own where it is symmetric, UNDECIDED where the system has no mirror.
+    evidence
+        Why it is believed to be what it is.
+
     Examples
     --------
     >>> found = saltus.find_attractors(system, starts=16)
@@ -83,12 +102,12 @@ class Attractor:
     """
 
     target: Target
-    highest: float  # of the coordinate, or of all of several
+    highest: float
     lowest: float
-    orbit: PeriodicOrbit | None  # of a periodic one: solved by its own equations, and stable by its multipliers
-    starts: int  # how many of the initial states end there
-    of: int  # the number of initial states in all
-    mirror: int  # label of its mirror image: its own where it is symmetric, UNDECIDED where the system has no mirror
+    orbit: PeriodicOrbit | None
+    starts: int
+    of: int
+    mirror: int
     evidence: str
 
     @property
@@ -130,7 +149,15 @@ class Attractor:
         return math.sqrt(self.fraction * (1.0 - self.fraction) / self.of) if self.of else math.nan
 
     def labelled(self, label_of: Mapping[int, int], **changes: Any) -> Attractor:
-        """A copy of the attractor with other labels, its mirror image's included."""
+        """A copy of the attractor with other labels, its mirror image's included.
+
+        Parameters
+        ----------
+        label_of
+            The new label by the old one.
+        changes
+            Other fields to be changed.
+        """
         target = replace(self.target, label=label_of[self.label])
         return replace(self, target=target, mirror=label_of.get(self.mirror, UNDECIDED), **changes)
 
@@ -144,6 +171,27 @@ class Attractor:
 class Attractors:
     """The attractors that were found, by their labels, and what was searched.
 
+    Attributes
+    ----------
+    system
+        What moves.
+    members
+        The attractors.
+    states
+        (n, d): the initial states that were sampled.
+    assigned
+        (n,): the label of the attractor on which each ends, or UNDECIDED.
+    carried
+        (k,): the same of the further states that were given.
+    window
+        The window of the initial states.
+    seed
+        The seed of the initial states.
+    tol
+        The error that one step might make.
+    reasons
+        Why motions are undecided.
+
     Examples
     --------
     >>> found = saltus.find_attractors(system, starts=16)
@@ -153,13 +201,13 @@ class Attractors:
 
     system: System
     members: tuple[Attractor, ...]
-    states: np.ndarray  # (n, d): the initial states that were sampled
-    assigned: np.ndarray  # (n,): the label of the attractor on which each ends, or UNDECIDED
-    carried: np.ndarray  # (k,): the same of the further states that were given
-    window: Window  # of the initial states
+    states: np.ndarray
+    assigned: np.ndarray
+    carried: np.ndarray
+    window: Window
     seed: int
     tol: float
-    reasons: tuple[str, ...]  # why motions are undecided
+    reasons: tuple[str, ...]
 
     def __len__(self) -> int:
         return len(self.members)
@@ -169,6 +217,11 @@ class Attractors:
 
     def of(self, label: int) -> Attractor:
         """The attractor of a label.
+
+        Parameters
+        ----------
+        label
+            Its label.
 
         Raises
         ------

@@ -30,6 +30,11 @@ def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
     a Dataset; a study (.toml) a `Study`; a system (.json, of `System.to_json`) a `System`. Orbits of a branch are given by
     `saltus.orbits.orbits_of(load(...))`. Nothing in a result is run; a study may name Python files with models, and these are.
 
+    Parameters
+    ----------
+    path
+        The file or the folder.
+
     Raises
     ------
     ParameterError

@@ -24,6 +24,19 @@ class Study:
 
     `load_study("study.toml").run()` is `saltus.simulate` with the file's settings.
 
+    Attributes
+    ----------
+    name
+        Its name, that of the file.
+    system
+        What is studied.
+    simulate
+        The settings of [simulate]; None where the file has none.
+    asks
+        The other questions, in the order of the file.
+    source
+        The text of the file, with the line of each key.
+
     Examples
     --------
     >>> from pathlib import Path
@@ -34,8 +47,8 @@ class Study:
 
     name: str
     system: System
-    simulate: Settings | None = None  # None where the file has no [simulate]
-    asks: tuple[Ask, ...] = ()  # the other questions, in the order of the file
+    simulate: Settings | None = None
+    asks: tuple[Ask, ...] = ()
     source: Source
 
     def settings(self) -> Settings:
@@ -53,6 +66,11 @@ class Study:
     def run(self, **more: Any) -> Any:
         """The motion that the study asks for; `more` goes to `saltus.simulate` as it is, in place of the file's own settings.
 
+        Parameters
+        ----------
+        more
+            Arguments of `saltus.simulate`.
+
         Raises
         ------
         ParameterError
@@ -69,6 +87,15 @@ class Study:
 
     def answer(self, ask: Ask, function: Callable[..., Any], **more: Any) -> Any:
         """`function(system, ...)` with the arguments of a question, and `more`.
+
+        Parameters
+        ----------
+        ask
+            The question.
+        function
+            What answers it.
+        more
+            Arguments beside those of the file.
 
         Raises
         ------

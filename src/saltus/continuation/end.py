@@ -31,6 +31,17 @@ class CurveEnd(EndReason):
 class End:
     """An end of a curve: its reason, with the parameter there, the kind of a special point and what else the sentence names.
 
+    Attributes
+    ----------
+    reason
+        Why; a member of `CurveEnd` or of `saltus.orbits.OrbitEnd`.
+    parameter
+        The parameter's value there, of the one that is followed.
+    kind
+        The special point that is named in the reason, if there is one.
+    detail
+        What else the sentence names.
+
     Examples
     --------
     >>> branch.ends[0].parameter, str(branch.ends[0])

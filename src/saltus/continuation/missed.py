@@ -24,6 +24,19 @@ class CurveMissed(MissedReason):
 class Missed:
     """Something special between two neighbouring points of a curve that was not located.
 
+    Attributes
+    ----------
+    reason
+        Why it could not be located.
+    kind
+        The kind whose test function changes its sign, if it is one.
+    first
+        The parameters at the first of the two points between which it lies.
+    last
+        The parameters at the last point.
+    detail
+        What else the sentence names.
+
     Examples
     --------
     >>> branch.missed  # all that a test function told was located
@@ -31,10 +44,10 @@ class Missed:
     """
 
     reason: MissedReason
-    kind: str  # of the test function that changes its sign, if it is one
-    first: np.ndarray  # the parameters at both points
+    kind: str
+    first: np.ndarray
     last: np.ndarray
-    detail: str = ""  # what else the text names
+    detail: str = ""
 
     def __str__(self) -> str:
         first, last = (", ".join(f"{value:.9g}" for value in values) for values in (self.first, self.last))

@@ -10,6 +10,19 @@ from typing import Any
 class Evidence:
     """The numbers that show that a special point is there.
 
+    Attributes
+    ----------
+    residual
+        The residual of the equations.
+    brackets
+        The width in each parameter within which the test function changes its sign.
+    before
+        The test function at the beginning of the step that contains the point.
+    after
+        The test function at the end of that step.
+    value
+        The test function at the point itself.
+
     Examples
     --------
     >>> fold = next(point for point in branch.special if point.kind == "LP")
@@ -17,11 +30,11 @@ class Evidence:
     (True, True)
     """
 
-    residual: float  # of the equations
-    brackets: tuple[float, ...]  # the width in each parameter within which the test function changes its sign
-    before: float  # the test function at the beginning of the step that contains the point
-    after: float  # the test function at the end of that step
-    value: float  # the test function at the point itself
+    residual: float
+    brackets: tuple[float, ...]
+    before: float
+    after: float
+    value: float
 
     @property
     def bracket(self) -> float:

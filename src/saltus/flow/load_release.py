@@ -18,6 +18,15 @@ RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: th
 class Release:
     """A root of a contact acceleration at which it begins to pull: from then on rest cannot be kept.
 
+    Attributes
+    ----------
+    time
+        Its instant in the forcing period, in [0, T).
+    side
+        The side on which the gap then opens; with several contacts the number of the contact, from 1 on.
+    peak
+        The greatest pull before it presses again: 0 where the release is only touched, and lost.
+
     Examples
     --------
     >>> resting = system.with_({"load.horizontal.amplitude": 0.15, "impact.e": 0.3})
@@ -26,9 +35,9 @@ class Release:
     0.9999999999999999
     """
 
-    time: float  # in [0, T)
-    side: int  # on which the gap then opens; with several contacts the number of one, from 1 on
-    peak: float  # the greatest pull before it presses again: 0 where the release is only touched, and lost
+    time: float
+    side: int
+    peak: float
 
 
 def contact_pull(system: System, side: int) -> Callable[[Any], Any]:
@@ -61,6 +70,11 @@ def load_releases(system: System) -> tuple[Release, ...]:
 
     For load (i) of the metainterface with equal layers those of side +1 are at sin(Omega t) = Hcr / Hhat, with
     Hcr = abs(V / tan(beta0)), and those of side -1 half a period later.
+
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
 
     Examples
     --------

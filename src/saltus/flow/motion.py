@@ -33,13 +33,13 @@ class EventKind(StrEnum):
     ['impact', 'grazing']
     """
 
-    IMPACT = "impact"  # an impact: the gap closes with a speed
-    GRAZING = "grazing"  # the gap touches zero without a speed, to within the working precision
-    REST = "rest"  # the system comes to rest at contact, at once or as the limit of impacts
-    RELEASE = "release"  # it leaves contact from rest
-    CHATTER = "chatter"  # impacts without loss became too small to follow; the phase is lost from here on
-    LIMIT = "limit"  # a margin reached zero
-    HELD = "held"  # of several contacts, some come to rest as the limit of impacts
+    IMPACT = "impact"  #: an impact: the gap closes with a speed
+    GRAZING = "grazing"  #: the gap touches zero without a speed, to within the working precision
+    REST = "rest"  #: the system comes to rest at contact, at once or as the limit of impacts
+    RELEASE = "release"  #: it leaves contact from rest
+    CHATTER = "chatter"  #: impacts without loss became too small to follow; the phase is lost from here on
+    LIMIT = "limit"  #: a margin reached zero
+    HELD = "held"  #: of several contacts, some come to rest as the limit of impacts
 
 
 EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
@@ -48,6 +48,19 @@ EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
 @dataclass(frozen=True, slots=True)
 class Event:
     """One event: its time, and the velocities before and after it (equal where nothing jumps).
+
+    Attributes
+    ----------
+    time
+        The dimensionless time.
+    kind
+        What happened.
+    side
+        The side that it ends.
+    velocity_before
+        The rate of the coordinate just before.
+    velocity_after
+        That just after.
 
     Examples
     --------
@@ -67,6 +80,17 @@ class Event:
 class Impacts:
     """The impacts of a motion, as arrays of one length.
 
+    Attributes
+    ----------
+    time
+        (n,) dimensionless times.
+    side
+        (n,) the side that each ends.
+    velocity_before
+        (n,) the rate of the coordinate just before each.
+    velocity_after
+        (n,) that just after.
+
     Examples
     --------
     >>> impacts = saltus.simulate(system, theta=0.3, periods=2).impacts
@@ -75,7 +99,7 @@ class Impacts:
     """
 
     time: np.ndarray
-    side: np.ndarray  # before the impact
+    side: np.ndarray
     velocity_before: np.ndarray
     velocity_after: np.ndarray
 
@@ -145,6 +169,41 @@ class Motion:
     The coordinate at the end has the model's own name: `motion.theta`, or `motion.x` for a wall oscillator; all of them are in
     `motion.position`. With several degrees of freedom positions and velocities are tuples.
 
+    Attributes
+    ----------
+    system
+        What moved.
+    tol
+        The error that one step might make.
+    start
+        The dimensionless time at which it began.
+    time
+        The dimensionless time at its end.
+    position
+        The coordinate at the end; a tuple where there are several.
+    velocity
+        Its rate at the end, of the same kind.
+    side
+        The side at the end: +1 or -1, and 0 at rest; of a model with contacts 1 and the sum of 2^i over the closed ones.
+    stop
+        Why it ended.
+    limit
+        The margin that stopped it.
+    chatter_speed
+        The rate of the gap just after impacts on `side`, if it ends in chatter; theta and theta' are then 0.
+    periods
+        The whole forcing periods since time 0.
+    events
+        All events, in the order of time.
+    impacts
+        The impacts among them, as arrays.
+    dense
+        The Taylor series of all its steps; None where they were not kept.
+    kept
+        The states at the times that `simulate(samples=...)` was given.
+    sampled_validity
+        What its margins said, of a motion with `kept` samples.
+
     Examples
     --------
     >>> motion = saltus.simulate(system, theta=0.3, periods=5)
@@ -155,18 +214,18 @@ class Motion:
     system: System
     tol: float
     start: float
-    time: float  # at the end
+    time: float
     position: Any
     velocity: Any
-    side: int  # +1 or -1, and 0 at rest; of a model with contacts 1 and the sum of 2^i over the closed ones
+    side: int
     stop: Stop
-    limit: str | None  # the margin that stopped it
-    chatter_speed: float | None  # of the gap just after impacts on `side`, if it ends in chatter; theta and theta' are then 0
-    periods: int  # whole forcing periods since time 0
+    limit: str | None
+    chatter_speed: float | None
+    periods: int
     events: MotionEvents
     impacts: Impacts
     dense: DenseOutput | None
-    kept: Samples | None  # at the times that `simulate(samples=...)` was given
+    kept: Samples | None
     sampled_validity: Validity | None
 
     def __getattr__(self, name: str) -> Any:
@@ -187,7 +246,13 @@ class Motion:
         return tuple(contact.name for i, contact in enumerate(self.system.model.contacts) if (self.side - 1) >> i & 1)
 
     def closed_at(self, time: float) -> int:
-        """The contacts that are closed just after a time, of a model with several: the sum of 2^i over them."""
+        """The contacts that are closed just after a time, of a model with several: the sum of 2^i over them.
+
+        Parameters
+        ----------
+        time
+            The dimensionless time.
+        """
         if not self.start <= time <= self.time:
             raise ParameterError(f"time must lie in [{self.start:g}, {self.time:g}], the span of the motion", "time")
         return int(self._states(np.array([time]))[2][0]) - 1
@@ -206,6 +271,11 @@ class Motion:
 
     def at(self, times: Numbers) -> tuple[Any, Any]:
         """Coordinate and velocity at any times of the motion, at the method's accuracy; after the impact at an impact.
+
+        Parameters
+        ----------
+        times
+            A number or an array (n,) of dimensionless times.
 
         Returns
         -------
@@ -263,6 +333,11 @@ class Motion:
     def samples(self, count: int) -> Samples:
         """So many states, evenly over the motion, its start and its end among them.
 
+        Parameters
+        ----------
+        count
+            How many, from 2 on.
+
         Raises
         ------
         ParameterError
@@ -273,7 +348,13 @@ class Motion:
         return Samples(times, *self._states(times))
 
     def to_pandas(self, times: Numbers | None = None) -> pandas.DataFrame:
-        """Coordinates, velocities and the side over the index `time`, at the times of `to_xarray`."""
+        """Coordinates, velocities and the side over the index `time`, at the times of `to_xarray`.
+
+        Parameters
+        ----------
+        times
+            Dimensionless times, (n,).
+        """
         data = self.to_xarray(times)
         return data.drop_vars([name for name in data.data_vars if "time" not in data[name].dims]).to_dataframe()
 
@@ -284,7 +365,13 @@ class Motion:
         return html_table(f"Motion of {type(self.system.model).__name__}", facts | ({"margin": self.limit} if self.limit else {}))
 
     def to_xarray(self, times: Numbers | None = None) -> xarray.Dataset:
-        """The motion as a dataset with units and provenance; by default its samples, or 200 a forcing period, or 2000 in all."""
+        """The motion as a dataset with units and provenance; by default its samples, or 200 a forcing period, or 2000 in all.
+
+        Parameters
+        ----------
+        times
+            Dimensionless times, (n,).
+        """
         from saltus.flow.motion_dataset import to_dataset
 
         return to_dataset(self, times)

@@ -44,6 +44,23 @@ class Sensitivities:
     parameter: the derivative of its time. It is nan where the event has none (a grazing, the beginning of chatter) or where
     the motion had lost its derivative before.
 
+    Attributes
+    ----------
+    motion
+        The motion.
+    state
+        (2 n, 2 n): the derivatives of the state at the end to the one at the start.
+    parameters
+        (2 n, parameters): the derivatives of the state at the end to each parameter.
+    parameter_paths
+        The dotted paths of the parameters.
+    event_times
+        (events, 2 n + parameters): the derivatives of the events' times, as above.
+    grazings
+        The times at which the motion touches the contact; on the other side of a touch the derivative is another.
+    undefined
+        Why the derivatives at the end, or some of them, do not exist; those are nan.
+
     Examples
     --------
     >>> result = saltus.sensitivities(system, theta=0.3, periods=2)
@@ -52,12 +69,12 @@ class Sensitivities:
     """
 
     motion: Motion
-    state: np.ndarray  # (2 n, 2 n): of the state at the end to the one at the start
-    parameters: np.ndarray  # (2 n, parameters): of the state at the end to each parameter
+    state: np.ndarray
+    parameters: np.ndarray
     parameter_paths: tuple[str, ...]
-    event_times: np.ndarray  # (events, 2 n + parameters)
-    grazings: np.ndarray  # times at which the motion touches the contact; on the other side of a touch the derivative is another
-    undefined: str | None  # why the derivatives at the end, or some of them, do not exist; those are nan
+    event_times: np.ndarray
+    grazings: np.ndarray
+    undefined: str | None
 
     @property
     def determinant(self) -> float:

@@ -21,6 +21,15 @@ class Validity:
 
     `gains` has the contacts at which the impact law may raise the kinetic energy, and by what share of it (see `energy_gain`).
 
+    Attributes
+    ----------
+    first
+        The dimensionless time at which each margin is first passed, or None.
+    share
+        The share of the motion's time that is spent beyond each margin.
+    gains
+        The contacts at which the impact law may raise the kinetic energy, and by what share of it (see `energy_gain`).
+
     Examples
     --------
     >>> validity = saltus.simulate(system, theta=0.3, periods=1).validity
@@ -46,7 +55,13 @@ class Validity:
         return "; ".join(parts) or "the model has no margins"
 
     def gain(self, contact: str) -> str:
-        """What the impact law does to the energy at a contact in `gains`."""
+        """What the impact law does to the energy at a contact in `gains`.
+
+        Parameters
+        ----------
+        contact
+            Its name.
+        """
         share = 100 * self.gains[contact]
         return f"may raise the kinetic energy by {share:.3g} %: v+' M v+ > v-' M v- for v+ = -E v-; a smaller transfer would not"
 

@@ -32,6 +32,21 @@ class Branch(Course[OrbitPoint | RestingPoint, SpecialPoint]):
     A family of resting orbits is a branch as well: `special` then holds grazings (GR), the zeros of margins and functions, and
     the ends RL and CH.
 
+    Attributes
+    ----------
+    points
+        The points in order, each with its `orbit` and its parameters.
+    special
+        The special ones among them, each a `SpecialPoint`.
+    ends
+        Why it ends, at its first point and at its last one.
+    missed
+        What was seen on the way and could not be located, each with its reason.
+    path
+        The dotted path of the parameter.
+    origin
+        What it was begun from: a start, or the special point of another branch.
+
     Examples
     --------
     >>> branch.ends[0].parameter, len(branch.at(0.88))
@@ -39,7 +54,7 @@ class Branch(Course[OrbitPoint | RestingPoint, SpecialPoint]):
     """
 
     path: str
-    origin: End = START  # what it was begun from: a start, or the special point of another branch
+    origin: End = START
 
     @property
     def orbits(self) -> list[PeriodicOrbit]:
@@ -58,6 +73,11 @@ class Branch(Course[OrbitPoint | RestingPoint, SpecialPoint]):
 
     def at(self, value: float) -> list[PeriodicOrbit]:
         """All orbits of the branch at a value of the parameter, solved there.
+
+        Parameters
+        ----------
+        value
+            The parameter's value.
 
         Raises
         ------

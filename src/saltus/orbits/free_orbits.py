@@ -54,6 +54,21 @@ class FreeOrbit:
 
     Where a wall throws it back, the wall is the other turning point.
 
+    Attributes
+    ----------
+    system
+        What moves.
+    amplitude
+        The coordinate of the turning point at which it begins.
+    turning
+        The coordinate of the other turning point.
+    period
+        The time after which it repeats itself.
+    impact_speed
+        The largest speed at an impact; nan without impacts.
+    defect
+        The distance of its state from itself after the period.
+
     Examples
     --------
     >>> free = saltus.System(model=saltus.RockingBlock(alpha=0.25))
@@ -63,11 +78,11 @@ class FreeOrbit:
     """
 
     system: System
-    amplitude: float  # the coordinate of the turning point at which it begins
-    turning: float  # that of the other one
+    amplitude: float
+    turning: float
     period: float
-    impact_speed: float  # of the gap, the largest; nan without impacts
-    defect: float  # its distance from itself after the period
+    impact_speed: float
+    defect: float
 
     @property
     def frequency(self) -> float:
@@ -86,6 +101,13 @@ def free_orbit(system: System, amplitude: float) -> FreeOrbit:
     It is followed from one turning point, theta' = 0, to the other one and back; each is a root of its Taylor series, and every
     impact on the way is exact. The load is constant. At a distance d beside a saddle, where the energy says little of the turning
     point, the period is exact to about 1e-16 / d^2.
+
+    Parameters
+    ----------
+    system
+        What moves, without loss, under a constant load.
+    amplitude
+        The coordinate at which it begins, at rest.
 
     Raises
     ------

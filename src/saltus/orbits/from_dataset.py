@@ -33,6 +33,11 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     The equations are evaluated at the unknowns as they are kept, which must solve them, and orbits that rest are followed from
     their first release. `continue_orbit` goes on from any.
 
+    Parameters
+    ----------
+    dataset
+        What `to_xarray` of a branch or a curve gave.
+
     Raises
     ------
     ParameterError

@@ -29,6 +29,13 @@ class PeriodicOrbit:
 
     Phases and speeds are those of one period of the orbit, q forcing periods, in the order of the impacts.
 
+    Attributes
+    ----------
+    problem
+        The equations that it solves: the system, the parameters and the sequence of its impacts.
+    solution
+        Their solution.
+
     Examples
     --------
     >>> orbit.period, orbit.signature.impact_count, orbit.stable
@@ -44,13 +51,35 @@ class PeriodicOrbit:
     def near(
         cls, problem: Problem, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
     ) -> PeriodicOrbit | None:
-        """The orbit near a guess at fixed parameters, or None where Newton's method does not converge."""
+        """The orbit near a guess at fixed parameters, or None where Newton's method does not converge.
+
+        Parameters
+        ----------
+        problem
+            The equations.
+        unknowns
+            A guess of their unknowns, (n,).
+        values
+            The parameters' values.
+        iterations
+            How many steps of Newton's method at most.
+        """
         found = solve(problem, unknowns, values, iterations)
         return None if found is None else PeriodicOrbit(problem, found)
 
     @classmethod
     def known(cls, problem: Problem, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit | None:
-        """The orbit whose unknowns are known: nothing is solved. None where its motion cannot be followed."""
+        """The orbit whose unknowns are known: nothing is solved. None where its motion cannot be followed.
+
+        Parameters
+        ----------
+        problem
+            The equations.
+        unknowns
+            Their unknowns, (n,).
+        values
+            The parameters' values.
+        """
         equations = problem.evaluate(unknowns, values, look=True)
         return None if equations is None else PeriodicOrbit(problem, Solution(unknowns, values, equations, 0))
 
@@ -221,7 +250,15 @@ class PeriodicOrbit:
         return {**dict(zip(self.system.model.coordinates, map(float, state[:n]), strict=True)), "velocity": velocity}
 
     def motion(self, periods: float | None = None, tol: float = 1e-13) -> Motion:
-        """The exact motion from its state, over one period of the orbit if nothing else is given."""
+        """The exact motion from its state, over one period of the orbit if nothing else is given.
+
+        Parameters
+        ----------
+        periods
+            How many forcing periods.
+        tol
+            The error that one step may make.
+        """
         return simulate(self.system, **self.start(), periods=self.period if periods is None else periods, tol=tol)
 
     @cached_property
@@ -240,7 +277,13 @@ class PeriodicOrbit:
         return self.defect_after(1)
 
     def defect_after(self, rounds: int) -> float:
-        """The same after so many of its periods, where it has no impact at its start."""
+        """The same after so many of its periods, where it has no impact at its start.
+
+        Parameters
+        ----------
+        rounds
+            How many of its periods.
+        """
         check_count("rounds", rounds, 1, LIMITS.periods // self.period)
         start, motion = self.start(), self.motion(rounds * self.period)
         apart = np.subtract(motion.position, [start[name] for name in self.system.model.coordinates])

@@ -35,6 +35,17 @@ class RestingOrbit(PeriodicOrbit):
     It has all that a `PeriodicOrbit` has. Its impacts are those that the flow resolves before it jumps to rest; there are
     infinitely many. `residual` is by how much the smooth segments from impact to impact miss what the event-driven flow found.
 
+    Attributes
+    ----------
+    problem
+        The equations that it solves.
+    solution
+        Their solution.
+    excursions
+        (n, 3) of the (half) period: when it is released, when it is at rest again, and the side it is released to.
+    bends
+        (impacts,): the second derivative of the gap just before each; it is above 0 only for those that a grazing brings.
+
     Examples
     --------
     >>> lossy = system.with_({"load.horizontal.amplitude": 0.15, "load.frequency": 0.2, "impact.e": 0.3})
@@ -43,8 +54,8 @@ class RestingOrbit(PeriodicOrbit):
     (True, array([0., 0.]))
     """
 
-    excursions: np.ndarray  # (n, 3) of the (half) period: when released, when at rest again, and the side released to
-    bends: np.ndarray  # (impacts,): the gap's second derivative just before each; > 0 only for those that a grazing brings
+    excursions: np.ndarray
+    bends: np.ndarray
 
     def _over_period(self, column: int) -> np.ndarray:
         values = self.excursions[:, column]

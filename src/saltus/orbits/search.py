@@ -52,6 +52,29 @@ class Settled:
 class Search:
     """What was found, and what was searched.
 
+    Attributes
+    ----------
+    path
+        The dotted path of the parameter.
+    orbits
+        The orbits that were found.
+    values
+        Its values.
+    starts
+        How many initial states there were at each value.
+    max_period
+        The longest period that was looked for, in forcing periods.
+    window
+        The window of the initial states.
+    seed
+        The seed of the initial states.
+    unsettled
+        (values,): how many motions did not settle on an orbit of up to `max_period`: slow or chaotic.
+    at_rest
+        (values,): how many came to rest.
+    settled
+        The attractors as simulation shows them.
+
     Examples
     --------
     >>> found = saltus.search_orbits(system, "load.frequency", [1.0], max_period=1, starts=8)
@@ -61,14 +84,14 @@ class Search:
 
     path: str
     orbits: tuple[PeriodicOrbit, ...]
-    values: np.ndarray  # of the parameter
-    starts: int  # at each value
-    max_period: int  # forcing periods
-    window: Window  # of the states
+    values: np.ndarray
+    starts: int
+    max_period: int
+    window: Window
     seed: int
-    unsettled: np.ndarray  # (values,): how many motions did not settle on an orbit of up to `max_period`: slow or chaotic
-    at_rest: np.ndarray  # (values,): how many came to rest
-    settled: Settled  # the attractors as simulation shows them
+    unsettled: np.ndarray
+    at_rest: np.ndarray
+    settled: Settled
 
     def __repr__(self) -> str:
         kinds = sorted({orbit.period for orbit in self.orbits})
@@ -97,6 +120,27 @@ def search_orbits(
     by default its half widths are 1.5 around the contact, or around 0 for a model without one. Motions that settle lead to the
     attracting orbits. Returns of the motions near to where they were, on their way or in chaos, are first guesses for Newton's
     method, which finds repelling ones, of up to `repelling` forcing periods (by default `max_period`; 0 looks for none).
+
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    path
+        The dotted path of the parameter.
+    values
+        Its values.
+    max_period
+        The longest period, in forcing periods.
+    starts
+        How many initial states at each value.
+    window
+        A pair (low, high) for each coordinate, then for each velocity; by default half widths of 1.5 around the contact.
+    seed
+        Of the initial states.
+    repelling
+        The longest period of repelling orbits, by default `max_period`; 0 looks for none.
+    progress
+        Called with the fraction done and what is being done.
 
     Raises
     ------

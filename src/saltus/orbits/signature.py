@@ -28,18 +28,33 @@ class Signature:
     `sides` is the side before each impact. A symmetric orbit is its own mirror image half a period later; then only the
     impacts of the first half are listed, and the equations are those of the half.
 
+    Attributes
+    ----------
+    sides
+        The side that each impact ends, in order; empty for an orbit without impacts.
+    period
+        The period q, in forcing periods.
+    symmetric
+        Whether the second half is the mirror image of the first one.
+    side
+        The side of an orbit without impacts.
+    events
+        What opens and closes, in order, of an orbit with several contacts, in place of `sides`.
+    closed
+        The contacts that such an orbit has closed if it has no events, as bits.
+
     Examples
     --------
     >>> orbit.signature.sides
     (-1,)
     """
 
-    sides: tuple[int, ...]  # empty for an orbit without impacts
-    period: int  # forcing periods, q
+    sides: tuple[int, ...]
+    period: int
     symmetric: bool = False
-    side: int = 1  # of an orbit without impacts
-    events: tuple[ModeChange, ...] = ()  # of an orbit with several contacts, in place of `sides`
-    closed: int = 0  # the contacts that such an orbit has closed if it has no events, as bits
+    side: int = 1
+    events: tuple[ModeChange, ...] = ()
+    closed: int = 0
 
     @property
     def impact_count(self) -> int:

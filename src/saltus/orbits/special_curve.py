@@ -96,6 +96,21 @@ class ConditionedCurve(OrbitCurve):
 class SpecialCurve(Course[SpecialCurvePoint, SpecialPoint]):
     """A curve of special points in two parameters: its points in order, its codimension-two points, and why it ends.
 
+    Attributes
+    ----------
+    points
+        The points in order, each with its `orbit` and its parameters.
+    special
+        The special ones among them, each a `SpecialPoint`.
+    ends
+        Why it ends, at its first point and at its last one.
+    missed
+        What was seen on the way and could not be located, each with its reason.
+    kind
+        What its points are: LP, PD, BPC or GR.
+    paths
+        The dotted paths of both parameters.
+
     Examples
     --------
     >>> fold = next(point for point in branch.special if point.kind == "LP")
@@ -104,7 +119,7 @@ class SpecialCurve(Course[SpecialCurvePoint, SpecialPoint]):
     'LP'
     """
 
-    kind: str  # LP, PD, BPC or GR
+    kind: str
     paths: tuple[str, str]
 
     @property
@@ -114,6 +129,13 @@ class SpecialCurve(Course[SpecialCurvePoint, SpecialPoint]):
 
     def at(self, path: str, value: float) -> list[PeriodicOrbit]:
         """All orbits of the curve at a value of one of its parameters, solved there.
+
+        Parameters
+        ----------
+        path
+            The parameter's dotted path.
+        value
+            Its value.
 
         Raises
         ------

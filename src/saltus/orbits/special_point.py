@@ -107,6 +107,15 @@ class OrbitMissed(MissedReason):
 class SpecialPoint(Zero):
     """A special point of a branch or of a curve, with its orbit and its evidence; its kind is one of `SpecialKind`, or a name.
 
+    Attributes
+    ----------
+    kind
+        One of `SpecialKind`, or the name of a margin or a function.
+    point
+        The point, with its `orbit` and its parameters.
+    evidence
+        How well it is located.
+
     Examples
     --------
     >>> sorted(round(point.parameter, 6) for point in branch.special if point.kind == "LP")

@@ -124,6 +124,11 @@ def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
 class Cascade:
     """Period doublings one after the other, and how fast they follow: the ratios tend to Feigenbaum's 4.6692.
 
+    Attributes
+    ----------
+    points
+        The period doublings, in order.
+
     Examples
     --------
     >>> [field for field in ("parameters", "ratios") if hasattr(saltus.orbits.Cascade, field)]
@@ -153,6 +158,17 @@ def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_pe
     """The period doublings that follow one, each on the branch born at the one before, up to `max_period` forcing periods.
 
     It ends early where a doubled branch has no further doubling within the bounds.
+
+    Parameters
+    ----------
+    first
+        The first period doubling (PD).
+    bounds
+        The values of the parameter between which branches are followed.
+    max_period
+        The longest period, in forcing periods.
+    step
+        The longest step along a branch.
 
     Raises
     ------

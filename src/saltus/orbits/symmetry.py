@@ -18,6 +18,11 @@ from saltus.systems import Constant, Harmonic, Load, Signal, System, check_syste
 def is_symmetric(system: System) -> bool:
     """Whether -theta(t + T/2) moves as theta(t) does: a mirrored load that is the load half a period later (errata 18).
 
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+
     Examples
     --------
     >>> saltus.orbits.is_symmetric(system)

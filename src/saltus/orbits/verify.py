@@ -34,6 +34,15 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
     All must belong to one system but for its parameters along their common path, if they have one. A motion that starts after its
     first impact ends with that impact, before or after it as rounding decides: the nearer counts.
 
+    Parameters
+    ----------
+    orbits
+        The orbits, n of them.
+    rounds
+        How many of their periods.
+    tol
+        The error that one step may make.
+
     Raises
     ------
     ParameterError

@@ -24,6 +24,17 @@ Arrays = dict[str, np.ndarray]
 class Failure:
     """A chunk that failed: which, where in the grid, why, and how often it was tried.
 
+    Attributes
+    ----------
+    index
+        The chunk's place among the chunks, a number for each axis.
+    place
+        Where in the grid it is, in words.
+    error
+        The last error.
+    attempts
+        How often it was tried.
+
     Examples
     --------
     >>> import dataclasses

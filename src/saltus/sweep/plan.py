@@ -25,6 +25,17 @@ class Variable:
     grid's axes, its attributes, and the value that stands where nothing is computed yet (by default NaN; 0 or False where
     there is none).
 
+    Parameters
+    ----------
+    dtype
+        NumPy's name of its type.
+    extra
+        Its own dimensions after those of the axes, each with its length.
+    attrs
+        Its attributes, such as units and a long name.
+    fill
+        What stands in chunks that are not computed; by default nan, or 0 of a whole number.
+
     Examples
     --------
     >>> saltus.sweep.Variable(attrs={"units": "rad"}).dtype
@@ -131,20 +142,46 @@ class Plan:
         return ChunkGrid({name: len(values) for name, values in self.axes.items()}, self.chunk)
 
     def block(self, index: Index) -> dict[str, np.ndarray]:
-        """The values of each axis in a chunk."""
+        """The values of each axis in a chunk.
+
+        Parameters
+        ----------
+        index
+            The chunk's place among the chunks, a number for each axis.
+        """
         cuts = zip(self.axes.items(), self.chunks.slices(index), strict=True)
         return {name: values[cut].copy() for (name, values), cut in cuts}
 
     def place(self, index: Index) -> str:
-        """Where in the grid a chunk is, in words."""
+        """Where in the grid a chunk is, in words.
+
+        Parameters
+        ----------
+        index
+            The chunk's place among the chunks, a number for each axis.
+        """
         return ", ".join(f"{name} {_range(values)}" for name, values in self.block(index).items())
 
     def dimensions(self, name: str) -> tuple[str, ...]:
-        """The dimensions of a variable: the axes, then its own."""
+        """The dimensions of a variable: the axes, then its own.
+
+        Parameters
+        ----------
+        name
+            The variable's name.
+        """
         return (*self.axes, *(extra for extra, _ in self.variables[name].extra))
 
     def shape(self, name: str, index: Index | None = None) -> tuple[int, ...]:
-        """The shape of a variable, of all of it or in the chunk `index`."""
+        """The shape of a variable, of all of it or in the chunk `index`.
+
+        Parameters
+        ----------
+        name
+            The variable's name.
+        index
+            The chunk's place among the chunks; None for the whole grid.
+        """
         sizes = self.chunks.sizes.values() if index is None else (s.stop - s.start for s in self.chunks.slices(index))
         return (*sizes, *(size for _, size in self.variables[name].extra))
 

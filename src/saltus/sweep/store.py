@@ -166,6 +166,11 @@ def check_store(plan: Plan, path: Path) -> None:
 def remove_store(path: Path | str) -> None:
     """Remove the store at `path`, if there is one.
 
+    Parameters
+    ----------
+    path
+        The folder.
+
     Raises
     ------
     ParameterError

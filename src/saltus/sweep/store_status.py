@@ -29,6 +29,33 @@ class StoreStatus:
     `running` is whether a run on this machine is writing to it, None where the file system has no locks. `damaged` are the files
     that are not what was written, if that was looked at; a chunk with such a file is not done.
 
+    Attributes
+    ----------
+    path
+        The folder.
+    kind
+        What is computed, such as "basins".
+    function
+        What computes a chunk.
+    sizes
+        The length of each dimension by its name.
+    done
+        How many chunks are complete.
+    total
+        How many there are.
+    failures
+        The chunks that failed.
+    bytes
+        The size of the folder.
+    started
+        When its first run began.
+    updated
+        When its last chunk was written; None without one.
+    running
+        Whether a run is writing to it now; None where that cannot be told.
+    damaged
+        Files that are damaged, if they were looked at.
+
     Examples
     --------
     >>> import dataclasses
@@ -63,6 +90,13 @@ class StoreStatus:
 @answered
 def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
     """How far the sweep is whose store is at `path`; to `verify` reads all of it, and finds the files that are damaged.
+
+    Parameters
+    ----------
+    path
+        The folder.
+    verify
+        Whether every file is read and compared with its checksum.
 
     Raises
     ------

@@ -136,6 +136,21 @@ class CellChain(Model):
 class TwoCells(CellChain):
     """A `CellChain` of two cells.
 
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    coupling
+        kappa, the stiffness of a spring times length squared, over K2; at least 0.
+    damping
+        C, the damping of the upper layer, at least 0.
+    stiffness_ratio
+        k = K1 / K2, above 0.
+    mass_ratio
+        m = M1 / M2, at least 0.
+    dissipation_ratio
+        c = C1 / C2, at least 0.
+
     Examples
     --------
     >>> saltus.TwoCells(beta0=1.4, coupling=0.5).coordinates
@@ -151,6 +166,21 @@ class TwoCells(CellChain):
 class ThreeCells(CellChain):
     """A `CellChain` of three cells.
 
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    coupling
+        kappa, the stiffness of a spring times length squared, over K2; at least 0.
+    damping
+        C, the damping of the upper layer, at least 0.
+    stiffness_ratio
+        k = K1 / K2, above 0.
+    mass_ratio
+        m = M1 / M2, at least 0.
+    dissipation_ratio
+        c = C1 / C2, at least 0.
+
     Examples
     --------
     >>> saltus.ThreeCells(beta0=1.4, coupling=0.5).coordinates
@@ -165,6 +195,21 @@ class ThreeCells(CellChain):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FourCells(CellChain):
     """A `CellChain` of four cells.
+
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    coupling
+        kappa, the stiffness of a spring times length squared, over K2; at least 0.
+    damping
+        C, the damping of the upper layer, at least 0.
+    stiffness_ratio
+        k = K1 / K2, above 0.
+    mass_ratio
+        m = M1 / M2, at least 0.
+    dissipation_ratio
+        c = C1 / C2, at least 0.
 
     Examples
     --------

@@ -18,6 +18,21 @@ class Contact:
 
     While it is closed, q stays at p, and its reaction, an impulse or a force along q times the sign, is not negative.
 
+    Parameters
+    ----------
+    name
+        Its name, such as "lower", in events and in the names of stops.
+    coordinate
+        The name of the model's coordinate.
+    sign
+        +1 where the coordinate stays above the position, -1 where it stays below.
+    position
+        p, a number, which may be one of the model's parameters.
+    group
+        The group to whose other contacts an impact passes speed on (`transfer`).
+    restitution
+        e of the impacts that close it, in [0, 1]; by default that of the system's impact law.
+
     Examples
     --------
     >>> right = saltus.Contact(name="right", coordinate="x", position=1.0, sign=-1)
@@ -25,19 +40,25 @@ class Contact:
     0.75
     """
 
-    name: str  # such as "lower", in events and in the names of stops
-    coordinate: str  # the name of the model's coordinate
-    sign: int = 1  # +1 where the coordinate stays above the position, -1 where it stays below
-    position: Any = 0.0  # p, a number, maybe one of the model's parameters
-    group: str = ""  # an impact passes speed on (`transfer`) to the other contacts of its group only
-    restitution: Any = None  # e of impacts that close it, in [0, 1]; by default that of the system's impact law
+    name: str
+    coordinate: str
+    sign: int = 1
+    position: Any = 0.0
+    group: str = ""
+    restitution: Any = None
 
     def __post_init__(self) -> None:
         if self.sign not in (1, -1):
             raise ParameterError(f"the sign of the contact {self.name!r} must be +1 or -1, got {self.sign!r}", "sign")
 
     def gap(self, position: Any) -> Any:
-        """sign (q - p), at a position q."""
+        """sign (q - p), at a position q.
+
+        Parameters
+        ----------
+        position
+            The coordinate q.
+        """
         return self.sign * (position - self.position)
 
 

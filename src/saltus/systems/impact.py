@@ -54,6 +54,11 @@ class VelocityReduction(ImpactLaw):
 
     In a model with contacts the other ones take the speed on if it says so (`transfers`), else each contact turns it back.
 
+    Parameters
+    ----------
+    e
+        The factor of the velocity, in [0, 1].
+
     Examples
     --------
     >>> lossy = saltus.System(model=system.model, load=system.load, impact=saltus.VelocityReduction(e=0.8))
@@ -90,6 +95,11 @@ class EnergyRestitution(ImpactLaw):
     T on the new side is a quadratic a v^2 + b v + c in the velocity; its root of the sign of v- is taken, and of two such the
     one on the same side of the minimum -b / (2 a) as v-. At r = 1 that is v+ = v- for m = 0 and nu' = 0. Where no root has the
     sign of v- (small v- on a moving ground) the motion cannot go on, and is refused with the instant and the numbers.
+
+    Parameters
+    ----------
+    r
+        The share of the kinetic energy that an impact leaves, above 0.
 
     Examples
     --------

@@ -22,16 +22,27 @@ class ImpactPair(Model):
     The coordinates are those of T = (z'^2 + mu (z' + x')^2) / 2, so that an impact at a wall acts on x alone, and the balance of
     momentum gives the jump of z'. Contacts `left` at x = -d and `right` at x = d.
 
+    Parameters
+    ----------
+    mass_ratio
+        mu, the ratio of the mass to the case, above 0.
+    stiffness
+        k of the case, at least 0.
+    damping
+        c of the case, at least 0.
+    clearance
+        d, above 0.
+
     Examples
     --------
     >>> [contact.name for contact in saltus.ImpactPair(clearance=0.5).contacts]
     ['left', 'right']
     """
 
-    mass_ratio: float = 0.1  # mu, of the mass to the case, above 0
-    stiffness: float = 1.0  # k, at least 0
-    damping: float = 0.0  # c, at least 0
-    clearance: float = 1.0  # d, above 0
+    mass_ratio: float = 0.1
+    stiffness: float = 1.0
+    damping: float = 0.0
+    clearance: float = 1.0
 
     coordinates: ClassVar[tuple[str, ...]] = ("z", "x")
     channels: ClassVar[tuple[str, ...]] = ("force",)

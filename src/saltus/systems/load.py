@@ -17,6 +17,13 @@ class Channel:
 
     `t` is the dimensionless time tau: a number, an array, or the symbolic time of a traced model.
 
+    Parameters
+    ----------
+    signal
+        What it carries; None is 0.
+    frequency
+        The base frequency of the load, or None.
+
     Examples
     --------
     >>> [channel for channel in system.model.channels if channel in system.load.channels]
@@ -39,11 +46,23 @@ class Channel:
         return self._derivative(t, 0)
 
     def velocity(self, t: Any) -> Any:
-        """The first derivative at `t`."""
+        """The first derivative at `t`.
+
+        Parameters
+        ----------
+        t
+            The time.
+        """
         return self._derivative(t, 1)
 
     def acceleration(self, t: Any) -> Any:
-        """The second derivative at `t`."""
+        """The second derivative at `t`.
+
+        Parameters
+        ----------
+        t
+            The time.
+        """
         return self._derivative(t, 2)
 
 
@@ -63,6 +82,8 @@ class Load:
     ----------
     frequency
         The base angular frequency Omega > 0 of every harmonic, or None for a load without a period.
+    channels
+        A `Signal` or a number for each channel by its name, such as horizontal=-0.5.
 
     Raises
     ------

@@ -37,18 +37,33 @@ class Metainterface(Model):
     >= 0, with the upper one open R1 = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2
     - [(1+h) H - (1+m) zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one of `eomnl`.
 
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    damping
+        C, the damping of the upper layer, at least 0.
+    stiffness_ratio
+        k = K1 / K2, above 0.
+    mass_ratio
+        m = M1 / M2, at least 0.
+    dissipation_ratio
+        c = C1 / C2, at least 0.
+    smoothing
+        B, with which sgn(theta) becomes tanh(B theta / 2) (`smoothing`); None is exact.
+
     Examples
     --------
     >>> saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1).coordinates
     ('theta',)
     """
 
-    beta0: float = field(metadata=RADIANS)  # angle of the undeformed cell, in (0, pi)
-    damping: float = 0.0  # C, at least 0
-    stiffness_ratio: float = 1.0  # k = K1 / K2, above 0
-    mass_ratio: float = 0.0  # m = M1 / M2, at least 0
-    dissipation_ratio: float = 1.0  # c = C1 / C2, at least 0
-    smoothing: float | None = None  # B of `smoothing`: sgn(theta) becomes tanh(B theta / 2); None is exact
+    beta0: float = field(metadata=RADIANS)
+    damping: float = 0.0
+    stiffness_ratio: float = 1.0
+    mass_ratio: float = 0.0
+    dissipation_ratio: float = 1.0
+    smoothing: float | None = None
 
     units: ClassVar[tuple[str, ...]] = ("rad",)
     channels: ClassVar[tuple[str, ...]] = (

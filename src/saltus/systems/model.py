@@ -21,9 +21,9 @@ class MarginKind(StrEnum):
     'assumption'
     """
 
-    LANDMARK = "landmark"  # a place worth a mark: the mechanism goes on through it
-    ASSUMPTION = "assumption"  # an assumption of the model fails: the mechanism does something else
-    LIMIT = "limit"  # the mechanism has no such positions
+    LANDMARK = "landmark"  #: a place worth a mark: the mechanism goes on through it
+    ASSUMPTION = "assumption"  #: an assumption of the model fails: the mechanism does something else
+    LIMIT = "limit"  #: the mechanism has no such positions
 
 
 @answering("unit_of", "margin_kind")
@@ -76,13 +76,25 @@ class Model:
     damping: float = 0.0  # small vibrations decay as exp(-damping tau / 2)
 
     def unit_of(self, coordinate: str) -> str:
-        """The unit of one of the coordinates, such as "rad"."""
+        """The unit of one of the coordinates, such as "rad".
+
+        Parameters
+        ----------
+        coordinate
+            Its name.
+        """
         if coordinate not in self.coordinates:
             raise ParameterError(f"no coordinate {shown(coordinate)}; {near(coordinate, self.coordinates)}", "coordinate")
         return self.units[self.coordinates.index(coordinate)] if self.units else "1"
 
     def margin_kind(self, margin: str) -> MarginKind:
-        """What it means to pass one of the margins."""
+        """What it means to pass one of the margins.
+
+        Parameters
+        ----------
+        margin
+            Its name.
+        """
         return self.margin_kinds.get(margin, MarginKind.ASSUMPTION)
 
     @property
@@ -96,7 +108,21 @@ class Model:
         return 0.0
 
     def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
-        """The acceleration on the given side; of a model that gives its `force`, while no contact acts."""
+        """The acceleration on the given side; of a model that gives its `force`, while no contact acts.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        theta
+            The coordinate q; a tuple where there are several.
+        velocity
+            Its rate, of the same kind.
+        side
+            The mode, one of `sides`.
+        load
+            The load, whose channels are called with the time: `load.horizontal(t)`.
+        """
         if type(self).force is Model.force:
             raise NotImplementedError(f"{type(self).__name__} must define acceleration(t, theta, velocity, side, load)")
         size = len(self.coordinates)
@@ -109,16 +135,42 @@ class Model:
         return ()
 
     def mass_matrix(self, theta: Any) -> Any:
-        """M(q): a number, or rows of numbers, symmetric and positive definite."""
+        """M(q): a number, or rows of numbers, symmetric and positive definite.
+
+        Parameters
+        ----------
+        theta
+            The coordinate q; a tuple where there are several.
+        """
         size = len(self.coordinates)
         return 1.0 if size == 1 else [[float(i == j) for j in range(size)] for i in range(size)]
 
     def force(self, t: Any, theta: Any, velocity: Any, load: Any) -> Any:
-        """r(t, q, v) of M(q) q'' = r, while no contact acts."""
+        """r(t, q, v) of M(q) q'' = r, while no contact acts.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        theta
+            The coordinate q; a tuple where there are several.
+        velocity
+            Its rate, of the same kind.
+        load
+            The load, whose channels are called with the time: `load.horizontal(t)`.
+        """
         raise NotImplementedError(f"{type(self).__name__} has contacts, so it must define force(t, theta, velocity, load)")
 
     def gap(self, theta: Any, side: Any) -> Any:
-        """What is positive inside the mode `side` and zero at contact."""
+        """What is positive inside the mode `side` and zero at contact.
+
+        Parameters
+        ----------
+        theta
+            The coordinate q; a tuple where there are several.
+        side
+            The mode, one of `sides`.
+        """
         return side * theta
 
     def reset(self, t: Any, velocity: Any, side: Any, load: Any, impact: Any) -> tuple[Any, Any]:
@@ -126,27 +178,82 @@ class Model:
 
         Both velocities are rates of the coordinate, positive towards larger coordinates, and not speeds of approach. Here the
         motion passes through the contact and the sign of the velocity stays; a model with a wall turns the sign itself.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        velocity
+            The rate of the coordinate before the impact.
+        side
+            The mode that the impact ends.
+        load
+            The load, whose channels are called with the time: `load.horizontal(t)`.
+        impact
+            The impact law, whose `velocity_after` gives the velocity that it lets through.
         """
         return -side, impact.velocity_after(self, t, velocity, side, -side, load)
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
-        """The kinetic energy; impact laws that conserve or restitute energy need it."""
+        """The kinetic energy; impact laws that conserve or restitute energy need it.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        theta
+            The coordinate q; a tuple where there are several.
+        velocity
+            Its rate, of the same kind.
+        side
+            The mode, one of `sides`.
+        load
+            The load, whose channels are called with the time: `load.horizontal(t)`.
+        """
         raise ParameterError(
             f"{type(self).__name__} defines no kinetic_energy, so this impact law cannot be used with it", "impact"
         )
 
     def inelastic_factor(self, side: Any) -> Any:
-        """The velocity factor of a frictionless, perfectly inelastic impact that ends the mode `side`."""
+        """The velocity factor of a frictionless, perfectly inelastic impact that ends the mode `side`.
+
+        Parameters
+        ----------
+        side
+            The mode that the impact ends.
+        """
         raise ParameterError(
             f"{type(self).__name__} defines no inelastic_factor, so InelasticImpact() cannot be used with it", "impact"
         )
 
     def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Any) -> dict[str, Any]:
-        """Named quantities that must stay positive for the motion to be one of the real mechanism."""
+        """Named quantities that must stay positive for the motion to be one of the real mechanism.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        theta
+            The coordinate q; a tuple where there are several.
+        velocity
+            Its rate, of the same kind.
+        acceleration
+            The second derivative of the coordinate, of the same kind.
+        side
+            The mode, one of `sides`.
+        load
+            The load, whose channels are called with the time: `load.horizontal(t)`.
+        """
         return {}
 
     def check_load(self, load: Any) -> None:
-        """Refuse, with a ParameterError, a load whose channels are known but cannot act on this model as it is."""
+        """Refuse, with a ParameterError, a load whose channels are known but cannot act on this model as it is.
+
+        Parameters
+        ----------
+        load
+            The load that a `System` is given.
+        """
 
     def mirror(self, load: Any) -> Any:
         """The load under which -theta(t) is a motion wherever theta(t) is one under `load`, or None without such a symmetry.
@@ -155,6 +262,11 @@ class Model:
         does not hold is refused.
 
         The mirror turns the signs of all coordinates, velocities and sides; it does not shift the time.
+
+        Parameters
+        ----------
+        load
+            A load of the model.
         """
         return None
 

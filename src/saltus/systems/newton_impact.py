@@ -24,6 +24,13 @@ class NewtonImpact(ImpactLaw):
     contact with an impulse is left with -e_i v_i- less g times the other ones' v-. For g = 0 the energy lost at an impact is
     1/2 sum J_i (1 - e_i) |v_i-| on fixed ground. A transfer may gain energy: see `energy_gain`.
 
+    Parameters
+    ----------
+    e
+        The restitution of all contacts, or a tuple with one for each in the order of the model; in [0, 1].
+    transfer
+        g, in [0, 1].
+
     Examples
     --------
     >>> stops = saltus.System(model=saltus.TwoStops(stiffness=0.0), impact=saltus.NewtonImpact(e=0.5))
@@ -31,8 +38,8 @@ class NewtonImpact(ImpactLaw):
     [-0.5]
     """
 
-    e: Any = 0.0  # of all contacts, or a tuple with one for each in the order of the model; in [0, 1]
-    transfer: float = 0.0  # g in [0, 1]
+    e: Any = 0.0
+    transfer: float = 0.0
 
     def __post_init__(self) -> None:
         settle_numbers(self, "transfer", at_least=0.0, at_most=1.0)
@@ -62,6 +69,13 @@ def energy_gain(model: Model, impact: ImpactLaw) -> dict[str, float]:
     -E v- where an impulse acts, coordinates without a contact keep their momentum, and (v+' M v+) / (v-' M v-) - 1 is the share,
     on fixed ground and in the position where these contacts are closed. For two layers it is positive where
     M_ss e_s^2 + 2 cos(2 beta0) e_s g + M_jj g^2 > M_ss, s the layer that is hit.
+
+    Parameters
+    ----------
+    model
+        A model with several contacts.
+    impact
+        The impact law.
 
     Examples
     --------

@@ -105,6 +105,17 @@ def sinusoid(rate: Any, phase: Any, since: Any, n: int) -> Any:
 class HalfSine(Pulse):
     """amplitude sin(frequency s) for 0 <= s <= pi / frequency, s the time since `start`.
 
+    Parameters
+    ----------
+    amplitude
+        What the shape is multiplied by, in units of the quantity.
+    start
+        The dimensionless time at which it begins.
+    quantity
+        What it is: "force", or of a ground channel "acceleration".
+    frequency
+        The angular frequency of the sine, above 0.
+
     Examples
     --------
     >>> load = saltus.Load(force=saltus.HalfSine(amplitude=2.0, frequency=np.pi))
@@ -112,7 +123,7 @@ class HalfSine(Pulse):
     (2.0, 0.0)
     """
 
-    frequency: float = field(metadata=RATE)  # angular, of the sine
+    frequency: float = field(metadata=RATE)
 
     @property
     def length(self) -> Any:
@@ -128,6 +139,17 @@ class HalfSine(Pulse):
 @dataclass(frozen=True, kw_only=True)
 class OneSine(HalfSine):
     """amplitude sin(frequency s) for one period, 0 <= s <= 2 pi / frequency; of acceleration, a forward pulse of the velocity.
+
+    Parameters
+    ----------
+    amplitude
+        What the shape is multiplied by, in units of the quantity.
+    start
+        The dimensionless time at which it begins.
+    quantity
+        What it is: "force", or of a ground channel "acceleration".
+    frequency
+        The angular frequency of the sine, above 0.
 
     Examples
     --------
@@ -146,6 +168,17 @@ class OneSine(HalfSine):
 @dataclass(frozen=True, kw_only=True)
 class OneCosine(OneSine):
     """amplitude cos(frequency s) for one period; it jumps where it begins and where it ends.
+
+    Parameters
+    ----------
+    amplitude
+        What the shape is multiplied by, in units of the quantity.
+    start
+        The dimensionless time at which it begins.
+    quantity
+        What it is: "force", or of a ground channel "acceleration".
+    frequency
+        The angular frequency of the cosine, above 0.
 
     Examples
     --------
@@ -168,6 +201,21 @@ class MavroeidisPapageorgiou(Pulse):
 
     r is the time since its middle and `gamma` > 1 says how many oscillations it has. Of the ground it is a `velocity`, or, if
     asked, an `acceleration`. It begins and ends with the value 0.
+
+    Parameters
+    ----------
+    amplitude
+        What the shape is multiplied by, in units of the quantity.
+    start
+        The dimensionless time at which it begins.
+    quantity
+        What it is: "force", or of a ground channel "velocity" or "acceleration".
+    frequency
+        The angular frequency of the carrier, above 0.
+    gamma
+        How many oscillations it has, above 1.
+    phase
+        The phase of the carrier at the middle of the pulse, rad.
 
     Examples
     --------
@@ -209,6 +257,17 @@ class Ricker(Pulse):
     Its peak is `7 (2 / frequency)` after `start`: before the start and after the end, abs(u) > 7, it is below 1e-19 of the
     amplitude and taken as 0. As a ground acceleration it leaves the ground where it was, at rest.
 
+    Parameters
+    ----------
+    amplitude
+        What the shape is multiplied by, in units of the quantity.
+    start
+        The dimensionless time at which it begins.
+    quantity
+        What it is: "force", or of a ground channel "acceleration".
+    frequency
+        The angular frequency of the wavelet, at which its spectrum peaks, above 0.
+
     Examples
     --------
     >>> pulse = saltus.Load(force=saltus.Ricker(amplitude=2.0, frequency=2.0))
@@ -236,6 +295,17 @@ class Ricker(Pulse):
 @dataclass(frozen=True, kw_only=True)
 class Ramp(Pulse):
     """amplitude s / duration for 0 <= s <= duration, and `amplitude` for ever after.
+
+    Parameters
+    ----------
+    amplitude
+        What the shape is multiplied by, in units of the quantity.
+    start
+        The dimensionless time at which it begins.
+    quantity
+        What it is: "force", or of a ground channel "acceleration".
+    duration
+        How long it rises, above 0.
 
     Examples
     --------
@@ -267,6 +337,21 @@ class Chirp(Pulse):
 
     Of the ground its velocity and its displacement are no elementary functions: a model or an impact law that reads them is
     refused.
+
+    Parameters
+    ----------
+    amplitude
+        What the shape is multiplied by, in units of the quantity.
+    start
+        The dimensionless time at which it begins.
+    quantity
+        What it is: "force", or of a ground channel "acceleration".
+    frequency
+        The angular frequency at the start, above 0.
+    end_frequency
+        That at the end, above 0.
+    duration
+        How long it lasts, above 0.
 
     Examples
     --------

@@ -48,6 +48,11 @@ def reversed_system(system: System) -> System:
     a time T before it came to (q, v) at t, with the velocity's sign turned. Rest has no past: a motion that comes to rest forward
     comes from everywhere, so a backward one never meets it.
 
+    Parameters
+    ----------
+    system
+        What moves forward.
+
     Raises
     ------
     ParameterError

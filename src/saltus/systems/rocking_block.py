@@ -27,6 +27,11 @@ class RockingBlock(Model):
     The block is taken to stay on the ground: for nu'' < -1 it would leave it, which nothing here says.
     A motion stops, `overturned`, when the block lies on its side: pi/2 - abs(theta) = 0.
 
+    Parameters
+    ----------
+    alpha
+        The slenderness angle, rad, in (0, pi/2).
+
     Examples
     --------
     >>> block = saltus.System(model=saltus.RockingBlock(alpha=0.25))
@@ -36,7 +41,7 @@ class RockingBlock(Model):
     0.9999999999999871
     """
 
-    alpha: float = field(metadata=RADIANS)  # slenderness angle, in (0, pi/2)
+    alpha: float = field(metadata=RADIANS)
 
     units: ClassVar[tuple[str, ...]] = ("rad",)
     channels: ClassVar[tuple[str, ...]] = ("ground_horizontal", "ground_vertical")

@@ -24,9 +24,9 @@ class Scenario(Enum):
     ['BOUNCING', 'NO_BOUNCING', 'PARTIAL_BOUNCING']
     """
 
-    NO_BOUNCING = "no bouncing"  # it stops
-    BOUNCING = "bouncing"  # it turns back, and is the only one to move, or the other one was open already
-    PARTIAL_BOUNCING = "partial bouncing"  # it turns back, and the other one, closed until then, opens
+    NO_BOUNCING = "no bouncing"  #: it stops
+    BOUNCING = "bouncing"  #: it turns back, and is the only one to move, or the other one was open already
+    PARTIAL_BOUNCING = "partial bouncing"  #: it turns back, and the other one, closed until then, opens
 
 
 class LayerState(NamedTuple):

@@ -27,6 +27,23 @@ class PhysicalCell:
     displacements U / l (`displ_ratio1`), the damping C = C2 T / (M2 l^2), all three as corrected by erratum 13; energies are
     per K2.
 
+    Parameters
+    ----------
+    length
+        l, the length of the inclined bars, m.
+    upper_mass
+        M2, the mass on the upper layer, kg.
+    upper_stiffness
+        K2, the stiffness of the upper layer's springs, N m / rad.
+    lower_mass
+        M1, that on the lower layer, kg.
+    lower_stiffness
+        K1, that of the lower layer, N m / rad; None is K2.
+    upper_damping
+        C2, the damping of the upper layer, N m s / rad.
+    lower_damping
+        C1, that of the lower layer, N m s / rad; None is C2.
+
     Raises
     ------
     ParameterError
@@ -39,13 +56,13 @@ class PhysicalCell:
     0.09999999999999998
     """
 
-    length: float  # l of the inclined bars, m
-    upper_mass: float  # M2, kg
-    upper_stiffness: float  # K2, N m / rad
-    lower_mass: float = 0.0  # M1, kg
-    lower_stiffness: float | None = None  # K1, N m / rad; None is K2
-    upper_damping: float = 0.0  # C2, N m s / rad
-    lower_damping: float | None = None  # C1, N m s / rad; None is C2
+    length: float
+    upper_mass: float
+    upper_stiffness: float
+    lower_mass: float = 0.0
+    lower_stiffness: float | None = None
+    upper_damping: float = 0.0
+    lower_damping: float | None = None
 
     def __post_init__(self) -> None:
         for name, twin in (("lower_stiffness", "upper_stiffness"), ("lower_damping", "upper_damping")):
@@ -64,7 +81,19 @@ class PhysicalCell:
     def from_model(
         cls, model: Metainterface | TwoLayer, *, length: float, upper_mass: float, upper_stiffness: float
     ) -> PhysicalCell:
-        """The cell of this length, upper mass and upper stiffness whose dimensionless numbers are those of `model`."""
+        """The cell of this length, upper mass and upper stiffness whose dimensionless numbers are those of `model`.
+
+        Parameters
+        ----------
+        model
+            The dimensionless model.
+        length
+            l, the length of the inclined bars, m.
+        upper_mass
+            M2, kg.
+        upper_stiffness
+            K2, N m / rad.
+        """
         for name, value in (("length", length), ("upper_mass", upper_mass), ("upper_stiffness", upper_stiffness)):
             check_number(name, value, above=0.0)
         upper_damping = model.damping * math.sqrt(upper_mass * length**2 * upper_stiffness)
@@ -106,19 +135,43 @@ class PhysicalCell:
         }
 
     def metainterface(self, beta0: float) -> Metainterface:
-        """The reduced model of this cell with the angle `beta0`, rad."""
+        """The reduced model of this cell with the angle `beta0`, rad.
+
+        Parameters
+        ----------
+        beta0
+            The angle of the undeformed cell, rad, in (0, pi).
+        """
         return Metainterface(beta0=beta0, **self.ratios)
 
     def two_layer(self, beta0: float) -> TwoLayer:
-        """The two-layer model of this cell with the angle `beta0`, rad."""
+        """The two-layer model of this cell with the angle `beta0`, rad.
+
+        Parameters
+        ----------
+        beta0
+            The angle of the undeformed cell, rad, in (0, pi).
+        """
         return TwoLayer(beta0=beta0, **self.ratios)
 
     def load(self, si: Load) -> Load:
-        """The dimensionless load of one written in SI: rad/s, N, and for the ground m, m/s or m/s^2; records in s."""
+        """The dimensionless load of one written in SI: rad/s, N, and for the ground m, m/s or m/s^2; records in s.
+
+        Parameters
+        ----------
+        si
+            A load in SI units.
+        """
         return self._convert(si, truediv, mul, -1)
 
     def load_in_si(self, load: Load) -> Load:
-        """The inverse of `load`."""
+        """The inverse of `load`.
+
+        Parameters
+        ----------
+        load
+            A dimensionless load.
+        """
         return self._convert(load, mul, truediv, 1)
 
     def _convert(self, load: Load, by_time: Callable[..., Any], by_rate: Callable[..., Any], power: int) -> Load:

@@ -62,6 +62,17 @@ class Harmonic(Signal):
 
     `Harmonic(amplitude=H)` is load (i) of the paper (`loadpatha`); a phase of pi/2 makes it a cosine (`loadpathb`).
 
+    Parameters
+    ----------
+    amplitude
+        The amplitude.
+    mean
+        The mean.
+    phase
+        The phase, rad.
+    order
+        Which multiple of the base frequency it has, from 1 on.
+
     Examples
     --------
     >>> load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=2.0, mean=1.0))
@@ -145,6 +156,19 @@ class Record(Signal):
 
     Outside its samples a ground record has no acceleration: the ground goes on with the velocity it has.
 
+    Parameters
+    ----------
+    time
+        The times of the samples, increasing, (n,).
+    value
+        The samples, (n,).
+    quantity
+        What they are: "force", or of a ground channel "displacement", "velocity" or "acceleration".
+    scale
+        What every sample is multiplied by.
+    source
+        The file that it came from.
+
     Raises
     ------
     ParameterError
@@ -162,7 +186,7 @@ class Record(Signal):
     quantity: str = "force"
     scale: float = 1.0
     once: ClassVar[bool] = True
-    source: str = field(default="", compare=False)  # the file it came from
+    source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.quantity, str) or self.quantity not in QUANTITIES:

@@ -27,6 +27,15 @@ class System:
     `System(model=Metainterface(beta0=...), load=Load(...), impact=VelocityReduction(1.0))`. Every number has a dotted path:
     `model.damping`, `load.frequency`, `load.horizontal.amplitude`, `load.vertical`, `impact.e`.
 
+    Parameters
+    ----------
+    model
+        The equations of motion.
+    load
+        What acts on it; by default nothing.
+    impact
+        What happens at an impact; by default the velocity is kept (e = 1).
+
     Raises
     ------
     ParameterError
@@ -74,6 +83,13 @@ class System:
     def with_(self, changes: Mapping[str, Any] | None = None, **more: Any) -> System:
         """A copy with the parts at the given dotted paths replaced: `system.with_({"load.frequency": 1.1})`.
 
+        Parameters
+        ----------
+        changes
+            The new parts by their dotted paths.
+        more
+            The same for paths without a dot: model=..., load=..., impact=....
+
         Raises
         ------
         ParameterError
@@ -83,7 +99,13 @@ class System:
         return system
 
     def get(self, path: str) -> Any:
-        """The part at a dotted path; a constant channel is its number."""
+        """The part at a dotted path; a constant channel is its number.
+
+        Parameters
+        ----------
+        path
+            The dotted path, such as "load.horizontal.amplitude".
+        """
         if not isinstance(path, str):
             raise ParameterError(f"a path must be a text such as 'load.frequency', got {shown(path)}", "path")
         node: Any = self
@@ -126,7 +148,13 @@ class System:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> System:
-        """The inverse of `to_dict`; `load` and `impact` may be left out."""
+        """The inverse of `to_dict`; `load` and `impact` may be left out.
+
+        Parameters
+        ----------
+        data
+            What `to_dict` gave.
+        """
         if not isinstance(data, Mapping):
             raise ParameterError(f"a system is a table with a model, a load and an impact law, got {shown(data)}", "data")
         unknown = set(data) - {"model", "load", "impact"}
@@ -146,6 +174,11 @@ class System:
     def from_json(cls, text: str) -> System:
         """The inverse of `to_json`.
 
+        Parameters
+        ----------
+        text
+            What `to_json` gave.
+
         Raises
         ------
         ParameterError
@@ -162,6 +195,11 @@ class System:
     @classmethod
     def from_toml(cls, text: str) -> System:
         """The inverse of `to_toml`.
+
+        Parameters
+        ----------
+        text
+            What `to_toml` gave.
 
         Raises
         ------

@@ -34,6 +34,19 @@ class TwoLayer(Model):
     Angles and velocities are pairs (lower, upper) of numbers or arrays; matrices have the shape (2, 2), or (2, 2, ...) for
     arrays. Energies are per K2. The load channels are those of `Metainterface`.
 
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    damping
+        C, the damping of the upper layer, at least 0.
+    stiffness_ratio
+        k = K1 / K2, above 0.
+    mass_ratio
+        m = M1 / M2, at least 0.
+    dissipation_ratio
+        c = C1 / C2, at least 0.
+
     Examples
     --------
     >>> both = saltus.System(model=saltus.TwoLayer(beta0=1.4), load=saltus.Load(vertical=-0.1))
@@ -41,11 +54,11 @@ class TwoLayer(Model):
     ('upper',)
     """
 
-    beta0: float = field(metadata=RADIANS)  # angle of the undeformed cell, in (0, pi)
-    damping: float = 0.0  # C, at least 0
-    stiffness_ratio: float = 1.0  # k = K1 / K2, above 0
-    mass_ratio: float = 0.0  # m = M1 / M2, at least 0
-    dissipation_ratio: float = 1.0  # c = C1 / C2, at least 0
+    beta0: float = field(metadata=RADIANS)
+    damping: float = 0.0
+    stiffness_ratio: float = 1.0
+    mass_ratio: float = 0.0
+    dissipation_ratio: float = 1.0
 
     coordinates: ClassVar[tuple[str, ...]] = ("theta_1", "theta_2")
     units: ClassVar[tuple[str, ...]] = ("rad", "rad")
@@ -88,7 +101,13 @@ class TwoLayer(Model):
         return _matrix(self.damping * self.dissipation_ratio, 0, 0, self.damping)
 
     def velocity_matrix(self, theta: Any) -> Any:
-        """D(theta), which multiplies the squares of the velocities."""
+        """D(theta), which multiplies the squares of the velocities.
+
+        Parameters
+        ----------
+        theta
+            theta_1 and theta_2, rad.
+        """
         coupling = np.sin(self._sum(theta))
         return _matrix(0 * coupling, -coupling, coupling, 0 * coupling)
 
@@ -97,7 +116,17 @@ class TwoLayer(Model):
         return _matrix(self.stiffness_ratio, 0, 0, 1)
 
     def load_vector(self, t: Any, theta: Any, load: Load) -> tuple[Any, Any]:
-        """f(theta, tau): the loads and the ground's accelerations."""
+        """f(theta, tau): the loads and the ground's accelerations.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        theta
+            theta_1 and theta_2, rad.
+        load
+            The load.
+        """
         zeta, nu = load.ground_horizontal.acceleration(t), load.ground_vertical.acceleration(t)
         return self._push(t, theta, load, zeta, nu)
 
@@ -107,6 +136,13 @@ class TwoLayer(Model):
         kappa_1 = k - cos(beta0) [(1+h) H - (1+m) zeta''] + sin(beta0) [(1+v) V - (1+m) nu''] and
         kappa_2 = 1 + cos(beta0) [H - zeta''] + sin(beta0) [V - nu''].
         M0 and f0 are `mass_matrix` and `load_vector` at `contact`; C is unchanged.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        load
+            The load.
         """
         zeta, nu = load.ground_horizontal.acceleration(t), load.ground_vertical.acceleration(t)
         (across_1, along_1), (across_2, along_2) = self._loads(t, load, zeta, nu)
@@ -128,6 +164,19 @@ class TwoLayer(Model):
         """(R_1, R_2) = M theta'' + C theta' + D theta'^2 + K theta - f, what contacts must supply (erratum 21).
 
         Both vanish in free motion. A closed layer (theta_j = theta_j' = theta_j'' = 0) stays closed while R_1 >= 0 or R_2 <= 0.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        theta
+            theta_1 and theta_2, rad.
+        velocity
+            The rates of theta_1 and theta_2.
+        acceleration
+            Their second derivatives.
+        load
+            The load.
         """
         first, second = reactions(self, t, theta, velocity, acceleration, load)
         return first, -second
@@ -141,15 +190,37 @@ class TwoLayer(Model):
         return (self.mass_ratio * (x_1 * x_1 + y_1 * y_1) + x_2 * x_2 + y_2 * y_2) / 2
 
     def potential_energy(self, theta: Any) -> Any:
-        """Pi / K2 = (k theta_1^2 + theta_2^2) / 2 of the springs (`pot_eng_beta`)."""
+        """Pi / K2 = (k theta_1^2 + theta_2^2) / 2 of the springs (`pot_eng_beta`).
+
+        Parameters
+        ----------
+        theta
+            theta_1 and theta_2, rad.
+        """
         return (self.stiffness_ratio * theta[0] * theta[0] + theta[1] * theta[1]) / 2
 
     def dissipation(self, velocity: Any) -> Any:
-        """R / K2 = C (c theta_1'^2 + theta_2'^2) / 2 (`Rayleigh`)."""
+        """R / K2 = C (c theta_1'^2 + theta_2'^2) / 2 (`Rayleigh`).
+
+        Parameters
+        ----------
+        velocity
+            The rates of theta_1 and theta_2.
+        """
         return self.damping * (self.dissipation_ratio * velocity[0] * velocity[0] + velocity[1] * velocity[1]) / 2
 
     def generalised_forces(self, t: Any, theta: Any, load: Load) -> tuple[Any, Any]:
-        """Q_j / K2 of the loads alone, without the ground (`ext_forces_beta`)."""
+        """Q_j / K2 of the loads alone, without the ground (`ext_forces_beta`).
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        theta
+            theta_1 and theta_2, rad.
+        load
+            The load.
+        """
         return self._push(t, theta, load, 0.0, 0.0)
 
     def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load) -> dict[str, Any]:

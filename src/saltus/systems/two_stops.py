@@ -18,16 +18,27 @@ from saltus.systems.model import Model
 class TwoStops(Model):
     """x'' + c x' + k x = F(tau) for d_1 <= x <= d_2: contacts `left` and `right`, with an impact law such as `NewtonImpact`.
 
+    Parameters
+    ----------
+    stiffness
+        k, at least 0.
+    damping
+        c, at least 0.
+    left
+        d_1, the coordinate of the left stop.
+    right
+        d_2, that of the right one, above d_1.
+
     Examples
     --------
     >>> [contact.name for contact in saltus.TwoStops(left=-1.0, right=2.0).contacts]
     ['left', 'right']
     """
 
-    stiffness: float = 1.0  # k, at least 0
-    damping: float = 0.0  # c, at least 0
-    left: float = -1.0  # d_1
-    right: float = 1.0  # d_2, above d_1
+    stiffness: float = 1.0
+    damping: float = 0.0
+    left: float = -1.0
+    right: float = 1.0
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("force",)

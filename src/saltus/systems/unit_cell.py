@@ -35,6 +35,15 @@ class UnitCell:
     With `physical`, a `PhysicalCell` of SI data, the cell makes its models (`metainterface`, `two_layer`);
     `physical.units` converts times, forces and displacements.
 
+    Parameters
+    ----------
+    alpha0
+        The angle between the base and the diagonal in the undeformed cell, rad.
+    beta0
+        The angle between the base and the inclined bar in the undeformed cell, rad.
+    physical
+        The cell's data in SI units, if its models are to be made.
+
     Raises
     ------
     ParameterError
@@ -99,6 +108,11 @@ class UnitCell:
     def line_condition(self, n: int = 1) -> float:
         """n pi - beta0, rad (`line_cond`).
 
+        Parameters
+        ----------
+        n
+            Which of the multiples of pi.
+
         Raises
         ------
         ParameterError
@@ -111,11 +125,22 @@ class UnitCell:
         return self.line_limit
 
     def beta(self, theta: Numbers) -> Any:
-        """beta_j = beta0 + abs(theta_j) (erratum 2), rad."""
+        """beta_j = beta0 + abs(theta_j) (erratum 2), rad.
+
+        Parameters
+        ----------
+        theta
+            The difference angle, rad; any shape.
+        """
         return self.beta0 + np.abs(theta)
 
     def phi(self, theta: Numbers) -> Any:
         """abs(phi_j) from cos(beta_j) = cos(beta0) - psi tan(phi_j)^2 (`gen_conf`), rad.
+
+        Parameters
+        ----------
+        theta
+            The difference angle, rad; any shape.
 
         Raises
         ------
@@ -126,6 +151,15 @@ class UnitCell:
 
     def theta(self, phi: Numbers, *, layer: int = 1, past_line: bool = False) -> Any:
         """theta_j = -(-1)^j (beta_j(phi_j) - beta0) (`gen_conf`, erratum 2), rad; `past_line` takes beta_j > pi.
+
+        Parameters
+        ----------
+        phi
+            The misalignment, rad; any shape.
+        layer
+            1 for the lower one, 2 for the upper one.
+        past_line
+            Whether the layer has gone past the straight line, beta_j > pi.
 
         Raises
         ------
@@ -139,28 +173,58 @@ class UnitCell:
         return -((-1) ** layer) * (beta - self.beta0)
 
     def alpha(self, theta: Numbers) -> Any:
-        """alpha_j of theta_j (`configalpha`, errata 1 and 3), rad; past the line it is the diagonal's angle below the base."""
+        """alpha_j of theta_j (`configalpha`, errata 1 and 3), rad; past the line it is the diagonal's angle below the base.
+
+        Parameters
+        ----------
+        theta
+            The difference angle, rad; any shape.
+        """
         lowering = self._lowering(theta)
         cosine = np.sqrt(self.psi / (lowering + self.psi)) * (lowering + 2 * self.lambda_ * self.chi + self.psi)
         return np.arccos(np.clip(cosine / (2 * self.lambda_), -1, 1))
 
     def alpha_of_phi(self, phi: Numbers) -> Any:
-        """arccos(psi / (2 lambda cos(phi)) + chi cos(phi)) (`gen_conf`), rad."""
+        """arccos(psi / (2 lambda cos(phi)) + chi cos(phi)) (`gen_conf`), rad.
+
+        Parameters
+        ----------
+        phi
+            The misalignment, rad; any shape.
+        """
         self._check_phi(phi)
         cosine = np.cos(phi)
         return np.arccos(np.clip(self.psi / (2 * self.lambda_ * cosine) + self.chi * cosine, -1, 1))
 
     def beta_of_phi(self, phi: Numbers) -> Any:
-        """arccos(cos(beta0) - psi tan(phi)^2), from beta0 to pi (`gen_conf`), rad."""
+        """arccos(cos(beta0) - psi tan(phi)^2), from beta0 to pi (`gen_conf`), rad.
+
+        Parameters
+        ----------
+        phi
+            The misalignment, rad; any shape.
+        """
         self._check_phi(phi)
         return np.arccos(np.clip(math.cos(self.beta0) - self.psi * np.tan(phi) ** 2, -1, 1))
 
     def xi(self, theta: Numbers) -> Any:
-        """Relative horizontal displacement, sgn(theta) (cos(beta0) - cos(beta_j)) (`configdbeta`, erratum 2)."""
+        """Relative horizontal displacement, sgn(theta) (cos(beta0) - cos(beta_j)) (`configdbeta`, erratum 2).
+
+        Parameters
+        ----------
+        theta
+            The difference angle, rad; any shape.
+        """
         return np.sign(theta) * (math.cos(self.beta0) - np.cos(self.beta(theta)))
 
     def eta(self, theta: Numbers) -> Any:
-        """Height of the layer, sin(beta_j) (`configdbeta`)."""
+        """Height of the layer, sin(beta_j) (`configdbeta`).
+
+        Parameters
+        ----------
+        theta
+            The difference angle, rad; any shape.
+        """
         return np.sin(self.beta(theta))
 
     def phi_velocity(self, theta: Numbers, velocity: Numbers) -> Any:
@@ -168,6 +232,13 @@ class UnitCell:
 
         At an impact, theta -> 0 with theta' finite, it diverges like abs(theta)' sqrt(sin(beta0) / (4 psi abs(theta)))
         (`fundamentalproperty`, `fundamentalvelocity`): there the result is an infinity of its sign, or 0 for theta' = 0.
+
+        Parameters
+        ----------
+        theta
+            The difference angle, rad; any shape.
+        velocity
+            theta', per unit of tau; it broadcasts.
         """
         phi, rate = self.phi(theta), np.where(np.less(theta, 0), -1.0, 1.0) * np.asarray(velocity)
         slope = np.sin(self.beta(theta)) * np.cos(phi) ** 3 / (2 * self.psi)
@@ -176,11 +247,26 @@ class UnitCell:
         return np.where(closed, moving, rate * slope / np.where(closed, 1.0, np.sin(phi)))[()]
 
     def small_phi(self, theta: Numbers) -> Any:
-        """abs(phi) = sqrt(abs(theta) sin(beta0) / psi), its limit for theta -> 0 (`fundamentalproperty`), rad."""
+        """abs(phi) = sqrt(abs(theta) sin(beta0) / psi), its limit for theta -> 0 (`fundamentalproperty`), rad.
+
+        Parameters
+        ----------
+        theta
+            The difference angle, rad; any shape.
+        """
         return np.sqrt(np.abs(theta) * math.sin(self.beta0) / self.psi)
 
     def layout(self, theta_1: float = 0.0, theta_2: float = 0.0, *, misaligned: tuple[int, int] = (1, 1)) -> CellLayout:
         """Where every hinge, slider and mass is, in units of l from the lower left hinge; `misaligned` holds the signs of phi_j.
+
+        Parameters
+        ----------
+        theta_1
+            The opening of the lower layer, rad, at least 0.
+        theta_2
+            That of the upper one, rad, at most 0.
+        misaligned
+            The signs of phi_1 and phi_2.
 
         Raises
         ------

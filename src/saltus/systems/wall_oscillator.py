@@ -18,6 +18,15 @@ class WallOscillator(Model):
 
     It has one mode, ended at the wall and entered again, and rests on the wall while F - k d > 0.
 
+    Parameters
+    ----------
+    stiffness
+        k, at least 0.
+    damping
+        c, at least 0.
+    wall
+        d, the coordinate of the wall.
+
     Examples
     --------
     >>> ball = saltus.System(model=saltus.WallOscillator(stiffness=0.0, wall=0.0), load=saltus.Load(force=1.0))
@@ -25,9 +34,9 @@ class WallOscillator(Model):
     array([2.])
     """
 
-    stiffness: float = 1.0  # k, at least 0
-    damping: float = 0.0  # c, at least 0
-    wall: float = 1.0  # d
+    stiffness: float = 1.0
+    damping: float = 0.0
+    wall: float = 1.0
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("force",)

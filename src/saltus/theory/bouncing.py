@@ -21,6 +21,19 @@ from saltus.theory.loaded_equilibria import zeros_of_slope
 class Peaks:
     """The two peaks of a periodic motion through theta = 0, and the velocities between which the impacts change it.
 
+    Attributes
+    ----------
+    theta_min
+        The peak on the upper side, rad, below 0.
+    theta_max
+        That on the lower side, rad, above 0.
+    lower_speed
+        abs(theta') at theta = 0 on the lower side.
+    upper_speed
+        abs(theta') at theta = 0 on the upper side.
+    period
+        The period of the whole oscillation, by quadrature.
+
     Examples
     --------
     >>> peaks = saltus.theory.peaks(tristable, 0.1)
@@ -28,11 +41,11 @@ class Peaks:
     0.0
     """
 
-    theta_min: float  # rad, below 0
-    theta_max: float  # rad, above 0
-    lower_speed: float  # abs(theta') at theta = 0 on the lower side
-    upper_speed: float  # abs(theta') at theta = 0 on the upper side
-    period: float  # of the whole oscillation, by quadrature
+    theta_min: float
+    theta_max: float
+    lower_speed: float
+    upper_speed: float
+    period: float
 
     @property
     def ratio(self) -> float:
@@ -50,6 +63,13 @@ def peaks(system: System, theta0: float) -> Peaks:
         k theta_max^2 / 2 - V sin(beta0 + theta_max) = theta_min^2 / 2 - V sin(beta0 + abs(theta_min))
 
     With m > 0 a constant velocity (e = 1) changes the energy at each impact and back again; r = 1 keeps it.
+
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
+    theta0
+        The opening at the start, at rest, rad.
 
     Raises
     ------
@@ -128,6 +148,15 @@ def unloaded_peak_ratio(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0, *, 
 
     It vanishes for k -> 0 and for k -> infinity; with e = 1 also for m -> infinity.
 
+    Parameters
+    ----------
+    stiffness_ratio
+        k = K1 / K2.
+    mass_ratio
+        m = M1 / M2.
+    energy_conserving
+        Whether the impact keeps the energy (r = 1) and not the velocity (e = 1).
+
     Examples
     --------
     >>> float(saltus.theory.unloaded_peak_ratio(4.0, energy_conserving=True))  # 1 / sqrt(k) or its inverse
@@ -140,6 +169,13 @@ def unloaded_peak_ratio(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0, *, 
 
 def unloaded_half_periods(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -> tuple[Any, float]:
     """Durations without loads on the lower and on the upper side (`period_case1`): pi sqrt((1+m)/k) and pi, any shape.
+
+    Parameters
+    ----------
+    stiffness_ratio
+        k = K1 / K2.
+    mass_ratio
+        m = M1 / M2.
 
     Examples
     --------
@@ -156,6 +192,13 @@ def unloaded_period(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -> Any:
 
     It holds for e = 1 and for r = 1, since without loads the durations do not depend on the amplitude.
 
+    Parameters
+    ----------
+    stiffness_ratio
+        k = K1 / K2.
+    mass_ratio
+        m = M1 / M2.
+
     Examples
     --------
     >>> round(float(saltus.theory.unloaded_period(4.0) / np.pi), 12)  # (1 + 1 / sqrt(k)) half periods
@@ -171,6 +214,13 @@ def reciprocal(system: System, theta0: float) -> tuple[System, float]:
         P_R(V, k), from theta0, equals P_R(V / k, 1 / k) from -theta0
 
     Constant forces on the upper mass only, m = 0. P and M are divided by k, which rescales time by sqrt(k) and leaves the angles.
+
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
+    theta0
+        The opening at the start, at rest, rad.
 
     Raises
     ------

@@ -19,6 +19,13 @@ def potential_energy(system: System, theta: Numbers) -> Any:
 
     where V, H stand for (1+v)^P V, (1+h)^P H, and s for the sign of theta.
 
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
+    theta
+        The coordinate, rad; any shape.
+
     Raises
     ------
     ParameterError
@@ -35,6 +42,13 @@ def potential_energy(system: System, theta: Numbers) -> Any:
 def potential_slope(system: System, theta: Numbers) -> Any:
     """dP/dtheta, minus the moment on the open layer; at theta = 0 the mean of its two one-sided values. Any shape.
 
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
+    theta
+        The coordinate, rad; any shape.
+
     Examples
     --------
     >>> state = saltus.theory.equilibria(tristable)[0]
@@ -49,6 +63,8 @@ def total_energy(system: System, theta: Numbers, velocity: Numbers, side: Number
 
     Parameters
     ----------
+    system
+        A metainterface under constant loads.
     theta, velocity
         Numbers or arrays that broadcast, rad and rad per unit of tau.
     side

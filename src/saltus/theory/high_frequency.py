@@ -33,6 +33,19 @@ def high_frequency_onset(frequency: Numbers, *, beta0: float, vertical: float, d
 
     The amplitude there is theta = A pi^2 / (8 Omega^2), which must be small against 1.
 
+    Parameters
+    ----------
+    frequency
+        Omega, any shape.
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    vertical
+        The constant load V.
+    damping
+        C, above 0.
+    order
+        1 or 2, of the expansion.
+
     Raises
     ------
     ParameterError

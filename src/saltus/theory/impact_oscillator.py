@@ -35,6 +35,25 @@ class WallOrbits:
 
         trace = -e tr + alpha Delta {Omega^2 wall / v - [c (1 - beta) - (k - Omega^2) alpha]}
 
+    Attributes
+    ----------
+    stiffness
+        k.
+    damping
+        c, with c^2 < 4 k.
+    wall
+        The wall less the mean's displacement, d - mean / k.
+    frequency
+        Omega.
+    restitution
+        e.
+    period
+        q, in forcing periods.
+    phase
+        The phase of the load, rad.
+    centre
+        The mean's displacement, mean / k.
+
     Examples
     --------
     >>> family = saltus.theory.wall_orbits(wall)
@@ -42,14 +61,14 @@ class WallOrbits:
     8.0
     """
 
-    stiffness: float  # k
-    damping: float  # c, with c^2 < 4 k
-    wall: float  # d - mean / k
-    frequency: float  # Omega
-    restitution: float  # e
-    period: int  # q
-    phase: float = 0.0  # of the load, rad
-    centre: float = 0.0  # mean / k
+    stiffness: float
+    damping: float
+    wall: float
+    frequency: float
+    restitution: float
+    period: int
+    phase: float = 0.0
+    centre: float = 0.0
 
     @property
     def duration(self) -> float:
@@ -87,12 +106,24 @@ class WallOrbits:
         return _positive(over_speed, -1 - self.determinant - constant)
 
     def amplitude(self, speed: Any) -> Any:
-        """A of the orbit whose impact has the speed v >= 0, any shape; admissible or not."""
+        """A of the orbit whose impact has the speed v >= 0, any shape; admissible or not.
+
+        Parameters
+        ----------
+        speed
+            v just before the impact.
+        """
         alpha, _, gamma = self._slopes
         return abs(self.impedance) * np.hypot(self.wall - alpha * np.asarray(speed), gamma * np.asarray(speed))[()]
 
     def speeds(self, amplitude: float) -> tuple[float, ...]:
-        """The speeds v > 0 of all orbits under the amplitude A, increasing: none, one, or two (between LP and GR)."""
+        """The speeds v > 0 of all orbits under the amplitude A, increasing: none, one, or two (between LP and GR).
+
+        Parameters
+        ----------
+        amplitude
+            A of the force.
+        """
         alpha, _, gamma = self._slopes
         response, square = abs(amplitude) / abs(self.impedance), alpha**2 + gamma**2
         inside = square * response**2 - (gamma * self.wall) ** 2
@@ -104,7 +135,13 @@ class WallOrbits:
         return tuple(sorted(v for v in roots if v > 0))
 
     def multipliers(self, speed: float) -> np.ndarray:
-        """Both multipliers of the orbit whose impact has the speed v > 0, complex, the larger one first."""
+        """Both multipliers of the orbit whose impact has the speed v > 0, complex, the larger one first.
+
+        Parameters
+        ----------
+        speed
+            v just before the impact.
+        """
         constant, over_speed = self._trace
         half = (constant + over_speed / speed) / 2
         root = np.sqrt(complex(half**2 - self.determinant))
@@ -113,6 +150,11 @@ class WallOrbits:
 
     def orbit(self, speed: float) -> WallOrbit:
         """The orbit whose impact has the speed v > 0.
+
+        Parameters
+        ----------
+        speed
+            v just before the impact.
 
         Raises
         ------
@@ -155,6 +197,13 @@ class WallOrbits:
 class WallOrbit:
     """One of `WallOrbits`, admissible or not: its impact, its load, its multipliers, and the motion between two impacts.
 
+    Attributes
+    ----------
+    family
+        The orbits to which it belongs.
+    speed
+        v > 0, just before the impact.
+
     Examples
     --------
     >>> family = saltus.theory.wall_orbits(wall)
@@ -163,7 +212,7 @@ class WallOrbit:
     """
 
     family: WallOrbits = field(repr=False)
-    speed: float  # v > 0 just before the impact
+    speed: float
 
     @property
     def amplitude(self) -> float:
@@ -212,7 +261,13 @@ class WallOrbit:
         return family.wall - max(heights) if heights else math.inf
 
     def state(self, tau: Any) -> tuple[Any, Any]:
-        """x and x' at tau, any shape, of the orbit with an impact at `impact_time`; just after the impact where tau is one."""
+        """x and x' at tau, any shape, of the orbit with an impact at `impact_time`; just after the impact where tau is one.
+
+        Parameters
+        ----------
+        tau
+            The dimensionless time, any shape.
+        """
         x, velocity = self._between((np.asarray(tau, dtype=float) - self.impact_time) % self.family.duration)
         return x + self.family.centre, velocity
 
@@ -234,6 +289,13 @@ class WallOrbit:
 
 def wall_orbits(system: System, period: int = 1) -> WallOrbits:
     """The orbits of an impact oscillator with one impact in `period` forcing periods; the system's amplitude does not matter.
+
+    Parameters
+    ----------
+    system
+        A `WallOscillator` under one harmonic force.
+    period
+        In forcing periods, from 1 on.
 
     Raises
     ------

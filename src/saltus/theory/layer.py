@@ -21,6 +21,23 @@ class Layer:
 
     with the powers P taken: mass (1+m)^P, damping c^P C, stiffness k^P, outward s (1+h)^P H, vertical (1+v)^P V.
 
+    Attributes
+    ----------
+    side
+        +1 for the lower layer, -1 for the upper one.
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    mass
+        (1+m)^P.
+    damping
+        c^P C.
+    stiffness
+        k^P.
+    outward
+        s (1+h)^P H.
+    vertical
+        (1+v)^P V.
+
     Examples
     --------
     >>> saltus.theory.open_layer(tristable, 1).mass
@@ -46,25 +63,55 @@ class Layer:
         return self.stiffness + math.hypot(self.outward, self.vertical)
 
     def push(self, x: Any) -> Any:
-        """The outward moment of the loads at the opening x."""
+        """The outward moment of the loads at the opening x.
+
+        Parameters
+        ----------
+        x
+            The opening of the layer, rad; any shape.
+        """
         return self.outward * np.sin(self.beta0 + x) + self.vertical * np.cos(self.beta0 + x)
 
     def potential(self, x: Any) -> Any:
-        """P (`pot_balance0`), zero at x = 0; the differences of sines are taken as products, exact for small x."""
+        """P (`pot_balance0`), zero at x = 0; the differences of sines are taken as products, exact for small x.
+
+        Parameters
+        ----------
+        x
+            The opening of the layer, rad; any shape.
+        """
         half, middle = np.sin(x / 2), self.beta0 + x / 2
         work = 2 * half * (self.outward * np.sin(middle) + self.vertical * np.cos(middle))
         return self.stiffness * x * x / 2 - work
 
     def slope(self, x: Any) -> Any:
-        """dP/dx, the moment that closes the layer."""
+        """dP/dx, the moment that closes the layer.
+
+        Parameters
+        ----------
+        x
+            The opening of the layer, rad; any shape.
+        """
         return self.stiffness * x - self.push(x)
 
     def curvature(self, x: Any) -> Any:
-        """d2P/dx2; at x = 0 the stiffness kappa of the linearised equation."""
+        """d2P/dx2; at x = 0 the stiffness kappa of the linearised equation.
+
+        Parameters
+        ----------
+        x
+            The opening of the layer, rad; any shape.
+        """
         return self.stiffness - self.outward * np.cos(self.beta0 + x) + self.vertical * np.sin(self.beta0 + x)
 
     def eigenvalues(self, curvature: float) -> tuple[complex, complex]:
-        """The eigenvalues of the motion linearised where d2P/dx2 = `curvature`, the faster growing one first."""
+        """The eigenvalues of the motion linearised where d2P/dx2 = `curvature`, the faster growing one first.
+
+        Parameters
+        ----------
+        curvature
+            d2P/dx2.
+        """
         root = cmath.sqrt(self.damping**2 - 4 * self.mass * curvature)
         return (-self.damping + root) / (2 * self.mass), (-self.damping - root) / (2 * self.mass)
 
@@ -82,6 +129,13 @@ class Layer:
 
 def open_layer(system: System, side: int) -> Layer:
     """The layer of a metainterface that is open on `side` (+1 the lower one, -1 the upper one), under constant loads.
+
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
+    side
+        +1 for the lower layer, -1 for the upper one.
 
     Raises
     ------
@@ -111,6 +165,11 @@ def open_layer(system: System, side: int) -> Layer:
 
 def layers(system: System) -> tuple[Layer, Layer]:
     """The lower layer (theta > 0) and the upper one (theta < 0).
+
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
 
     Examples
     --------

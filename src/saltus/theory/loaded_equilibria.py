@@ -25,12 +25,27 @@ class Stability(Enum):
 
     STABLE = "stable"
     UNSTABLE = "unstable"
-    FOLD = "fold"  # P' = P'' = 0: two equilibria meet
+    FOLD = "fold"  #: P' = P'' = 0: two equilibria meet
 
 
 @dataclass(frozen=True, slots=True)
 class LoadedEquilibrium:
     """A state of rest under constant loads.
+
+    Attributes
+    ----------
+    theta
+        The coordinate, rad.
+    stability
+        Whether small disturbances stay small.
+    energy
+        P(theta) - P(0), over K2.
+    curvature
+        P''(theta); None at theta = 0, where it has a corner.
+    eigenvalues
+        Those of the linearised motion, the faster growing one first; None at theta = 0.
+    within_line
+        Whether abs(theta) <= pi - beta0, the straight line.
 
     Examples
     --------
@@ -38,12 +53,12 @@ class LoadedEquilibrium:
     [True, False, True, False, True]
     """
 
-    theta: float  # rad
+    theta: float
     stability: Stability
-    energy: float  # P(theta) - P(0), over K2
-    curvature: float | None  # P''(theta); None at theta = 0, where it has a corner
-    eigenvalues: tuple[complex, complex] | None  # of the linearised motion, the faster growing one first; None at theta = 0
-    within_line: bool  # abs(theta) <= pi - beta0, the straight line
+    energy: float
+    curvature: float | None
+    eigenvalues: tuple[complex, complex] | None
+    within_line: bool
 
     @property
     def stable(self) -> bool:
@@ -56,6 +71,11 @@ def equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
 
     They are the zeros of P'(theta) (`pot_balance0`), stable where P'' > 0, and theta = 0 while the loads hold both layers
     closed or push both open. Between the zeros of P'', known in closed form, P' is monotone, so none can be missed.
+
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
 
     Raises
     ------
@@ -81,6 +101,11 @@ def undeformed_stability(system: System) -> Stability | None:
     With H = 0 it is stable for V cos(beta0) < 0 and unstable for V cos(beta0) > 0; in general, stable if the loads close
     both layers. If they push one open and the other closed the system leaves, and theta = 0 is no equilibrium.
     At V cos(beta0) = 0 the curvature decides, k^P + V sin(beta0).
+
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
 
     Examples
     --------

@@ -14,6 +14,15 @@ from saltus.systems import Metainterface, System
 class AmplitudeLimit:
     """An amplitude that motions of the mechanism do not pass.
 
+    Attributes
+    ----------
+    name
+        Its name, that of the margin.
+    value
+        The limit, rad; an array where it varies with a parameter that is one.
+    meaning
+        What happens there.
+
     Examples
     --------
     >>> saltus.theory.amplitude_limits(system)[0].name
@@ -21,7 +30,7 @@ class AmplitudeLimit:
     """
 
     name: str
-    value: Any  # rad; an array where the limit varies with a parameter that is one
+    value: Any
     meaning: str
 
 

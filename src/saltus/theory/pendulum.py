@@ -21,6 +21,17 @@ def pendulum_acceleration(system: System, tau: Numbers, theta: Numbers, velocity
     No sign of theta is left: sin(abs(theta) + pi/2) = cos(theta) and sgn(theta) cos(abs(theta) + pi/2) = -sin(theta),
     so with e = 1 there is no impact to speak of.
 
+    Parameters
+    ----------
+    system
+        A symmetric metainterface with beta0 = pi/2.
+    tau
+        The dimensionless time; any shape.
+    theta
+        The coordinate, rad; any shape.
+    velocity
+        theta'; any shape.
+
     Raises
     ------
     ParameterError

@@ -66,6 +66,20 @@ class Arc:
 class LinearMotion:
     """A motion of the piecewise-linear equation; call it for theta(tau) and theta'(tau).
 
+    Attributes
+    ----------
+    impact_times
+        (n,): the times tau_*^[i] of the impacts.
+    velocity_before
+        (n,): theta' just before each.
+    velocity_after
+        (n,): theta' just after.
+    arcs
+        The motion between impacts: the first arc from 0, the others from each impact; none from an impact that stops the
+        motion.
+    end
+        The time up to which it is known: the next impact, or infinity if none follows.
+
     Examples
     --------
     >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
@@ -74,11 +88,11 @@ class LinearMotion:
     [0.1, 0.0]
     """
 
-    impact_times: np.ndarray  # (n,) tau_*^[i]
-    velocity_before: np.ndarray  # (n,) theta' just before each impact
-    velocity_after: np.ndarray  # (n,) theta' just after
-    arcs: tuple[Arc, ...]  # the first from 0, the others from each impact; none from an impact that stops the motion
-    end: float  # the time up to which it is known: the next impact, or infinity if none follows
+    impact_times: np.ndarray
+    velocity_before: np.ndarray
+    velocity_after: np.ndarray
+    arcs: tuple[Arc, ...]
+    end: float
 
     def __call__(self, tau: Any) -> tuple[Any, Any]:
         """theta and theta' at `tau`, any shape, from 0 to `end`; just after an impact the velocity is the one after it.
@@ -109,6 +123,15 @@ def linear_motion(system: System, theta0: float, impacts: int) -> LinearMotion:
     """The solution of `gov_eqn_constant_loading_lin` from theta0, at rest, through so many impacts (`linsol_theta1`).
 
     Any k, m, c, e or r and either sign of theta0; a constant H acts through s H sin(beta0) and the stiffness -s H cos(beta0).
+
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
+    theta0
+        The opening at the start, at rest, rad.
+    impacts
+        How many impacts.
 
     Raises
     ------

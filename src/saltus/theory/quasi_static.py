@@ -22,6 +22,15 @@ def critical_horizontal(beta0: float, vertical: Numbers, swing: float = 0.0) -> 
     Hhat sin(tau), it is the ellipse that touches the border V cos(beta0) = -abs(H) sin(beta0) (errata 35): the largest of
     tan(beta0) Hhat sin(tau) + swing cos(tau) is sqrt((tan(beta0) Hhat)^2 + swing^2), which must reach abs(V).
 
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    vertical
+        V, or its mean where it swings; any shape.
+    swing
+        The amplitude of V, for load (iii).
+
     Raises
     ------
     ParameterError
@@ -53,6 +62,13 @@ def fold_curve(beta0: float, opening: Numbers) -> tuple[Any, Any]:
     These solve P' = x - H sin(beta0 + x) - V cos(beta0 + x) = 0 and P'' = 0, which are linear in H and V. The curve leaves the
     line V cos(beta0) = -H sin(beta0) at x = 0, V = -sin(beta0), tangent to it. Its mirror is H -> -H.
 
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    opening
+        x, rad; any shape.
+
     Raises
     ------
     ParameterError
@@ -77,6 +93,11 @@ def fold_curve(beta0: float, opening: Numbers) -> tuple[Any, Any]:
 def subcritical_vertical(beta0: float) -> float:
     """V = -sin(beta0), below which the buckling at Hcr is subcritical (errata 23), for beta0 < pi/2.
 
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+
     Examples
     --------
     >>> round(float(saltus.theory.subcritical_vertical(np.pi / 6)), 12)  # -sin(beta0)
@@ -90,6 +111,11 @@ def unloaded_fold(beta0: float) -> tuple[float, float]:
     """The V below which deformed equilibria exist without any H (k = 1, beta0 < pi/2, errata 23), and their theta there:
 
     x = -cot(beta0 + x),   V = -1 / sin(beta0 + x),   the point H = 0 of `fold_curve`
+
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
 
     Examples
     --------
@@ -108,6 +134,13 @@ def fold_horizontal(beta0: float, vertical: Numbers) -> Any:
 
     It is `fold_curve` at the opening with dV/dx = -x sin(beta0 + x) < 0, found by bisection; 0 below `unloaded_fold`, where they
     exist without any H. It is never above Hcr.
+
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    vertical
+        The constant load V.
 
     Raises
     ------
@@ -143,6 +176,15 @@ def is_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
     looking at: the other layer's push at beta0 + x is this one's at 2 pi - beta0 - x, so its equilibria come later.
     Broadcasts; arrays of bool.
 
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    horizontal
+        The constant load H.
+    vertical
+        The constant load V.
+
     Examples
     --------
     >>> bool(saltus.theory.is_monostable(1.4, 0.0, -0.5))
@@ -160,6 +202,15 @@ def is_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
 def paper_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
     """The domain as Fig. 8 states it, V cos(beta0) < -abs(H) sin(beta0): the undeformed state is stable there, but not alone.
 
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    horizontal
+        The constant load H.
+    vertical
+        The constant load V.
+
     Examples
     --------
     >>> bool(saltus.theory.paper_monostable(1.4, 0.0, -0.5))
@@ -173,6 +224,15 @@ def static_angle(beta0: float, horizontal: float, vertical: float) -> float:
     """theta_st, the equilibrium that the undeformed state gives way to as H grows past Hcr to its amplitude, V constant (k = 1).
 
     The smallest positive zero of P', stable because the loads push open at contact.
+
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    horizontal
+        The amplitude H.
+    vertical
+        The constant load V.
 
     Raises
     ------
@@ -200,10 +260,17 @@ def static_angle(beta0: float, horizontal: float, vertical: float) -> float:
 def equivalent_angle(beta0: float, ground_amplitude: Numbers) -> Any:
     """theta_eq = arccos(cos(beta0) - zetahat) - beta0, the opening whose horizontal displacement is zetahat, any shape.
 
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    ground_amplitude
+        zetahat, the amplitude of the ground; any shape.
+
     Raises
     ------
     ParameterError
-        Zetahat out of [0, 1 + cos(beta0)], the largest displacement (`max_disp_condition`).
+        zetahat out of [0, 1 + cos(beta0)], the largest displacement (`max_disp_condition`).
 
     Examples
     --------

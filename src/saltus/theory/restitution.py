@@ -19,6 +19,15 @@ from saltus.theory.layer import metainterface
 class InelasticContact:
     """A frictionless, perfectly inelastic impact that ends one side.
 
+    Attributes
+    ----------
+    factor
+        theta'+ / theta'-, 0 where the motion stops.
+    restitution
+        r = T+ / T- on a ground at rest.
+    impulses
+        The impulses over theta'- of the constraints theta_1 >= 0 and theta_2 <= 0, the two rows of M [[theta']].
+
     Examples
     --------
     >>> contact = saltus.theory.inelastic_contact(np.deg2rad(80), 0.0, 1)
@@ -26,9 +35,8 @@ class InelasticContact:
     0.0
     """
 
-    factor: float  # theta'+ / theta'-, 0 where the motion stops
-    restitution: float  # r = T+ / T- on a ground at rest
-    # Impulses over theta'- of the constraints theta_1 >= 0 and theta_2 <= 0, the two rows of M [[theta']].
+    factor: float
+    restitution: float
     impulses: tuple[float, float]
 
 
@@ -43,6 +51,15 @@ def inelastic_contact(beta0: float, mass_ratio: float, side: int) -> InelasticCo
 
     Both keep r = cos^2(2 beta0) / (1+m) of the energy. Ground velocities are continuous, so they drop out of the jump. This
     opens the other layer the right way for pi/4 < beta0 < 3 pi/4; otherwise its constraint acts too, and both stop (factor 0).
+
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    mass_ratio
+        m = M1 / M2.
+    side
+        The side that the impact ends.
 
     Raises
     ------
@@ -75,6 +92,19 @@ def energy_factor(system: System, velocity: float, side: int, e: float, tau: flo
     the vertical ground velocity with one sign on both sides. On a ground at rest r = e^2 / (1+m)^s, with m = 0 the e^2
     of `rest_def_red`.
 
+    Parameters
+    ----------
+    system
+        A model with a kinetic energy.
+    velocity
+        The velocity theta'- before the impact.
+    side
+        The side that the impact ends, +1 or -1.
+    e
+        The factor of the velocity at an impact.
+    tau
+        The dimensionless time of the impact.
+
     Raises
     ------
     ParameterError
@@ -94,10 +124,23 @@ def energy_factor(system: System, velocity: float, side: int, e: float, tau: flo
 def velocity_factor(system: System, velocity: float, side: int, r: float, tau: float = 0.0) -> float:
     """e = theta'+ / theta'- of an impact that ends `side` with T+ = r T- (`rest_def`): the inverse of `energy_factor`.
 
+    Parameters
+    ----------
+    system
+        A model with a kinetic energy.
+    velocity
+        The velocity theta'- before the impact.
+    side
+        The side that the impact ends, +1 or -1.
+    r
+        The share of the kinetic energy that the impact leaves.
+    tau
+        The dimensionless time of the impact.
+
     Raises
     ------
     ParameterError
-        Velocity = 0, or none solves it (errata 26), with the instant and the velocity.
+        velocity = 0, or none solves it (errata 26), with the instant and the velocity.
 
     Examples
     --------
@@ -121,6 +164,19 @@ def energy_jump(system: System, velocity: Numbers, side: int, e: Numbers, tau: N
         from upper:  -[(1-(1+m) e^2) v^2 + 2 v ((1-(1+m) e) sin(beta0) zeta' - (1+(1+m) e) cos(beta0) nu')] / 2
 
     The energy decreases where this is below 0. With nu' other than 0 it changes even at e = 1, m = 0.
+
+    Parameters
+    ----------
+    system
+        A metainterface.
+    velocity
+        The velocity theta'- before the impact.
+    side
+        The side that the impact ends, +1 or -1.
+    e
+        The factor of the velocity at an impact.
+    tau
+        The dimensionless time of the impact.
 
     Raises
     ------

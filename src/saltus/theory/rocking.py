@@ -21,6 +21,13 @@ def rocking_period(theta0: Numbers, *, alpha: float) -> Any:
     with R_F Carlson's symmetric elliptic integral: alpha - theta is an inverted pendulum (`EOM&Rock`). It is Legendre's
     F(chi | cos^2((alpha - theta0)/2)) with tan(chi) = u / (c s), in a form that keeps its digits as theta0 nears alpha.
 
+    Parameters
+    ----------
+    theta0
+        The opening at the start, at rest, rad; any shape.
+    alpha
+        The slenderness angle of the block, rad.
+
     Raises
     ------
     ParameterError
@@ -43,6 +50,13 @@ def rocking_period(theta0: Numbers, *, alpha: float) -> Any:
 def short_rocking_period(theta0: Numbers, *, alpha: float) -> Any:
     """p T0 = 4 sqrt(2 abs(theta0) / sin(alpha)), for abs(theta0) << alpha (appendix A), any shape, in units of 1/p.
 
+    Parameters
+    ----------
+    theta0
+        The opening at the start, at rest, rad; any shape.
+    alpha
+        The slenderness angle of the block, rad.
+
     Raises
     ------
     ParameterError
@@ -61,6 +75,13 @@ def slender_rocking_period(theta0: Numbers, *, alpha: float) -> Any:
 
     It holds for small alpha and every abs(theta0) < alpha, not only close to alpha as the paper says (errata 17); its relative
     error is of order alpha^2.
+
+    Parameters
+    ----------
+    theta0
+        The opening at the start, at rest, rad; any shape.
+    alpha
+        The slenderness angle of the block, rad.
 
     Raises
     ------
@@ -84,6 +105,10 @@ def rocking_energy_jump(velocity: Numbers, *, alpha: float, e: float, ground_vel
     ----------
     velocity
         theta'- in the time p t, any shape.
+    alpha
+        The slenderness angle of the block, rad.
+    e
+        The factor of the velocity at an impact.
     ground_velocity
         zeta' in the same time, zeta = 3 U_h / (4 R); it broadcasts.
 
@@ -104,6 +129,17 @@ def rocking_energy_decreases(velocity: Numbers, *, alpha: float, e: float, groun
 
     Broadcasts; arrays of bool.
 
+    Parameters
+    ----------
+    velocity
+        theta'- in the time p t, any shape.
+    alpha
+        The slenderness angle of the block, rad.
+    e
+        The factor of the velocity at an impact.
+    ground_velocity
+        zeta' in the same time, zeta = 3 U_h / (4 R); it broadcasts.
+
     Examples
     --------
     >>> bool(saltus.theory.rocking_energy_decreases(0.1, alpha=0.3, e=0.9))
@@ -119,6 +155,11 @@ def housner_restitution(alpha: float) -> float:
     """r = (1 - (3/2) sin^2(alpha))^2, the energy kept when angular momentum about the new corner is (Housner 1963).
 
     The velocity factor is its root, above 0 for sin^2(alpha) < 2/3.
+
+    Parameters
+    ----------
+    alpha
+        The slenderness angle of the block, rad.
 
     Raises
     ------

@@ -21,6 +21,15 @@ UPRIGHT = 1e-15  # moments V cos(beta0) below this are the rounding of cos(pi/2)
 class Vibration:
     """The small vibration of one open layer about its own (virtual) centre (`gov_beta_reduced`).
 
+    Attributes
+    ----------
+    frequency
+        The apparent angular frequency Omega_0.
+    damping_ratio
+        mu.
+    centre
+        theta of the linearised equilibrium.
+
     Examples
     --------
     >>> constant = saltus.System(model=system.model, load=saltus.Load(vertical=-0.5))
@@ -29,9 +38,9 @@ class Vibration:
     True
     """
 
-    frequency: float  # apparent angular frequency Omega_0
-    damping_ratio: float  # mu
-    centre: float  # theta of the linearised equilibrium
+    frequency: float
+    damping_ratio: float
+    centre: float
 
 
 def vibrations(system: System) -> tuple[Vibration, Vibration]:
@@ -41,10 +50,15 @@ def vibrations(system: System) -> tuple[Vibration, Vibration]:
 
     A constant H adds -s H cos(beta0) to kappa.
 
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
+
     Raises
     ------
     ParameterError
-        Kappa <= 0, where the layer does not vibrate; another model, or a load that varies in time.
+        kappa <= 0, where the layer does not vibrate; another model, or a load that varies in time.
 
     Examples
     --------
@@ -75,6 +89,15 @@ def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
         T0 = 4 / sqrt(kappa) arccos(1 / (1 - kappa abs(theta0) / (V cos(beta0)))),   kappa = 1 + V sin(beta0)
 
     continued to kappa <= 0, where it is an arccosh and grows without bound as abs(theta0) nears the saddle of `non-trivial`.
+
+    Parameters
+    ----------
+    theta0
+        The opening at the start, at rest, rad; any shape.
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    vertical
+        The constant load V.
 
     Raises
     ------
@@ -116,6 +139,15 @@ def short_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
 
         T0 = 4 sqrt(2 abs(theta0)) / sqrt(-V cos(beta0)), the next factor being 1 + 5/12 kappa abs(theta0) / (V cos(beta0))
 
+    Parameters
+    ----------
+    theta0
+        The opening at the start, at rest, rad; any shape.
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    vertical
+        The constant load V.
+
     Raises
     ------
     ParameterError
@@ -137,6 +169,15 @@ def upright_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     """T0 for beta0 close to pi/2 (`t-beta_exp2`), any shape; its error is of order (pi/2 - beta0)^2:
 
         T0 = 4 / sqrt(1+V) arccos(1 / (1 - (1+V) / V abs(theta0) / (pi/2 - beta0)))
+
+    Parameters
+    ----------
+    theta0
+        The opening at the start, at rest, rad; any shape.
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    vertical
+        The constant load V.
 
     Raises
     ------
@@ -170,6 +211,15 @@ def decayed_amplitude(cycle: Numbers, *, theta0: float, e: float) -> Any:
 
     The paper prints e^(4n). Each impact takes e^2 off the energy, which is proportional to the amplitude while that is small.
 
+    Parameters
+    ----------
+    cycle
+        n, a number or an array of them.
+    theta0
+        The opening at the start, at rest, rad.
+    e
+        The factor of the velocity at an impact.
+
     Raises
     ------
     ParameterError
@@ -194,6 +244,8 @@ def decayed_period(cycle: Numbers, *, period: float, e: float) -> Any:
         n, a number or an array of them.
     period
         T0(theta0) without losses.
+    e
+        The factor of the velocity at an impact.
 
     Raises
     ------
@@ -210,6 +262,13 @@ def decayed_period(cycle: Numbers, *, period: float, e: float) -> Any:
 
 def final_time(*, period: float, e: float) -> float:
     """The time at which small vibrations end (`finaltime`): (1+e) / (4 (1-e)) T0(theta0), the sum of all `decayed_period`.
+
+    Parameters
+    ----------
+    period
+        T0(theta0) without losses.
+    e
+        The factor of the velocity at an impact.
 
     Raises
     ------

@@ -21,6 +21,17 @@ LOAD_PLANE = ("load.horizontal.amplitude", "load.vertical")  # the two parameter
 class QuasiStaticBorder:
     """Both parts of the border over the vertical load V; the true border is the lesser of them (erratum 23).
 
+    Attributes
+    ----------
+    vertical
+        V, (n,).
+    critical
+        Hhat at which the undeformed state is lost: the paper's border.
+    fold
+        Hhat at the fold of deformed equilibria, nan where there is none.
+    subcritical_below
+        The V below which the fold comes first.
+
     Examples
     --------
     >>> plane = ("load.horizontal.amplitude", "load.vertical")
@@ -30,9 +41,9 @@ class QuasiStaticBorder:
     """
 
     vertical: np.ndarray
-    critical: np.ndarray  # Hhat at which the undeformed state is lost: the paper's border
-    fold: np.ndarray  # Hhat at the fold of deformed equilibria, nan where there is none
-    subcritical_below: float  # V below which the fold comes first
+    critical: np.ndarray
+    fold: np.ndarray
+    subcritical_below: float
 
     @property
     def true(self) -> np.ndarray:
@@ -58,6 +69,15 @@ def quasi_static_border(system: System, plane: tuple[str, ...], lowest: float) -
 
     It is known for the metainterface with k = 1 and beta0 below 90 degrees, under H = Hhat sin and a constant V < 0 alone, in
     the plane of Hhat and V.
+
+    Parameters
+    ----------
+    system
+        A metainterface under load (i).
+    plane
+        The dotted paths of the parameters along both axes, the horizontal one first.
+    lowest
+        The least V.
 
     Examples
     --------

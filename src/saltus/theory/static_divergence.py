@@ -14,15 +14,24 @@ from saltus.theory.loaded_equilibria import MOMENT_ROUNDING, LoadedEquilibrium, 
 class Divergence:
     """The theta(0), at rest, from which the linearised motion does not return to theta = 0 (bullets after `minmin`).
 
+    Attributes
+    ----------
+    from_rest
+        Whether it diverges from every small theta(0) of at least one sign: theta = 0 is then unstable.
+    above
+        It diverges from every theta(0) above this one; None if never.
+    below
+        It diverges from every theta(0) below this one; None if never.
+
     Examples
     --------
     >>> saltus.theory.divergence(linear).from_rest
     False
     """
 
-    from_rest: bool  # from every small theta(0) of at least one sign: theta = 0 is unstable
-    above: float | None  # from theta(0) > above; None if never
-    below: float | None  # from theta(0) < below; None if never
+    from_rest: bool
+    above: float | None
+    below: float | None
 
 
 def linear_equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
@@ -33,6 +42,11 @@ def linear_equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
     with P(theta) - P(0) = -(V cos(beta0))^2 / (2 (k^P + V sin(beta0))), so each is stable just where theta = 0 is not. For
     V cos(beta0) < 0, both exist where V sin(beta0) < -max(1, k), one of them where V sin(beta0) < -min(1, k) (`minmin`,
     errata 15). They approximate the equilibria of the full equation only for beta0 close to pi/2. A constant H is included.
+
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
 
     Raises
     ------
@@ -57,6 +71,11 @@ def divergence(system: System) -> Divergence:
     If the loads push a layer open at theta = 0 (V cos(beta0) > 0) every disturbance to its side leaves. If they hold it
     closed (V cos(beta0) < 0) it diverges when k^P + V sin(beta0) < 0 and theta(0) lies beyond theta_A or theta_B. At
     beta0 = pi/2 these are at 0: theta(0) > 0 diverges for V < -k, theta(0) < 0 for V < -1.
+
+    Parameters
+    ----------
+    system
+        A metainterface under constant loads.
 
     Raises
     ------

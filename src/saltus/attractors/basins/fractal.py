@@ -36,6 +36,19 @@ FRACTAL = FractalSettings()
 class BasinEntropy:
     """Basin entropy of a grid cut into boxes (Daza et al., Sci. Rep. 6 (2016) 31416).
 
+    Attributes
+    ----------
+    entropy
+        S_b: the mean over all boxes of sum_j p_j ln(1 / p_j), p_j the share of label j in the box.
+    boundary
+        S_bb: the mean over the boxes with more than one label; nan where there are none.
+    boxes
+        How many boxes were counted.
+    boundary_boxes
+        How many of them hold more than one label.
+    box
+        How many cells a box has along a side.
+
     Examples
     --------
     >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
@@ -43,11 +56,11 @@ class BasinEntropy:
     False
     """
 
-    entropy: float  # S_b: the mean over all boxes of sum_j p_j ln(1 / p_j), p_j the share of label j in the box
-    boundary: float  # S_bb: the mean over the boxes with more than one label; nan where there are none
+    entropy: float
+    boundary: float
     boxes: int
     boundary_boxes: int
-    box: int  # cells along a side
+    box: int
 
     @property
     def fractal(self) -> bool:
@@ -61,6 +74,13 @@ def basin_entropy(labels: Numbers, box: int = 5) -> BasinEntropy:
 
     Incomplete boxes at the far edges, and boxes with an undecided cell (-1), are left out. The criterion S_bb > ln 2 holds for
     boundaries that part two labels almost everywhere, in boxes of which few hold three.
+
+    Parameters
+    ----------
+    labels
+        Whole numbers, a label for each cell of a grid, (n,) or (rows, columns); -1 is undecided.
+    box
+        How many cells a box has along a side.
 
     Raises
     ------
@@ -102,6 +122,19 @@ def _boxes(grid: np.ndarray, box: int) -> np.ndarray:
 class UncertaintyExponent:
     """f(eps) ~ eps^alpha, the share of states with a different end within eps (Grebogi et al., Phys. Lett. A 99 (1983) 415).
 
+    Attributes
+    ----------
+    alpha
+        1 for a smooth boundary, towards 0 the more fractal it is; nan without a boundary.
+    error
+        The standard error of the fit.
+    distances
+        The distances eps, in cells.
+    shares
+        The share f of uncertain cells at each of them.
+    cells
+        The dimensions of the grid, 1 or 2.
+
     Examples
     --------
     >>> halves = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
@@ -109,11 +142,11 @@ class UncertaintyExponent:
     1.0
     """
 
-    alpha: float  # 1 for a smooth boundary, towards 0 the more fractal it is; nan without a boundary
-    error: float  # standard error of the fit
-    distances: np.ndarray  # eps in cells
-    shares: np.ndarray  # f
-    cells: int  # dimensions of the grid
+    alpha: float
+    error: float
+    distances: np.ndarray
+    shares: np.ndarray
+    cells: int
 
     @property
     def dimension(self) -> float:
@@ -129,6 +162,13 @@ def uncertainty_exponent(labels: Numbers, distances: Iterable[int] | None = None
     counted, and make none uncertain). Cells nearer to the edge than the largest eps are not counted. The slope of ln f over
     ln eps is fitted, with its standard error, over distances (1, 2, 3, 4, 6, 8, ... up to 1/16 of the grid) at which f is below
     0.5, unless fewer than three are.
+
+    Parameters
+    ----------
+    labels
+        Whole numbers, a label for each cell of a grid, (n,) or (rows, columns); -1 is undecided.
+    distances
+        The distances eps, in cells.
 
     Raises
     ------
@@ -199,6 +239,17 @@ class WadaVerdict(StrEnum):
 class Wada:
     """How near to the boundary all basins are (after Daza et al., Sci. Rep. 5 (2015) 16579).
 
+    Attributes
+    ----------
+    labels
+        The labels of the grid.
+    radii
+        The radii of the neighbourhoods, in cells.
+    shares
+        The share of the boundary cells that have all labels within each of these radii.
+    boundary_cells
+        How many cells lie at a boundary.
+
     Examples
     --------
     >>> thirds = np.repeat([np.arange(63) // 21], 63, axis=0)
@@ -207,8 +258,8 @@ class Wada:
     """
 
     labels: tuple[int, ...]
-    radii: np.ndarray  # in cells
-    shares: np.ndarray  # of the boundary cells: those that have all labels within each of these radii
+    radii: np.ndarray
+    shares: np.ndarray
     boundary_cells: int
 
     @property
@@ -235,6 +286,13 @@ def wada(labels: Numbers, radius: int = FRACTAL.radius) -> Wada:
     Boundary cells have a neighbour, along an axis or diagonally, with another label. Around each a neighbourhood grows, up to
     `radius` cells, until it meets all labels. In a Wada picture nearly all do; where basins meet in threes only at single points,
     nearly none. Undecided cells (-1) are no label.
+
+    Parameters
+    ----------
+    labels
+        Whole numbers, a label for each cell of a grid, (n,) or (rows, columns); -1 is undecided.
+    radius
+        How far neighbourhoods grow, in cells.
 
     Raises
     ------

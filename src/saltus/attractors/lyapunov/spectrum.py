@@ -28,6 +28,33 @@ class Exponents:
     They are -inf where the motion comes to rest with a loss at impacts: states beside it are at the same rest after a finite
     time. They are NaN where the motion has no derivative or ends; `note` then says why.
 
+    Attributes
+    ----------
+    values
+        (2 n,): the exponents, for n coordinates.
+    errors
+        (2 n,): half widths of 95 % intervals, see `averages.uncertainty`.
+    halves
+        (2, 2 n): the same exponents from the first and from the second half of the run.
+    half_errors
+        (2, 2 n): their errors.
+    divergence
+        The mean of ln det per unit of time, from impacts and the time on each side; NaN where not so simple.
+    stroboscopic
+        The stroboscopic map's largest exponent over the forcing period, from two trajectories; or NaN.
+    stroboscopic_error
+        Its half width of a 95 % interval.
+    periods
+        The forcing periods (units of time under constant loads) that were averaged over.
+    duration
+        The same in dimensionless time.
+    largest_condition
+        The largest condition number of the derivatives over a span of the run.
+    state
+        The state at the end of the run, at phase 0, as arguments of `simulate`.
+    note
+        Why the exponents are not finite.
+
     Examples
     --------
     >>> exponents = saltus.lyapunov_spectrum(system, theta=0.3, periods=200)
@@ -35,18 +62,18 @@ class Exponents:
     -0.1
     """
 
-    values: np.ndarray  # (2 n,) for n coordinates
-    errors: np.ndarray  # (2 n,): half widths of 95 % intervals, see `averages.uncertainty`
-    halves: np.ndarray  # (2, 2 n): the same exponents from the first and from the second half of the run
-    half_errors: np.ndarray  # (2, 2 n)
-    divergence: float  # the mean of ln det per unit of time, from impacts and the time on each side; NaN where not so simple
-    stroboscopic: float  # the stroboscopic map's largest exponent over the forcing period, from two trajectories; or NaN
+    values: np.ndarray
+    errors: np.ndarray
+    halves: np.ndarray
+    half_errors: np.ndarray
+    divergence: float
+    stroboscopic: float
     stroboscopic_error: float
-    periods: int  # forcing periods (units of time under constant loads) that were averaged over
-    duration: float  # that in dimensionless time
-    largest_condition: float  # of the derivatives over a span of the run
-    state: dict[str, Any]  # at the end of the run, at phase 0: arguments of `simulate`
-    note: str | None  # why the exponents are not finite
+    periods: int
+    duration: float
+    largest_condition: float
+    state: dict[str, Any]
+    note: str | None
 
     @property
     def at_half(self) -> np.ndarray:

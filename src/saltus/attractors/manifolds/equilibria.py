@@ -37,6 +37,17 @@ SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # (step, weight) of the
 class Equilibrium:
     """An equilibrium under a constant load.
 
+    Attributes
+    ----------
+    place
+        The coordinate.
+    side
+        The side on which it lies, 0 at the contact.
+    eigenvalues
+        The one with the larger real part first; None at the contact.
+    stable
+        No disturbance grows; it need not decay.
+
     Examples
     --------
     >>> places = saltus.attractors.equilibria(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))
@@ -44,10 +55,10 @@ class Equilibrium:
     True
     """
 
-    place: float  # the coordinate
-    side: int  # 0 at the contact
-    eigenvalues: tuple[complex, complex] | None  # the one with the larger real part first; None at the contact
-    stable: bool  # no disturbance grows; it need not decay
+    place: float
+    side: int
+    eigenvalues: tuple[complex, complex] | None
+    stable: bool
 
     @property
     def saddle(self) -> bool:
@@ -60,6 +71,13 @@ def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
 
     They are the zeros of the acceleration at rest between 2001 points of the window: two that are nearer to one another than a
     thousandth of it, as beside a fold, may be missed.
+
+    Parameters
+    ----------
+    system
+        What moves, under a constant load.
+    window
+        A pair (low, high) for the coordinate and one for the velocity.
 
     Raises
     ------

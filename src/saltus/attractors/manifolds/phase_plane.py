@@ -44,6 +44,21 @@ class SeparatrixEnd(StrEnum):
 class Separatrix:
     """A branch of the stable manifold of a saddle, followed back in time from it; nan where an impact makes the velocity jump.
 
+    Attributes
+    ----------
+    saddle
+        The coordinate of the saddle.
+    time
+        (n,), from 0 to negative times.
+    theta
+        (n,), the coordinate.
+    velocity
+        (n,), its rate.
+    impacts
+        (m, 2): the times and velocities, just before each, of the impacts of the forward motion, latest first.
+    end
+        Why it ends.
+
     Examples
     --------
     >>> curve = saltus.separatrices(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))[0]
@@ -53,10 +68,10 @@ class Separatrix:
     """
 
     saddle: float
-    time: np.ndarray  # (n,), from 0 to negative times
-    theta: np.ndarray  # (n,)
-    velocity: np.ndarray  # (n,)
-    impacts: np.ndarray  # (m, 2): the times and velocities, just before each, of the impacts of the forward motion, latest first
+    time: np.ndarray
+    theta: np.ndarray
+    velocity: np.ndarray
+    impacts: np.ndarray
     end: SeparatrixEnd
 
 
@@ -76,6 +91,17 @@ def separatrices(system: System, window: Box = PLANE, *, span: float = 60.0, ste
 
     Each branch is followed back for at most `span` of time, until it leaves the window for good (three half widths) or comes to
     a saddle, and given every `step` of time.
+
+    Parameters
+    ----------
+    system
+        What moves, under a constant load.
+    window
+        A pair (low, high) for the coordinate and one for the velocity.
+    span
+        For how long each branch is followed back, in dimensionless time.
+    step
+        The time between the points that are given.
 
     Raises
     ------

@@ -56,6 +56,21 @@ class ManifoldBranch:
 class Manifold:
     """The stable or unstable manifold of a saddle orbit.
 
+    Attributes
+    ----------
+    orbit
+        The saddle orbit.
+    stable
+        Whether it is the stable manifold.
+    multiplier
+        mu_s or mu_u, over the orbit's period.
+    orbit_states
+        (q, 2): the orbit at phase 0.
+    directions
+        (q, 2): unit vectors along the manifold there.
+    branches
+        The two branches, or, of a flip saddle, those of both signs.
+
     Examples
     --------
     >>> saddle = next(o for o in branch.at(0.88) if not o.stable)
@@ -65,9 +80,9 @@ class Manifold:
 
     orbit: PeriodicOrbit
     stable: bool
-    multiplier: float  # mu_s or mu_u, over the orbit's period
-    orbit_states: np.ndarray  # (q, 2): the orbit at phase 0
-    directions: np.ndarray  # (q, 2): unit vectors along the manifold there
+    multiplier: float
+    orbit_states: np.ndarray
+    directions: np.ndarray
     branches: tuple[ManifoldBranch, ...]
 
     @property
@@ -139,6 +154,19 @@ def unstable_manifold(
     points: int = 100_000,
 ) -> Manifold:
     """The states that the flow takes away from a saddle orbit: as `stable_manifold`, forward in time.
+
+    Parameters
+    ----------
+    orbit
+        A saddle orbit.
+    window
+        A pair (low, high) for the coordinate and one for the velocity.
+    periods
+        For how many forcing periods it is followed.
+    step
+        The longest distance between two points, in units of the window's half widths.
+    points
+        How many points at most.
 
     Examples
     --------

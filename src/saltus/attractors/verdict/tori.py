@@ -29,6 +29,11 @@ def excludes_tori(system: System) -> str | None:
     Both are checked by interval bounds over all of the forcing period and all states. Sufficient, not necessary: a load of which
     the bounds do not decide is one that may have tori.
 
+    Parameters
+    ----------
+    system
+        What moves, with one coordinate, under a load with a frequency.
+
     Raises
     ------
     ParameterError

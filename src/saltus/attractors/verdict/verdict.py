@@ -28,6 +28,31 @@ if TYPE_CHECKING:
 class Verdict:
     """Where a motion ends.
 
+    Attributes
+    ----------
+    system
+        What moves.
+    kind
+        What it is.
+    cause
+        Why it is said to be so.
+    reason
+        The sentence of the cause, with its numbers.
+    period
+        The forcing periods after which it repeats itself; None where it does not.
+    orbit
+        Its orbit, solved by its own equations, attracting, and met by the motion; else None.
+    exponents
+        The exponents of the last and longest run; None where the motion has settled.
+    zero_one
+        The second opinion, from the states at phase 0; None where the motion has settled.
+    state
+        The state at the end, at phase 0, as arguments of `simulate`.
+    periods
+        How many forcing periods the motion was followed in all.
+    evidence
+        Numbers and sentences by their names.
+
     Examples
     --------
     >>> verdict = saltus.classify(system, theta=0.3)
@@ -38,14 +63,14 @@ class Verdict:
     system: System
     kind: AttractorKind
     cause: Reason
-    reason: str  # the sentence of the cause, with its numbers
-    period: int | None  # forcing periods after which it repeats; None where it does not
-    orbit: PeriodicOrbit | None  # solved by its own equations, attracting, and met by the motion
-    exponents: Exponents | None  # of the last and longest run; None where the motion has settled
-    zero_one: ZeroOne | None  # the second opinion, from the states at phase 0; None where the motion has settled
-    state: dict[str, Any]  # at the end, at phase 0: arguments of `simulate`
-    periods: int  # forcing periods that the motion was followed in all
-    evidence: dict[str, Any] = field(default_factory=dict)  # numbers and sentences by name
+    reason: str
+    period: int | None
+    orbit: PeriodicOrbit | None
+    exponents: Exponents | None
+    zero_one: ZeroOne | None
+    state: dict[str, Any]
+    periods: int
+    evidence: dict[str, Any] = field(default_factory=dict)
 
     def to_xarray(self) -> xarray.Dataset:
         """The verdict and its evidence as a Dataset of single values."""

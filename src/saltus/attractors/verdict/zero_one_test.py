@@ -18,14 +18,23 @@ CONSTANT = 1e-9  # relative: a series that varies less does not vary
 class ZeroOne:
     """The outcome: near 0 for regular motion, near 1 for chaos.
 
+    Attributes
+    ----------
+    K
+        The median over the frequencies.
+    spread
+        Half the distance between their quartiles.
+    samples
+        How many numbers of the series were used.
+
     Examples
     --------
     >>> bool(saltus.zero_one_test(np.sin(np.arange(2000.0))).K < 0.1)  # regular
     True
     """
 
-    K: float  # the median over the frequencies
-    spread: float  # half the distance between their quartiles
+    K: float
+    spread: float
     samples: int
 
 

@@ -20,6 +20,11 @@ if TYPE_CHECKING:
 def stop_names(dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
     """Why each motion ended, in the dimensions of the ensemble; the words are those of `Stop`.
 
+    Parameters
+    ----------
+    dataset
+        What `simulate_many` gave.
+
     Examples
     --------
     >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2], periods=2)
@@ -36,6 +41,13 @@ def stroboscopic(system: System, dataset: xarray.Dataset) -> np.ndarray[Any, Any
     """The states (coordinates, then velocities) at the ends of the forcing periods that were kept, in the order of time.
 
     The shape is that of the ensemble, then (periods, d); states are nan where a motion had fewer periods than were kept.
+
+    Parameters
+    ----------
+    system
+        What moved.
+    dataset
+        What `simulate_many` gave, with "state" among its samples.
 
     Examples
     --------

@@ -57,6 +57,8 @@ def simulate_many(
 
     Parameters
     ----------
+    system
+        What moves.
     parameters
         Arrays by dotted path, such as {"load.horizontal.amplitude": np.linspace(0, 1, 101)}.
     sample

@@ -46,6 +46,13 @@ KEY = ("row", "column", "amplitude_nrad", "to_row", "to_column")
 class Borders:
     """Curves through the plane of a chart, each a Dataset along `point`, and what becomes of its changes.
 
+    Attributes
+    ----------
+    curves
+        The curves on which motions end.
+    endings
+        What becomes of each change, of dtype ENDING, by its key.
+
     Examples
     --------
     >>> len(saltus.studies.Borders().curves)
@@ -53,10 +60,18 @@ class Borders:
     """
 
     curves: list[xarray.Dataset] = field(default_factory=list)
-    endings: dict[tuple[int, ...], np.ndarray] = field(default_factory=dict)  # of dtype ENDING, by the key of the change
+    endings: dict[tuple[int, ...], np.ndarray] = field(default_factory=dict)
 
     def of(self, chart: ChartMotions, changes: Changes) -> np.ndarray:
-        """What becomes of these changes, of dtype ENDING; of those that were not looked into nothing is known."""
+        """What becomes of these changes, of dtype ENDING; of those that were not looked into nothing is known.
+
+        Parameters
+        ----------
+        chart
+            The motions of a chart.
+        changes
+            The changes between its neighbouring cells.
+        """
         unknown = np.zeros((), ENDING)
         found = [self.endings.get(key, unknown) for key in keys_of(chart, changes)]
         return np.array(found, dtype=ENDING).reshape(len(changes))
@@ -64,6 +79,11 @@ class Borders:
     def to_xarray(self, chart: ChartMotions) -> xarray.DataTree:
         """The curves as groups, and all changes of a chart in the group `ends`: `key` (see `keys_of`), the `outcome`,
         `horizontal` and `vertical` of the place at which the motion ends, up to how many cells it may be off (`uncertainty`),
+
+        Parameters
+        ----------
+        chart
+            The motions of a chart.
         the `amplitude` and the `period` there."""
         import xarray as xr
 

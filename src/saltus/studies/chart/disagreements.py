@@ -24,6 +24,13 @@ if TYPE_CHECKING:
 def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     """Where chart and curves do not agree, away from the cells through which the curves run.
 
+    Parameters
+    ----------
+    chart
+        What `stability_chart` gave.
+    borders
+        Its borders, as `with_borders` gives them.
+
     Returns
     -------
     xarray.Dataset

@@ -173,6 +173,17 @@ def response_spectrum(
 ) -> xarray.DataTree:
     """`bifurcation_diagram` along the forcing frequency, with the same options (the paper's Figs. 9 and 10).
 
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    path
+        The dotted path of the frequency.
+    bounds
+        Its lowest and its highest value.
+    options
+        Those of `bifurcation_diagram`.
+
     Examples
     --------
     >>> spectrum = saltus.response_spectrum(system, bounds=(0.8, 1.0), max_period=1, values=[0.9], starts=4, bands=False)
