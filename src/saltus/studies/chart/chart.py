@@ -120,7 +120,26 @@ def _check_bordered(system: System, curves: int, progress: object, **options: An
 
 
 @checked_by(_check_bordered)
-def bordered_chart(system: System, *, curves: int = 12, progress: Progress = silent, **options: Any) -> xarray.DataTree:
+def bordered_chart(
+    system: System,
+    *,
+    curves: int = 12,
+    horizontal: Iterable[float] = HORIZONTAL,
+    vertical: Iterable[float] = VERTICAL,
+    paths: tuple[str, str] = ("load.horizontal.amplitude", "load.vertical"),
+    max_period: int = 6,
+    starts: int = 12,
+    window: Box | None = None,
+    least: float = 1e-3,
+    periods: int | None = None,
+    tol: float = 1e-10,
+    seed: int = 0,
+    rows: int = 101,
+    store: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress = silent,
+) -> xarray.DataTree:
     """`stability_chart` with what bounds its motions (Figs. 14, 15).
 
     Parameters
@@ -129,10 +148,10 @@ def bordered_chart(system: System, *, curves: int = 12, progress: Progress = sil
         What moves, under a load with a frequency.
     curves
         How many curves on which motions end are followed at most, see `with_borders`.
+    horizontal, vertical, paths, max_period, starts, window, least, periods, tol, seed, rows, store, workers, scheduler
+        As for `stability_chart`.
     progress
         Called with the fraction done and what is being done, first when all arguments have been checked.
-    options
-        Those of `stability_chart`.
 
     Returns
     -------
@@ -155,9 +174,26 @@ def bordered_chart(system: System, *, curves: int = 12, progress: Progress = sil
     """
     import xarray as xr
 
-    chart = stability_chart(system, progress=part_of(progress, 0.0, 0.5), **options)
-    where = {name: options.get(name) for name in ("store", "workers", "scheduler")}
-    chart, borders = with_borders(system, chart, curves=curves, progress=part_of(progress, 0.5, 1.0), **where)
+    chart = stability_chart(
+        system,
+        horizontal=horizontal,
+        vertical=vertical,
+        paths=paths,
+        max_period=max_period,
+        starts=starts,
+        window=window,
+        least=least,
+        periods=periods,
+        tol=tol,
+        seed=seed,
+        rows=rows,
+        store=store,
+        workers=workers,
+        scheduler=scheduler,
+        progress=part_of(progress, 0.0, 0.5),
+    )
+    rest = part_of(progress, 0.5, 1.0)
+    chart, borders = with_borders(system, chart, curves=curves, progress=rest, store=store, workers=workers, scheduler=scheduler)
     chart.attrs = {name: value for name, value in chart.attrs.items() if name != "plan"}
     groups = {"chart": chart, "disagreements": disagreements(chart, borders)}
     static = quasi_static_border(system, tuple(chart.attrs["path"]), float(chart["vertical"].min()))

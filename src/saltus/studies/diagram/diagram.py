@@ -129,7 +129,9 @@ def bifurcation_diagram(
     Raises
     ------
     ParameterError
-        An argument without meaning; SweepError: as `saltus.sweep.run`.
+        An argument without meaning.
+    SweepError
+        As `saltus.sweep.run`.
 
     Examples
     --------
@@ -169,20 +171,35 @@ def _search(search: DiagramSearch, repelling: int, bands: bool, follow: bool, pr
 
 @checked_by(bifurcation_diagram.check)
 def response_spectrum(
-    system: System, path: str = "load.frequency", bounds: tuple[float, float] = (0.1, 3.0), **options: Any
+    system: System,
+    path: str = "load.frequency",
+    bounds: tuple[float, float] = (0.1, 3.0),
+    *,
+    effort: str = "standard",
+    max_period: int = 6,
+    values: Iterable[float] | None = None,
+    starts: int | None = None,
+    window: Box | None = None,
+    seed: int = 0,
+    repelling: int = 1,
+    switch: bool = True,
+    step: float = STEP,
+    bands: bool = True,
+    store: Any = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress = silent,
 ) -> xarray.DataTree:
-    """`bifurcation_diagram` along the forcing frequency, with the same options (the paper's Figs. 9 and 10).
+    """`bifurcation_diagram` along the forcing frequency (the paper's Figs. 9 and 10).
 
     Parameters
     ----------
     system
         What moves, under a load with a frequency.
-    path
-        The dotted path of the frequency.
-    bounds
-        Its lowest and its highest value.
-    options
-        Those of `bifurcation_diagram`.
+    path, bounds
+        The dotted path of the frequency, its lowest and its highest value.
+    effort, max_period, values, starts, window, seed, repelling, switch, step, bands, store, workers, scheduler, progress
+        As for `bifurcation_diagram`.
 
     Examples
     --------
@@ -191,7 +208,25 @@ def response_spectrum(
     >>> first.special_parameter.values[first.kind.values == "LP"].round(6)
     array([0.908811, 0.848485])
     """
-    return bifurcation_diagram(system, path, bounds, **options)
+    return bifurcation_diagram(
+        system,
+        path,
+        bounds,
+        effort=effort,
+        max_period=max_period,
+        values=values,
+        starts=starts,
+        window=window,
+        seed=seed,
+        repelling=repelling,
+        switch=switch,
+        step=step,
+        bands=bands,
+        store=store,
+        workers=workers,
+        scheduler=scheduler,
+        progress=progress,
+    )
 
 
 def _values(bounds: tuple[float, float], values: Iterable[float] | None, count: int) -> np.ndarray:
