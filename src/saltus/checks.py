@@ -238,6 +238,14 @@ def check_step(step: Any) -> None:
     check_number("step", step, at_least=1e-6, at_most=1.0)
 
 
+def as_numbers(given: Any) -> np.ndarray:
+    """An array of numbers; an empty one for what is none, so that whoever refuses the one refuses the other."""
+    try:
+        return np.asarray(given if hasattr(given, "__array__") or not np.iterable(given) else list(given), dtype=float)
+    except (TypeError, ValueError):
+        return np.empty(0)
+
+
 def check_axis(name: str, values: Any) -> np.ndarray:
     """The numbers along an axis of a grid.
 
@@ -246,10 +254,7 @@ def check_axis(name: str, values: Any) -> np.ndarray:
     ParameterError
         With the name, for what is no list of finite numbers that rise.
     """
-    try:
-        axis = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):
-        axis = np.empty(0)
+    axis = np.atleast_1d(as_numbers(values))
     if axis.ndim != 1 or not axis.size or not (np.abs(axis) <= LIMITS.value).all() or not (np.diff(axis) > 0).all():
         raise ParameterError(f"{name} must be numbers that rise, each above the one before, got {shown(values)}", name)
     return axis
@@ -324,10 +329,7 @@ def check_window(window: Any, system: System) -> Window:
     names = system.model.coordinates
     if window is None:
         return _default_window(system)
-    try:
-        bounds = np.asarray(window, dtype=float)
-    except (TypeError, ValueError):
-        bounds = np.empty(0)
+    bounds = as_numbers(window)
     single = len(names) == 1
     sound = bounds.shape == (2 * len(names), 2) and (np.abs(bounds) <= LIMITS.value).all()
     if not sound or not ((bounds[:, 0] < bounds[:, 1]) if single else (bounds[:, 0] <= bounds[:, 1])).all():

@@ -12,7 +12,7 @@ from saltus.attractors.attractor import REST, Attractor, Attractors, Target
 from saltus.attractors.attractors_dataset import about, attractor_columns, variable
 from saltus.attractors.find import find_attractors
 from saltus.attractors.kind import AttractorKind
-from saltus.checks import Box, check_along, check_number, check_path
+from saltus.checks import Box, as_numbers, check_along, check_number, check_path
 from saltus.errors import ParameterError
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
@@ -187,10 +187,7 @@ def _apart(old: Attractor, new: Attractor, led: bool) -> float:
 
 def _values(system: System, path: str, values: Any) -> np.ndarray:
     check_path(system, path)
-    try:
-        grid = np.atleast_1d(np.asarray(list(values), dtype=float))
-    except (TypeError, ValueError):
-        grid = np.empty(0)
+    grid = np.atleast_1d(as_numbers(values))
     steps = np.diff(grid)
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all() or not ((steps > 0).all() or (steps < 0).all()):
         raise ParameterError(f"values must be numbers of {path} that increase, or that decrease, got {values!r}", "values")

@@ -101,17 +101,29 @@ def _one_by_one(coordinates: Mapping[str, Any], names: tuple[str, ...]) -> Mappi
     return coordinates
 
 
-def _start_state(system: System, velocity: Any, coordinates: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
-    names = system.model.coordinates
-    coordinates = _one_by_one(coordinates, names)
-    for name in coordinates:
+def check_coordinates(system: System, given: Iterable[str]) -> None:
+    """Refuse a start in other coordinates than those of the model, or without one of them.
+
+    Raises
+    ------
+    ParameterError
+        A name that is no coordinate, with the near ones; a coordinate that is not given.
+    """
+    names, given = system.model.coordinates, tuple(given)
+    for name in given:
         if name not in names:
             raise ParameterError(
                 f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names, ARGUMENTS)}", name
             )
-    missing = [name for name in names if name not in coordinates]
-    if missing:
-        raise ParameterError(f"the state at the start needs {missing[0]}=...", missing[0])
+    for name in names:
+        if name not in given:
+            raise ParameterError(f"the state at the start needs {name}=...", name)
+
+
+def _start_state(system: System, velocity: Any, coordinates: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    names = system.model.coordinates
+    coordinates = _one_by_one(coordinates, names)
+    check_coordinates(system, coordinates)
     for name in names:
         check_number(name, coordinates[name])
     try:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import as_numbers, check_number
 from saltus.enumerations import Sentence
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import Motion, Stop, simulate
@@ -198,10 +198,7 @@ def _check(system: System, asking: str) -> None:
 
 
 def _numbers(amplitudes: Any) -> np.ndarray:
-    try:
-        grid = np.atleast_1d(np.asarray(list(amplitudes), dtype=float))
-    except (TypeError, ValueError):
-        grid = np.empty(0)
+    grid = np.atleast_1d(as_numbers(amplitudes))
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
         raise ParameterError(f"amplitudes must be finite numbers, got {amplitudes!r}", "amplitudes")
     return grid

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import RADIANS, settle_numbers
+from saltus.checks import settle_numbers
 from saltus.systems.contact import Contact
+from saltus.systems.layered_cell import LayeredCell
 from saltus.systems.load import Load
-from saltus.systems.metainterface import Metainterface
-from saltus.systems.model import MarginKind, Model
+from saltus.systems.model import MarginKind
 from saltus.systems.two_layer import TwoLayer
 
 
@@ -22,7 +22,7 @@ def _names(cells: int) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CellChain(Model):
+class CellChain(LayeredCell):
     """Cells side by side, each a `TwoLayer` of the same numbers under the same loads; `TwoCells`, `ThreeCells` and `FourCells`.
 
     Long horizontal springs join each mass to that of the same layer in the neighbouring cell: with the displacements
@@ -34,31 +34,19 @@ class CellChain(Model):
     (`upper_1`, ...); each has a contact of the same name. An impact passes its speed on within its cell only.
     """
 
-    beta0: float = field(metadata=RADIANS)  # angle of the undeformed cell, in (0, pi)
     coupling: float = 0.1  # kappa = stiffness of a spring times length squared, over K2; at least 0
-    damping: float = 0.0  # C, at least 0
-    stiffness_ratio: float = 1.0  # k = K1 / K2, above 0
-    mass_ratio: float = 0.0  # m = M1 / M2, at least 0
-    dissipation_ratio: float = 1.0  # c = C1 / C2, at least 0
 
     cells: ClassVar[int] = 1
-    channels: ClassVar[tuple[str, ...]] = Metainterface.channels
     singularity: ClassVar[str] = "massless_hinge"
     transfers: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "beta0", above=0.0, below=math.pi)
-        settle_numbers(self, "stiffness_ratio", above=0.0)
-        settle_numbers(self, "coupling", "damping", "mass_ratio", "dissipation_ratio", at_least=0.0)
+        LayeredCell.__post_init__(self)
+        settle_numbers(self, "coupling", at_least=0.0)
 
     def unit_of(self, coordinate: str) -> str:
         """Radians."""
         return "rad"
-
-    @property
-    def sides(self) -> tuple[int, ...]:
-        """None: its contacts say which layers are open."""
-        return ()
 
     @property
     def contact(self) -> Any:
@@ -75,8 +63,8 @@ class CellChain(Model):
     def cell(self) -> TwoLayer:
         """One cell by itself; its numbers may be symbols, which no checks could be made of."""
         cell = object.__new__(TwoLayer)
-        for name in ("beta0", "damping", "stiffness_ratio", "mass_ratio", "dissipation_ratio"):
-            object.__setattr__(cell, name, getattr(self, name))
+        for name, value in self.cell_numbers.items():
+            object.__setattr__(cell, name, value)
         return cell
 
     def mass_matrix(self, theta: Any) -> Any:

@@ -52,11 +52,6 @@ class ImpactPair(Model):
         settle_numbers(self, "stiffness", "damping", at_least=0.0)
 
     @property
-    def sides(self) -> tuple[int, ...]:
-        """None: it has contacts."""
-        return ()
-
-    @property
     def contacts(self) -> tuple[Contact, ...]:
         """x >= -d and x <= d."""
         left = Contact(name="left", coordinate="x", position=-self.clearance)

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import RADIANS, settle_numbers
+from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
 from saltus.public_functions import answering
+from saltus.systems.layered_cell import LayeredCell
 from saltus.systems.load import Load
-from saltus.systems.model import MarginKind, Model
+from saltus.systems.model import MarginKind
 from saltus.systems.signals import Constant, Signal, scaled, vanishes
 
 
 @answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Metainterface(Model):
+class Metainterface(LayeredCell):
     """The single-degree-of-freedom metainterface (paper, `gov_eqn_theta_long`).
 
     theta > 0 is the lower layer open (side s = +1, P = 1), theta < 0 the upper one (s = -1, P = 0); dimensionless time tau:
@@ -58,22 +59,9 @@ class Metainterface(Model):
     ('theta',)
     """
 
-    beta0: float = field(metadata=RADIANS)
-    damping: float = 0.0
-    stiffness_ratio: float = 1.0
-    mass_ratio: float = 0.0
-    dissipation_ratio: float = 1.0
     smoothing: float | None = None
 
     units: ClassVar[tuple[str, ...]] = ("rad",)
-    channels: ClassVar[tuple[str, ...]] = (
-        "horizontal",
-        "vertical",
-        "lower_horizontal",
-        "lower_vertical",
-        "ground_horizontal",
-        "ground_vertical",
-    )
     margin_kinds: ClassVar[dict[str, MarginKind]] = {
         "line_limit": MarginKind.LANDMARK,
         "kinematic_limit": MarginKind.LIMIT,
@@ -81,9 +69,7 @@ class Metainterface(Model):
     }
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "beta0", above=0.0, below=math.pi)
-        settle_numbers(self, "stiffness_ratio", above=0.0)
-        settle_numbers(self, "damping", "mass_ratio", "dissipation_ratio", at_least=0.0)
+        LayeredCell.__post_init__(self)
         if self.smoothing is not None:
             settle_numbers(self, "smoothing", above=0.0)
             if (self.stiffness_ratio, self.mass_ratio, self.dissipation_ratio) != (1.0, 0.0, 1.0):

@@ -99,8 +99,8 @@ class Model:
 
     @property
     def sides(self) -> tuple[int, ...]:
-        """The numbers of the smooth modes."""
-        return (1, -1)
+        """The numbers of the smooth modes; none where the model has `contacts`, which say what is free."""
+        return (1, -1) if type(self).contacts is Model.contacts else ()
 
     @property
     def contact(self) -> Any:

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import RADIANS, settle_numbers
 from saltus.public_functions import answering
 from saltus.systems.constrained import reactions
 from saltus.systems.contact import Contact
+from saltus.systems.layered_cell import LayeredCell
 from saltus.systems.load import Load
-from saltus.systems.metainterface import Metainterface
-from saltus.systems.model import MarginKind, Model
+from saltus.systems.model import MarginKind
 
 
 @answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TwoLayer(Model):
+class TwoLayer(LayeredCell):
     """The metainterface with theta_1 >= 0 of the lower and theta_2 <= 0 of the upper layer (paper, `eomnl`).
 
         M(theta) theta'' + C theta' + D(theta) theta'^2 + K theta = f(theta, tau),   S = 2 beta0 + theta_1 - theta_2,
@@ -54,15 +53,8 @@ class TwoLayer(Model):
     ('upper',)
     """
 
-    beta0: float = field(metadata=RADIANS)
-    damping: float = 0.0
-    stiffness_ratio: float = 1.0
-    mass_ratio: float = 0.0
-    dissipation_ratio: float = 1.0
-
     coordinates: ClassVar[tuple[str, ...]] = ("theta_1", "theta_2")
     units: ClassVar[tuple[str, ...]] = ("rad", "rad")
-    channels: ClassVar[tuple[str, ...]] = Metainterface.channels
     margin_kinds: ClassVar[dict[str, MarginKind]] = {
         **dict.fromkeys(("lower_line_limit", "upper_line_limit"), MarginKind.LANDMARK),
         **dict.fromkeys(("lower_kinematic_limit", "upper_kinematic_limit"), MarginKind.LIMIT),
@@ -70,16 +62,6 @@ class TwoLayer(Model):
     stops: ClassVar[tuple[str, ...]] = ("lower_kinematic_limit", "upper_kinematic_limit")
     singularity: ClassVar[str] = "massless_hinge"
     transfers: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        settle_numbers(self, "beta0", above=0.0, below=math.pi)
-        settle_numbers(self, "stiffness_ratio", above=0.0)
-        settle_numbers(self, "damping", "mass_ratio", "dissipation_ratio", at_least=0.0)
-
-    @property
-    def sides(self) -> tuple[int, ...]:
-        """None: its contacts say which layers are open."""
-        return ()
 
     @property
     def contacts(self) -> tuple[Contact, ...]:

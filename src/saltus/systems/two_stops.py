@@ -50,11 +50,6 @@ class TwoStops(Model):
             raise ParameterError(f"left must lie below right = {self.right:g}, got {self.left:g}", "left")
 
     @property
-    def sides(self) -> tuple[int, ...]:
-        """None: it has contacts."""
-        return ()
-
-    @property
     def contacts(self) -> tuple[Contact, ...]:
         """x >= d_1 and x <= d_2."""
         left = Contact(name="left", coordinate="x", position=self.left)

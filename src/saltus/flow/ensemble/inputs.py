@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import LIMITS, check_memory
-from saltus.errors import ParameterError, near
+from saltus.errors import ParameterError
 from saltus.flow.ensemble.ensemble_dataset import result_names
 from saltus.flow.motion_dataset import rate_name
-from saltus.flow.request import ARGUMENTS
+from saltus.flow.request import check_coordinates
 from saltus.systems import System, broadcast_arrays, check_parameters, finite_array, numbers, parameter_table
 
 
@@ -60,14 +60,7 @@ def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coord
 def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, Any]) -> dict[str, Any]:
     """The state and the time at the start, by name."""
     names = system.model.coordinates
-    for name in coordinates:
-        if name not in names:
-            raise ParameterError(
-                f"{type(system.model).__name__} has no coordinate {name!r}; {near(name, names, ARGUMENTS)}", name
-            )
-    for name in names:
-        if name not in coordinates:
-            raise ParameterError(f"the state at the start needs {name}=...")
+    check_coordinates(system, coordinates)
     speeds = (velocity,) if len(names) == 1 else velocity
     if not isinstance(speeds, (tuple, list)) or len(speeds) != len(names):
         raise ParameterError(f"velocity must be a tuple of {len(names)} numbers or arrays, got {velocity!r}", "velocity")

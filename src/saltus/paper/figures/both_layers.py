@@ -48,9 +48,9 @@ FATES = ("same", "near", "moved", "other", "unsettled", "rest", "ended")
 
 def full(system: System, mass: float, e: float, transfer: float) -> System:
     """The same cell with both of its layers."""
-    one = system.model
-    numbers = {name: float(getattr(one, name)) for name in ("beta0", "damping", "stiffness_ratio", "dissipation_ratio")}
-    return System(model=TwoLayer(mass_ratio=mass, **numbers), load=system.load, impact=NewtonImpact(e=(e, e), transfer=transfer))
+    one: Any = system.model
+    both = TwoLayer(**{**one.cell_numbers, "mass_ratio": mass})
+    return System(model=both, load=system.load, impact=NewtonImpact(e=(e, e), transfer=transfer))
 
 
 def embedded(states: np.ndarray) -> np.ndarray:

@@ -59,8 +59,7 @@ class _Reaction:
 
     def __init__(self, orbit: PeriodicOrbit) -> None:
         model: Any = orbit.system.model
-        names = ("beta0", "damping", "stiffness_ratio", "mass_ratio", "dissipation_ratio")
-        self.both = TwoLayer(**{name: getattr(model, name) for name in names})
+        self.both = TwoLayer(**model.cell_numbers)
         self.orbit, self.motion = orbit, orbit.motion()
 
     @property

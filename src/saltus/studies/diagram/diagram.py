@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Box, check_bounds, check_count, check_step, check_window
+from saltus.checks import Box, as_numbers, check_bounds, check_count, check_step, check_window
 from saltus.errors import ParameterError
 from saltus.orbits import STEP
 from saltus.progress import Progress, part_of, silent
@@ -233,11 +233,8 @@ def _values(bounds: tuple[float, float], values: Iterable[float] | None, count: 
     """The values at which motions are simulated, in order: those given, all within the bounds, or so many from bound to bound."""
     if values is None:
         return np.linspace(*bounds, count)
-    try:
-        grid = np.array([float(value) for value in values])
-    except (TypeError, ValueError):
-        grid = np.empty(0)
-    if not grid.size:
+    grid = as_numbers(values)
+    if grid.ndim != 1 or not grid.size:
         raise ParameterError(f"values must be numbers at which to search, got {values!r}", "values")
     outside = grid[~((grid >= bounds[0]) & (grid <= bounds[1]))]
     if outside.size:
