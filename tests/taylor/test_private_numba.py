@@ -14,7 +14,7 @@ import pytest
 
 import saltus
 from saltus.flow.compiled import kernel_module, load_kernel
-from saltus.taylor.cache import cache_directory
+from saltus.taylor.cache import cache_directory, load_module
 
 SOURCE = Path(saltus.__file__).parents[1]
 SYSTEM = """
@@ -38,7 +38,7 @@ def partly(name, *more):
     return whole(name, *more)
 importlib.import_module = partly
 from saltus.taylor import private_numba as p
-assert not any((p.CPU_OPTIONS, p.FUNCTION_CACHE, p.RUNTIME, p.ADDRESS_PROTOCOL, p.EXPERIMENTAL))
+assert not any((p.CPU_OPTIONS, p.FUNCTION_CACHE, p.RUNTIME, p.CONTEXT, p.LIBRARY, p.ADDRESS_PROTOCOL, p.EXPERIMENTAL))
 """
 
 
@@ -63,6 +63,32 @@ def test_without_what_is_private_motions_are_the_same(tmp_path):
     assert run(WITHOUT + MOTION, tmp_path) == first  # from the cache
     assert {path.name for path in target.rglob("*.nbc")} == made
     assert first == run(MOTION, cache_directory().parent)
+
+
+WITHIN = """
+from numba import float64
+from saltus.taylor.private_numba import cached_jit, jit
+@jit
+def twice(x):
+    return 2.0 * x
+@cached_jit(float64(float64))
+def four_times(x):
+    return twice(twice(x))
+@cached_jit(float64(float64))
+def eight_times(x):
+    return four_times(twice(x))
+"""
+
+
+def test_machine_code_is_made_only_of_what_is_called_from_outside(tmp_path, monkeypatch):
+    monkeypatch.setenv("SALTUS_CACHE_DIR", str(tmp_path))
+    made = load_module("within", WITHIN)
+    assert (made.four_times(1.5), made.eight_times(1.5)) == (6.0, 12.0)
+    (inner,), (outer,) = made.twice.overloads.values(), made.four_times.overloads.values()
+    engine = outer.library.codegen._engine
+    assert engine.is_symbol_defined(outer.fndesc.llvm_cpython_wrapper_name)
+    assert not engine.is_symbol_defined(inner.fndesc.llvm_cpython_wrapper_name)
+    assert numba.njit(lambda x: 3.0 * x)(2.0) == 6.0  # what others compile later is theirs to call
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,8 @@ plain answer where a numba lacks it:
 * the option `_nrt`, which turns reference counting off: then references are counted, which costs time;
 * `FunctionCache`, its `_load_overload` and `rtsys`, with which compiled code is loaded from disk without the registries of all
   that numba could compile, and `IndexDataCacheFile`, whose files get a digest: then numba's own `cache=True`;
+* what a function's library and context do when it has been compiled (`CPUContext`, `JITCodeLibrary`): machine code is made of
+  those functions only that are called from outside: then it is made of all, which takes twice as long;
 * `WrapperAddressProtocol` and a compile result's `library` and `entry_point`, with which a function's address is looked up once
   and calls skip numba's dispatch: then numba looks it up, at every call.
 """
@@ -22,6 +24,7 @@ import io
 import logging
 import os
 import stat
+import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -47,6 +50,9 @@ CPU_OPTIONS = _private("numba.core.cpu", "CPUTargetOptions")
 FUNCTION_CACHE = _private("numba.core.caching", "FunctionCache")
 CACHE_FILE = _private("numba.core.caching", "IndexDataCacheFile")
 RUNTIME = _private("numba.core.runtime", "rtsys")
+CONTEXT = _private("numba.core.cpu", "CPUContext")
+LIBRARY = _private("numba.core.codegen", "JITCodeLibrary")
+MAKE_FUNCTION = _private("numba._dynfunc", "make_function")
 ADDRESS_PROTOCOL = _private("numba.core.types", "WrapperAddressProtocol")
 EXPERIMENTAL = _private("numba.core.errors", "NumbaExperimentalFeatureWarning")
 
@@ -55,9 +61,10 @@ DIGEST = hashlib.sha256().digest_size  # bytes
 log = logging.getLogger("saltus.cache")
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
-# For functions that make no array and that only compiled code may call: numba then counts no references, which would cost more
-# than the work between two calls, and writes no wrappers.
-LEAN: dict[str, Any] = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+# For functions that only compiled code may call: numba writes no wrappers. Where they make no array either, it counts no
+# references, which would cost more than the work between two calls.
+WITHIN: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+LEAN: dict[str, Any] = {"_nrt": False} | WITHIN
 
 
 def _njit(**options: Any) -> Callable[[Any], Any]:
@@ -67,7 +74,7 @@ def _njit(**options: Any) -> Callable[[Any], Any]:
     return decorator
 
 
-jit = _njit(_nrt=True)
+jit = _njit(_nrt=True, **WITHIN)
 lean_jit = _njit(**LEAN)
 inline_jit = _njit(**LEAN, forceinline=True)  # for what every step of the lanes calls
 
@@ -148,11 +155,57 @@ def _compiled(signature: Any, **options: Any) -> Callable[[Any], Any]:
             dispatcher.enable_caching()
         else:
             dispatcher._cache = kept
-        dispatcher.compile(signature)
+        with _machine_code_of(function):
+            dispatcher.compile(signature)
         dispatcher.disable_compile()
         return dispatcher
 
     return compiled
+
+
+@contextmanager
+def _machine_code_of(outer: Any) -> Iterator[None]:
+    """Within it machine code is made of this function only, with all that it calls in it.
+
+    numba would optimise all that it calls one by one, and make machine code of each, as if it were called from Python as well.
+    """
+    parts = [(CONTEXT, "get_executable"), (LIBRARY, "_optimize_final_module"), (LIBRARY, "_finalize_final_module")]
+    if MAKE_FUNCTION is None or not all(hasattr(*part) for part in parts):
+        yield
+        return
+    whole, optimise, finish = (getattr(*part) for part in parts)
+    inner: dict[Any, tuple[str, Any]] = {}  # by library: the environments of functions that are only linked
+    mine = threading.get_ident()
+
+    def get_executable(self: Any, library: Any, described: Any, environment: Any) -> Any:
+        if threading.get_ident() != mine:
+            return whole(self, library, described, environment)
+        if described.qualname == outer.__qualname__:
+            made = whole(self, library, described, environment)
+            for name, own in inner.values():
+                if library.codegen._engine.is_symbol_defined(name):
+                    library.codegen.set_env(name, own)
+            return made
+        inner[library] = self.get_env_name(described), environment
+        return MAKE_FUNCTION(described.lookup_module(), described.qualname, "", 0, environment, (library,))
+
+    def optimize(self: Any) -> None:
+        if self not in inner:
+            optimise(self)
+
+    def finalize(self: Any) -> None:
+        if self not in inner:
+            finish(self)
+        self._finalized = True
+
+    before = [(owner, name, vars(owner).get(name)) for owner, name in parts]
+    try:
+        for (owner, name), new in zip(parts, (get_executable, optimize, finalize), strict=True):
+            setattr(owner, name, new)
+        yield
+    finally:
+        for owner, name, old in before:
+            delattr(owner, name) if old is None else setattr(owner, name, old)
 
 
 def cached_jit(signature: Any, nogil: bool = False) -> Callable[[Any], Any]:
