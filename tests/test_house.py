@@ -65,6 +65,9 @@ def module_of(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
+MODULES = {module_of(path) for path in FILES}
+
+
 @cache
 def behind_the_door(package: str) -> dict[str, str]:
     """The module of each name that a front door gives, by its stub."""
@@ -84,8 +87,13 @@ def statements(path: Path) -> Iterator[ast.stmt]:
     return (node for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom)))
 
 
-def imported(path: Path) -> Iterator[tuple[int, str, str]]:
+@cache
+def imported(path: Path) -> tuple[tuple[int, str, str], ...]:
     """(line, the module as it is written, the module that is reached) of all that a file imports of saltus."""
+    return tuple(found_imports(path))
+
+
+def found_imports(path: Path) -> Iterator[tuple[int, str, str]]:
     for node in statements(path):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, a.name, a.name) for a in node.names if a.name.startswith("saltus"))
@@ -93,7 +101,7 @@ def imported(path: Path) -> Iterator[tuple[int, str, str]]:
             for a in node.names:
                 home = behind_the_door(node.module).get(a.name)
                 submodule = f"{node.module}.{a.name}"
-                is_module = home is None and any(module_of(other) == submodule for other in FILES)
+                is_module = home is None and submodule in MODULES
                 yield node.lineno, node.module, submodule if is_module else home or node.module
 
 
