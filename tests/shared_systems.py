@@ -75,11 +75,11 @@ def shaken(zeta=0.3, nu=0.05, r=0.9, m=0.2, W=1.1):
     )
 
 
-def walled(A=0.2, W=1.3, wall=1.0, e=0.8, *, k=1.0, c=0.1, mean=0.0):
-    """The impact oscillator under mean + A cos(W t)."""
+def walled(A=0.2, W=1.3, wall=1.0, e=0.8, *, k=1.0, c=0.1, mean=0.0, phase=math.pi / 2):
+    """The impact oscillator under mean + A sin(W t + phase), a cosine."""
     return System(
         model=WallOscillator(stiffness=k, damping=c, wall=wall),
-        load=Load(frequency=W, force=Harmonic(amplitude=A, mean=mean, phase=math.pi / 2)),
+        load=Load(frequency=W, force=Harmonic(amplitude=A, mean=mean, phase=phase)),
         impact=VelocityReduction(e),
     )
 

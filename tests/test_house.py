@@ -162,6 +162,23 @@ def test_a_class_has_its_name_alone() -> None:
     assert not {name for name in names if names.count(name) > 1}
 
 
+def numbers_of(path: Path) -> Iterator[str]:
+    """The names of the numbers at the top of a file."""
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.Assign) and isinstance(node.value, (ast.Constant, ast.BinOp, ast.UnaryOp)):
+            parts = [part.value for part in ast.walk(node.value) if isinstance(part, ast.Constant)]
+            if parts and all(isinstance(part, (int, float)) for part in parts):
+                yield from (target.id for target in node.targets if isinstance(target, ast.Name))
+
+
+def test_a_number_has_its_name_alone() -> None:
+    """Those of figures of the paper are read beside their figure only."""
+    names = [name for path in FILES if "paper" not in path.relative_to(SOURCE).parts for name in numbers_of(path)]
+    assert len(names) > 100
+    same = {"MOST_STEPS"}  # of a segment with one contact and with several, which are compiled apart
+    assert not {name for name in names if names.count(name) > 1} - same
+
+
 # --- models ----------------------------------------------------------------------------------------------------------------
 
 GENERIC = ("taylor", "bounds", "flow", "continuation", "orbits", "attractors", "studies", "sweep")

@@ -1,22 +1,12 @@
 """Recurrence: rest, periods, extrema and impacts of many motions at once, against single motions."""
 
-import math
-
 import numpy as np
 import pytest
+from shared_systems import forced
 
 import saltus
 from saltus.flow import RECURRENCE, Outcome, find_recurrence, load_releases, nearest_return, return_distances, return_period
 from saltus.flow.recurrence import _long_period
-
-
-def forced(frequency=1.0, amplitude=0.5, e=1.0):
-    return saltus.System(
-        model=saltus.Metainterface(beta0=math.radians(80), damping=0.1),
-        load=saltus.Load(frequency=frequency, horizontal=saltus.Harmonic(amplitude=amplitude), vertical=-0.5),
-        impact=saltus.VelocityReduction(e),
-    )
-
 
 STATES = np.random.default_rng(1).uniform(-1.5, 1.5, (32, 2))
 AMPLITUDE = "load.horizontal.amplitude"
@@ -61,13 +51,13 @@ def test_parameters_of_their_own_are_those_of_a_system_of_their_own():
     amplitudes = np.linspace(0.3, 0.9, len(STATES))
     together = find_recurrence(forced(), STATES, 100, parameters={AMPLITUDE: amplitudes})
     for row in (0, 7, 31):
-        single = find_recurrence(forced(amplitude=float(amplitudes[row])), STATES[row : row + 1], 100)
+        single = find_recurrence(forced(H=float(amplitudes[row])), STATES[row : row + 1], 100)
         assert single.outcome[0] == together.outcome[row]
         assert np.array_equal(single.last[0], together.last[row])
 
 
 def test_rest_is_for_good_only_where_no_load_pulls():
-    loose, held = forced(amplitude=0.5, e=0.2), forced(amplitude=0.01, e=0.2)
+    loose, held = forced(H=0.5, e=0.2), forced(H=0.01, e=0.2)
     assert load_releases(loose)
     assert not load_releases(held)
     quiet = find_recurrence(held, np.array([[1e-3, 0.0]]), 50)

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from shared_systems import walled
 
 import saltus
 from saltus.orbits import SpecialCurve, SpecialPoint, conditions
@@ -27,18 +28,10 @@ def metainterface(frequency: float, amplitude: float, vertical: float = -0.5) ->
     )
 
 
-def oscillator(frequency: float, e: float) -> saltus.System:
-    return saltus.System(
-        model=saltus.WallOscillator(stiffness=1.0, damping=0.1, wall=1.0),
-        load=saltus.Load(frequency=frequency, force=saltus.Harmonic(amplitude=0.5, phase=np.pi / 2)),
-        impact=saltus.VelocityReduction(e),
-    )
-
-
 @cache
 def wall_special(kind: str) -> SpecialPoint:
     """A special point of the impact oscillator's branch along the load's amplitude."""
-    system = oscillator(0.7, 0.6) if kind == "PD" else oscillator(1.0, 0.8)
+    system = walled(0.5, 0.7, e=0.6) if kind == "PD" else walled(0.5, 1.0)
     if kind == "PD":
         family = wall_orbits(system)
         speed = 1.3 * family.doubling_speed

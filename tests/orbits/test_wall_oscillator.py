@@ -5,28 +5,20 @@ from functools import cache
 
 import numpy as np
 import pytest
+from shared_systems import walled
 
 import saltus
-from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscillator
 from saltus.theory import wall_orbits
 
 AMPLITUDE = "load.force.amplitude"
 
 
-def oscillator(*, stiffness=1.0, damping=0.1, wall=1.0, frequency=1.0, e=0.8):
-    return System(
-        model=WallOscillator(stiffness=stiffness, damping=damping, wall=wall),
-        load=Load(frequency=frequency, force=Harmonic(amplitude=0.2, phase=math.pi / 2)),
-        impact=VelocityReduction(e),
-    )
-
-
 # name: system, forcing periods per impact, the special points of its one-impact orbits
 CASES = {
-    "issue 4": (oscillator(), 1, {"GR", "LP"}),
-    "stiff": (oscillator(stiffness=1.5, damping=0.3, frequency=2.2, e=0.7), 1, {"GR", "LP"}),
-    "slow": (oscillator(frequency=0.7, wall=0.5, e=0.6), 1, {"GR", "PD"}),
-    "two periods": (oscillator(frequency=2.6, wall=0.3, e=0.5), 2, {"GR", "LP", "PD"}),
+    "issue 4": (walled(W=1.0), 1, {"GR", "LP"}),
+    "stiff": (walled(W=2.2, k=1.5, c=0.3, e=0.7), 1, {"GR", "LP"}),
+    "slow": (walled(W=0.7, wall=0.5, e=0.6), 1, {"GR", "PD"}),
+    "two periods": (walled(W=2.6, wall=0.3, e=0.5), 2, {"GR", "LP", "PD"}),
 }
 every_case = pytest.mark.parametrize("name", CASES)
 

@@ -9,32 +9,24 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.optimize import minimize_scalar
+from shared_systems import walled
 
 import saltus
 from saltus.errors import ParameterError
-from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface, System, VelocityReduction, WallOscillator
+from saltus.systems import EnergyRestitution, Load, Metainterface, System, WallOscillator
 from saltus.theory import wall_orbits
 
-
-def oscillator(*, amplitude=0.2, stiffness=1.0, damping=0.1, wall=1.0, frequency=1.0, e=0.8, mean=0.0, phase=math.pi / 2):
-    return System(
-        model=WallOscillator(stiffness=stiffness, damping=damping, wall=wall),
-        load=Load(frequency=frequency, force=Harmonic(amplitude=amplitude, mean=mean, phase=phase)),
-        impact=VelocityReduction(e),
-    )
-
-
-KNOWN = oscillator()  # k = d = 1, c = 0.1, e = 0.8
+KNOWN = walled(W=1.0)  # k = d = 1, c = 0.1, e = 0.8
 FOLDING = [  # the last one with two forcing periods from one impact to the next
     (KNOWN, 1),
-    (oscillator(frequency=2.2, stiffness=1.5, damping=0.3, e=0.7), 1),
-    (oscillator(frequency=3.2, wall=-0.5, mean=0.2), 1),
-    (oscillator(frequency=2.6, wall=0.3, e=0.5), 2),
+    (walled(W=2.2, k=1.5, c=0.3, e=0.7), 1),
+    (walled(W=3.2, wall=-0.5, mean=0.2), 1),
+    (walled(W=2.6, wall=0.3, e=0.5), 2),
 ]
 DOUBLING = [
-    (oscillator(frequency=0.7, wall=0.5, e=0.6), 1),
-    (oscillator(frequency=3.2, wall=-0.5, mean=0.2), 1),
-    (oscillator(frequency=2.6, wall=0.3, e=0.5), 2),
+    (walled(W=0.7, wall=0.5, e=0.6), 1),
+    (walled(W=3.2, wall=-0.5, mean=0.2), 1),
+    (walled(W=2.6, wall=0.3, e=0.5), 2),
 ]
 
 
@@ -61,11 +53,11 @@ def cases(draw):
         return draw(st.floats(low, high))
 
     stiffness = number(0.3, 3.0)
-    system = oscillator(
-        stiffness=stiffness,
-        damping=number(0.02, 0.9) * 2 * math.sqrt(stiffness),
+    system = walled(
+        k=stiffness,
+        c=number(0.02, 0.9) * 2 * math.sqrt(stiffness),
         wall=number(-1.0, 1.0),
-        frequency=number(0.5, 4.0),
+        W=number(0.5, 4.0),
         e=number(0.1, 1.0),
         mean=number(-0.5, 0.5),
         phase=number(-4.0, 4.0),
@@ -187,14 +179,14 @@ def test_speeds_are_the_inverse_of_the_amplitude(case):
 
 def test_another_grazing_ends_the_admissible_orbits():
     """Two forcing periods an impact: once the maximum between impacts reaches the wall, the exact flow has its impact there."""
-    family = wall_orbits(oscillator(frequency=0.7, wall=0.5, e=0.6), 2)
+    family = wall_orbits(walled(W=0.7, wall=0.5, e=0.6), 2)
     speeds = np.linspace(0.05, 1.5, 30)
     clear = np.array([family.orbit(v).clearance for v in speeds])
     assert clear.max() > 1e-3
     assert clear.min() < -1e-3
     for speed, room in zip(speeds, clear, strict=True):
         orbit = family.orbit(speed)
-        motion = flown(oscillator(frequency=0.7, wall=0.5, e=0.6), orbit, orbit.impact_time + 1e-3)
+        motion = flown(walled(W=0.7, wall=0.5, e=0.6), orbit, orbit.impact_time + 1e-3)
         first = motion.impacts.time[0] - orbit.impact_time
         assert (first == pytest.approx(family.duration, abs=1e-9)) == (room > 0)
         assert room > 0 or first < 0.9 * family.duration
@@ -276,11 +268,11 @@ def test_the_saltation_matrix_is_the_first_order_of_the_moved_impact():
     [
         (System(model=Metainterface(beta0=1.4)), 1, "WallOscillator"),
         (System(model=WallOscillator(), load=Load(force=0.3)), 1, "one Harmonic"),
-        (oscillator(damping=2.5), 1, "below critical"),
-        (oscillator(damping=0.0), 1, "resonance"),
-        (oscillator(damping=0.0, frequency=2.0), 2, "resonance"),
-        (oscillator(), 0, "whole number"),
-        (oscillator(), 1.5, "whole number"),
+        (walled(W=1.0, c=2.5), 1, "below critical"),
+        (walled(W=1.0, c=0.0), 1, "resonance"),
+        (walled(W=2.0, c=0.0), 2, "resonance"),
+        (walled(W=1.0), 0, "whole number"),
+        (walled(W=1.0), 1.5, "whole number"),
     ],
 )
 def test_refuses_what_has_no_such_orbits(system, period, message):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from saltus.config.study import Study
 
 PARTIAL = {"basin_cells": "the cells of basins", "diagram": "the parts of a diagram"}  # what stores keep beside a netCDF file
-LONGEST_NAME = 63  # characters that MATLAB takes
+LONGEST_MATLAB_NAME = 63  # characters that MATLAB takes
 Result = Any  # a Dataset or a DataTree, or what has `to_xarray`
 
 
@@ -157,8 +157,8 @@ def _array(values: np.ndarray) -> Any:
 
 
 def _named(parts: dict[str, Any]) -> dict[str, Any]:
-    names = [re.sub(r"\W", "_", name)[:LONGEST_NAME] for name in parts]
-    names = [name if name[:1].isalpha() else f"x{name}"[:LONGEST_NAME] for name in names]
+    names = [re.sub(r"\W", "_", name)[:LONGEST_MATLAB_NAME] for name in parts]
+    names = [name if name[:1].isalpha() else f"x{name}"[:LONGEST_MATLAB_NAME] for name in names]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise ParameterError(f"two names of the result become {twice} in MATLAB; rename one", "result")

@@ -27,7 +27,7 @@ class TrailSettings:
 
 SETTINGS = TrailSettings()
 GRID = np.linspace(0.0, 1.0, SETTINGS.grid)
-HUMP = GRID * (1.0 - GRID)
+PARABOLA = GRID * (1.0 - GRID)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +159,8 @@ def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> 
         doubtful = (room <= swing) & (signs != 0) & np.isfinite(swing)
     worst, place = 0.0, None
     for row in np.flatnonzero(doubtful):
-        cubic = begin[row] + rise[row] * GRID - HUMP * (bend[row] + twist[row] * lever)
-        margin = SETTINGS.doubt * HUMP * unsure[row] * np.abs(lever)
+        cubic = begin[row] + rise[row] * GRID - PARABOLA * (bend[row] + twist[row] * lever)
+        margin = SETTINGS.doubt * PARABOLA * unsure[row] * np.abs(lever)
         if signs[row] > 0:
             least = np.sign(begin[row]) * cubic - margin
             k = int(np.argmin(least))

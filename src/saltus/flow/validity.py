@@ -11,7 +11,7 @@ from saltus.flow.dense_output import DenseOutput, evaluate
 from saltus.systems import System, energy_gain
 
 STEP_SAMPLES = 12  # in each step, to find changes of sign: a step is shorter than a margin's own time scale
-ROUNDING = 1e-12  # An impact that gains a smaller share of the energy keeps it.
+GAIN_ROUNDING = 1e-12  # An impact that gains a smaller share of the energy keeps it.
 RIDDERS_ITERATIONS = 8  # of Ridders' method, each of which doubles the correct digits or at least halves the bracket
 
 
@@ -100,7 +100,7 @@ class ValidityCheck:
             {name: beyond / duration if duration else 0.0 for name, beyond in self._beyond.items()},
         )
         gains = energy_gain(model, self._system.impact) if model.contacts else {}
-        return Validity(dict(self._first), shares, {name: gain for name, gain in gains.items() if gain > ROUNDING})
+        return Validity(dict(self._first), shares, {name: gain for name, gain in gains.items() if gain > GAIN_ROUNDING})
 
 
 def _beyond(

@@ -59,7 +59,7 @@ def torus(point: OrbitPoint) -> float:
         else:
             first, second = np.triu_indices(len(values), 1)
             product = float(np.prod(values[first] * values[second] - 1.0).real)
-    return -1.0 if not math.isfinite(product) else product if abs(product) > ROUNDING else 0.0
+    return -1.0 if not math.isfinite(product) else product if abs(product) > PRODUCT_ROUNDING else 0.0
 
 
 def _areas(maps: np.ndarray) -> np.ndarray:
@@ -99,7 +99,7 @@ def touching(point: OrbitPoint) -> float:
     return float((-1) ** pairs * min(NEAREST, orbit.clearance, orbit.shallowest))
 
 
-ROUNDING = 1e-12  # by which a product of multipliers may differ from 1 where nothing is lost
+PRODUCT_ROUNDING = 1e-12  # by which a product of multipliers may differ from 1 where nothing is lost
 VANISHING = 1e-4  # modulus below which a complex pair of multipliers is one of zeros, by the root of rounding
 NEAREST = 1.0  # upper limit of the distance of an orbit from a grazing, which would be infinite for one that never turns
 

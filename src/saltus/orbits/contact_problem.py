@@ -23,7 +23,7 @@ from saltus.systems import System
 from saltus.taylor import FREQUENCY
 
 AFTER_RELEASE, AFTER_IMPACT = 3, 2  # powers of the time with which a contact opens from rest
-WITHIN = 0.4  # share of a segment at which a motion is started: in the middle an orbit may touch, by symmetry
+START_SHARE = 0.4  # share of a segment at which a motion is started: in the middle an orbit may touch, by symmetry
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ class ContactProblem(Problem):
         times = np.append(phases, phases[0] + self.closing) / self.frequency(values)
         longest = int(np.argmax(np.diff(times)))
         begin = equations.ends[longest, SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + 2 * self.own]
-        part = times[longest] + np.array([0.0, WITHIN]) * (times[longest + 1] - times[longest])
+        part = times[longest] + np.array([0.0, START_SHARE]) * (times[longest + 1] - times[longest])
         there = self.carried_along(begin, int(self.plan[longest, SegmentPlan.ALONG]), part, values)
         assert there is not None, "an orbit's own segments can be followed"
         return there, float(part[1])

@@ -11,7 +11,7 @@ import numpy as np
 from saltus.checks import Window
 from saltus.systems import System
 
-ROUNDING = 1e-13  # A gap that is open, and moves, by less than this is closed but for rounding.
+CLOSED_BELOW = 1e-13  # A gap that is open, and moves, by less than this is closed but for rounding.
 
 
 @cache
@@ -88,7 +88,7 @@ def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.
         place = names.index(contact.coordinate)
         closed = (np.asarray(contact.gap(states[..., place])) == 0.0) & (states[..., len(names) + place] == 0.0)
         least = np.maximum(np.abs(contact.gap(moved[..., place])), np.abs(moved[..., len(names) + place]))
-        closed = closed | (least < ROUNDING)
+        closed = closed | (least < CLOSED_BELOW)
         moved[..., place] = np.where(closed, float(contact.position), moved[..., place])
         moved[..., len(names) + place] = np.where(closed, 0.0, moved[..., len(names) + place])
     return moved

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+
+from saltus.paper.toml_tables import toml_table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,11 +20,4 @@ class Erratum:
 @cache
 def errata() -> dict[int, Erratum]:
     """All errata by number."""
-    tables = tomllib.loads((files("saltus.paper") / "errata.toml").read_text(encoding="utf-8"))
-    return {int(number): Erratum(**keys) for number, keys in tables.items()}
-
-
-@cache
-def equation_numbers() -> dict[str, int]:
-    """The numbers of the paper's equations by the labels that claims and errata name."""
-    return tomllib.loads((files("saltus.paper") / "equations.toml").read_text(encoding="utf-8"))
+    return {int(number): Erratum(**keys) for number, keys in toml_table("errata.toml").items()}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from saltus.provenance import provenance
@@ -34,6 +35,12 @@ def _variable(dims: Any, values: Any, units: str = "1", meaning: str = "") -> xr
 def scalar_dataset(values: Mapping[str, float], *, what: str, **attributes: Any) -> xr.Dataset:
     """A Dataset of single numbers without a unit, with its provenance."""
     return dataset({name: ((), value) for name, value in values.items()}, what=what, **attributes)
+
+
+def largest_angle(ends: xr.Dataset) -> np.ndarray:
+    """The largest abs(theta) of each motion of an ensemble of which extrema were kept, over all the periods that were."""
+    size = np.maximum(ends["largest_theta"].values, -ends["smallest_theta"].values)
+    return np.asarray(size.reshape(len(size), -1).max(axis=1))
 
 
 def scalars(data: Any) -> dict[str, float]:

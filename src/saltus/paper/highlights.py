@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
 from saltus.paper.claims.claim import Claim, ClaimVerdict
+from saltus.paper.toml_tables import toml_table
 
 BEARS_OUT = (ClaimVerdict.CORRECTED, ClaimVerdict.HOLDS)  # a finding: the statement fails as printed, or our own check holds
 
@@ -52,7 +50,6 @@ def validity(claims: Iterable[Claim]) -> list[Claim]:
     return [claim for claim in listed if claim.headline and claim.verdict in BEARS_OUT]
 
 
-@cache
 def highlight_tables() -> dict[str, Any]:
     """`findings`, each with its keys, and `validity`, the ids of claims, as the file has them."""
-    return tomllib.loads((files("saltus.paper") / "highlights.toml").read_text(encoding="utf-8"))
+    return toml_table("highlights.toml")

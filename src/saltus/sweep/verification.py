@@ -12,7 +12,7 @@ from saltus.checks import LIMITS, free_memory
 from saltus.sweep import store_files as files
 from saltus.sweep.chunk_grid import ChunkGrid, Index
 
-AT_ONCE = 256e6  # bytes that are read together, which is faster than chunk by chunk
+BYTES_AT_ONCE = 256e6  # bytes that are read together, which is faster than chunk by chunk
 
 
 def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, int]) -> Iterator[tuple[str, Index]]:
@@ -38,7 +38,7 @@ def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, 
             if not there:
                 continue
             rows, whole = chunks.slices(there[0])[0], len(there) == len(row)
-            if whole and _row_size(array, rows) < AT_ONCE and _can_be_read(array, (rows,)):
+            if whole and _row_size(array, rows) < BYTES_AT_ONCE and _can_be_read(array, (rows,)):
                 continue
             yield from ((name, index) for index in there if not _can_be_read(array, chunks.slices(index)))
 

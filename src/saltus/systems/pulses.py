@@ -22,12 +22,8 @@ from saltus.systems.signals import QUANTITY_ORDER, Signal
 
 TIME, RATE = {"converts": "time"}, {"converts": "rate"}  # the metadata of fields that units of time convert
 RICKER_REACH = 7.0  # of the argument u: beyond it (2 u^2 - 1) exp(-u^2) is below 1e-19, which no sum of the load notices
-SINUSOIDS: tuple[Callable[[Any], Any], ...] = (
-    np.sin,
-    np.cos,
-    lambda x: -np.sin(x),
-    lambda x: -np.cos(x),
-)  # each the last one's slope
+# Each the last one's slope.
+SINUSOIDS: tuple[Callable[[Any], Any], ...] = (np.sin, np.cos, lambda x: -np.sin(x), lambda x: -np.cos(x))
 
 
 @dataclass(frozen=True, kw_only=True)

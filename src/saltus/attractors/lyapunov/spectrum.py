@@ -18,7 +18,7 @@ from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import Numbers
 from saltus.systems import System
 
-ROUNDING = 1e-13  # of a derivative, relative to the largest one
+DERIVATIVE_ROUNDING = 1e-13  # of a derivative, relative to the largest one
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +214,7 @@ class _Run:
         with np.errstate(divide="ignore"):
             lengths = np.abs(np.diag(upper))
             if self.system.model.contacts:  # what closed contacts take away is 0 but for rounding
-                lengths[lengths < ROUNDING * lengths.max()] = 0.0
+                lengths[lengths < DERIVATIVE_ROUNDING * lengths.max()] = 0.0
             self.stretch[p] += np.log(lengths)
         self.areas[p] += contraction.along(found.motion)
         self.condition = max(self.condition, float(np.linalg.cond(found.state)))

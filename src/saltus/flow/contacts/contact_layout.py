@@ -93,7 +93,7 @@ class ImpactDetail(IntEnum):
 NEAR = (
     2.0**-44
 )  # Contacts close together if when one does the other's gap is no larger than this share of what it was in the step.
-ROUNDING = 2.0**-6  # of a gap, in NEAR times the contact's position
+GAP_ROUNDING = 2.0**-6  # of a gap, in NEAR times the contact's position
 VIOLATED = 1e-12  # The largest share of its right-hand side by which a complementarity problem may be violated by rounding.
 MOST_FROZEN_IMPACTS = 100_000  # that an accumulation is followed for: e = 0.9996 needs so many for 16 digits
 APART = 1e-9  # Contacts close together in motions beside one if the derivatives of their instants differ by less than this share.

@@ -35,7 +35,7 @@ from saltus.flow.contacts.contact_impacts import (
     smaller_set,
     solver_arrays,
 )
-from saltus.flow.contacts.contact_layout import NEAR, ROUNDING, TRIED_AGAIN, ContactColumn, ContactPart, ImpactDetail, Solver
+from saltus.flow.contacts.contact_layout import GAP_ROUNDING, NEAR, TRIED_AGAIN, ContactColumn, ContactPart, ImpactDetail, Solver
 from saltus.flow.contacts.contact_tangent import (
     accumulation_shifts,
     closing_columns,
@@ -279,7 +279,7 @@ def together(where, model, contacts, work, solver, hit, tau):
         if i == hit or contacts[i, ContactColumn.CLOSED] == 1:
             continue
         gap_series(model, contacts, work, i, contact_position(solver, own, count, i), order, g)
-        size = abs(g[0]) + abs(g[1]) * tau + abs(g[2]) * tau * tau + ROUNDING * abs(contact_position(solver, own, count, i))
+        size = abs(g[0]) + abs(g[1]) * tau + abs(g[2]) * tau * tau + GAP_ROUNDING * abs(contact_position(solver, own, count, i))
         if horner(g, order, tau) <= NEAR * size and horner_slope(g, order, tau) < 0.0:
             bits |= 1 << i
     return bits

@@ -11,7 +11,7 @@ from saltus.flow.ensemble.wanted import Sample, Until, Wanted
 from saltus.flow.kernel_layout import Mode, Status
 from saltus.flow.motion_dataset import rate_name, state_names
 from saltus.flow.stops import Stop
-from saltus.flow.validity import ROUNDING
+from saltus.flow.validity import GAIN_ROUNDING
 from saltus.provenance import provenance
 from saltus.systems import energy_gains, substitute
 from saltus.taylor import FREQUENCY
@@ -146,7 +146,7 @@ def _add_gains(writer: _Writer, system: System, inputs: Inputs) -> None:
     which = np.zeros(inputs.size, dtype=np.int16)
     gains = energy_gains(twin.model, twin.impact, which.shape)
     for i, gain in enumerate(gains.values()):
-        which |= np.where(gain > ROUNDING, 1 << i, 0).astype(np.int16)
+        which |= np.where(gain > GAIN_ROUNDING, 1 << i, 0).astype(np.int16)
     writer.add("gaining_contacts", which, "1", "contacts at which impacts may gain energy", **_masks(list(gains)))
 
 

@@ -74,12 +74,7 @@ def _paths(beta0: float, loads: tuple[tuple[float, float, float], ...], what: st
             "within": ("path", is_monostable(beta0, horizontal, vertical).all(axis=1), "1", "all of the path in the true domain"),
             "within_printed": ("path", paper_monostable(beta0, horizontal, vertical).all(axis=1), "1", "in the printed domain"),
             "held": ("path", [_held(s) for s in systems], "1", "rests in all"),
-            "deformed": (
-                "path",
-                [_most_deformed(beta0, *row) for row in rows],
-                "1",
-                "deformed equilibria under constant loads of it",
-            ),
+            "deformed": ("path", [_most_deformed(beta0, *row) for row in rows], "1", "deformed equilibria under its loads"),
             "system": ("path", np.array(systems), "1", "the System as JSON"),
         },
         {"phase": ("phase", phase, "rad", "Omega tau")},
@@ -105,7 +100,6 @@ def _numbers() -> Any:
     """Erratum 23 in numbers: the fold and Hcr at V = -1.2, and how many equilibria there are on each side of the fold."""
     beta0, vertical = np.deg2rad(80.0), -1.2
     fold = float(fold_horizontal(beta0, vertical))
-
     critical = float(critical_horizontal(beta0, vertical))
 
     def under(horizontal: float) -> System:
@@ -167,13 +161,12 @@ def measure(data: Any) -> dict[str, Measured]:
             n["count_at_rest_below"] == 1, n["count_at_rest_above"] == 1 and n["count_at_rest_below"] > 1
         ),
         "fig08-paths": measured(
-            all(_both(p["within"].values) and _borne_out(p) for p in (i, iii)),
-            within_i=i["within"].values.tolist(),
-            within_iii=iii["within"].values.tolist(),
-            held_i=i["held"].values.tolist(),
-            held_iii=iii["held"].values.tolist(),
-            most_i=i["deformed"].values.tolist(),
-            most_iii=iii["deformed"].values.tolist(),
+            all(len(set(p["within"].values.tolist())) == 2 and _borne_out(p) for p in (i, iii)),
+            **{
+                f"{name}_{load}": data[load][name].values.tolist()
+                for name in ("within", "held", "deformed")
+                for load in ("i", "iii")
+            },
         ),
         "fig08-critical": measured(n["held_below"] == 1 and n["held_above"] == 0),
     }
@@ -184,10 +177,6 @@ def _borne_out(paths: Any) -> bool:
     """Whether rest is held just on the paths within the printed border, and nothing deformed exists just in the true domain."""
     held = (paths["held"].values.astype(bool) == paths["within_printed"].values.astype(bool)).all()
     return bool(held and ((paths["deformed"].values == 0) == paths["within"].values.astype(bool)).all())
-
-
-def _both(flags: np.ndarray) -> bool:
-    return bool(flags.any() and not flags.all())
 
 
 FIGURE = paper_figure("fig08", compute=compute, draw=draw, measure=measure)

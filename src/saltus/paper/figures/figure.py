@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cache, partial
-from importlib.resources import files
+from functools import partial
 from operator import itemgetter
 from typing import Any
 
 from saltus.paper.claims.claim import Claim, Measures, judge
 from saltus.paper.panel_work import Panels, compute_panels
+from saltus.paper.toml_tables import toml_table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,7 +53,7 @@ class PaperFigure:
 
 def paper_figure(name: str, *, compute: Callable[..., Any] | None = None, **parts: Any) -> PaperFigure:
     """A `PaperFigure` with its title and caption from `captions.toml`; `compute` is all of one that has no panels."""
-    words = _captions()[name]
+    words = toml_table("figures", "captions.toml")[name]
     if compute is not None:
         parts |= {"panels": partial(_only, name, compute), "join": itemgetter(name), "module": compute.__module__}
     else:
@@ -64,8 +63,3 @@ def paper_figure(name: str, *, compute: Callable[..., Any] | None = None, **part
 
 def _only(name: str, compute: Callable[..., Any], **parameters: Any) -> Panels:
     return {name: partial(compute, **parameters)}
-
-
-@cache
-def _captions() -> dict[str, dict[str, str]]:
-    return tomllib.loads((files("saltus.paper.figures") / "captions.toml").read_text(encoding="utf-8"))

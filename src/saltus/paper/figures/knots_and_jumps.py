@@ -10,7 +10,7 @@ import numpy as np
 from saltus.branch_lines import smooth_lines
 from saltus.flow import simulate_many
 from saltus.orbits import PeriodicOrbit, orbits_of, solve
-from saltus.paper.figure_data import dataset, scalar_dataset
+from saltus.paper.figure_data import dataset, largest_angle, scalar_dataset
 from saltus.paper.measures.spectrum_features import detached, first_fold, main_branch, turning
 from saltus.systems import System
 
@@ -166,8 +166,7 @@ def _settled(system: Any, path: str, values: np.ndarray, orbits: list[Any]) -> n
     ends = simulate_many(
         system, **starts, parameters={path: values}, periods=SETTINGS.settle, sample=("extrema",), last=SETTINGS.last
     )
-    size = np.maximum(np.abs(ends["largest_theta"].values), np.abs(ends["smallest_theta"].values))
-    return np.asarray(size.reshape(len(orbits), -1).max(axis=1))
+    return largest_angle(ends)
 
 
 def _last_stable(branch: Any, fold: float) -> tuple[Any, float]:

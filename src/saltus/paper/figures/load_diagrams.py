@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.flow import simulate_many
 from saltus.paper.claims.claim import Measures
-from saltus.paper.figure_data import joined, scalar_dataset, with_groups
+from saltus.paper.figure_data import joined, largest_angle, scalar_dataset, with_groups
 from saltus.paper.figures.figure import PaperFigure, paper_figure
 from saltus.paper.figures.harmonic_loads import AMPLITUDE, under_force
 from saltus.paper.figures.knots_and_jumps import birth
@@ -83,8 +83,7 @@ def undeformed(system: Any, critical: float) -> Any:
     amplitudes = critical * np.array([1 - NEAR, 1 + NEAR])
     ends = simulate_many(system, theta=0.0, parameters={AMPLITUDE: amplitudes}, periods=WAIT, sample=("extrema",), last=LAST)
     moved = np.maximum(ends["overall_largest_theta"].values, -ends["overall_smallest_theta"].values)
-    late = np.maximum(ends["largest_theta"].values, -ends["smallest_theta"].values)
-    values = {"held_below": int(moved[0] == 0.0), "held_above": int(moved[1] == 0.0), "later": float(late[1].max())}
+    values = {"held_below": int(moved[0] == 0.0), "held_above": int(moved[1] == 0.0), "later": float(largest_angle(ends)[1])}
     return scalar_dataset(values, what="rest beside Hcr", system=system)
 
 

@@ -6,11 +6,8 @@ import io
 import json
 import math
 import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +15,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.files import checked_content
+from saltus.paper.toml_tables import toml_table
 
 ANGLES = ("beta0", "alpha")  # numbers of the paper's models in rad, which a reader knows in degrees
 
@@ -77,7 +75,7 @@ def _tables_of(file: Any) -> DataTables:
     for panel, inner, group in _groups(file):
         for name, variable in group.variables.items():
             units, meaning = (str(variable.attrs.get(key, "")) for key in ("units", "long_name"))
-            row = (f"{inner}/{name}".strip("/"), units, meaning or _words("meanings", name))
+            row = (f"{inner}/{name}".strip("/"), units, meaning or _words("meanings").get(name, ""))
             variables.setdefault(row, []).append(panel)
             if row not in dims:  # to look them up is slow, and panels have the same
                 dims[row] = ", ".join(variable.dimensions)
@@ -85,7 +83,7 @@ def _tables_of(file: Any) -> DataTables:
             if name == "system" and panel not in parameters.get("model.type", {}):
                 for number, text in _flat(json.loads(str(value))):
                     parameters.setdefault(number, {})[panel] = text
-            elif name in _tables()["settings"]:
+            elif name in _words("settings"):
                 settings.setdefault(name, {}).setdefault(panel, _text(value))
     return DataTables(
         variables=[
@@ -93,7 +91,7 @@ def _tables_of(file: Any) -> DataTables:
             for row, panels in variables.items()
         ],
         parameters=[_parameter_row(name, values, settings.get("path", {})) for name, values in parameters.items()],
-        settings=[_value_row(name, _words("settings", name), values) for name, values in settings.items()],
+        settings=[_value_row(name, _words("settings")[name], values) for name, values in settings.items()],
     )
 
 
@@ -150,11 +148,7 @@ def _panels(names: list[str]) -> str:
     return ", ".join(unique)
 
 
-def _words(table: str, name: str) -> str:
-    return _tables()[table].get(name, "")
-
-
-@cache
-def _tables() -> dict[str, dict[str, str]]:
-    """`settings`: the attributes that are settings, and `meanings`: of variables that say none themselves."""
-    return tomllib.loads((files("saltus.paper.report") / "variables.toml").read_text(encoding="utf-8"))
+def _words(table: str) -> dict[str, str]:
+    """The words for `settings`, the attributes that are settings, or the `meanings` of variables that say none themselves."""
+    words: dict[str, str] = toml_table("report", "variables.toml")[table]
+    return words

@@ -16,11 +16,12 @@ from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import Claim, ClaimVerdict
 from saltus.paper.claims.claim_tables import Origin
 from saltus.paper.claims.ledger import HEADINGS, ledger, tally, to_markdown
-from saltus.paper.errata import equation_numbers, errata
+from saltus.paper.errata import errata
 from saltus.paper.figures.figure import PaperFigure
 from saltus.paper.highlights import findings, validity
 from saltus.paper.report.browser import print_pdf
 from saltus.paper.report.report_content import BEYOND, ReportContent, report_content
+from saltus.paper.toml_tables import toml_table
 
 PAGE, PRINT = "report.html", "report.pdf"
 
@@ -165,7 +166,7 @@ def _equation(label: str) -> Any:
     """An equation by its number, or None where the label is none of the paper's."""
     from markupsafe import Markup
 
-    number = equation_numbers().get(label)
+    number = toml_table("equations.toml").get(label)
     return Markup('<span title="{}">eq.\xa0({})</span>').format(label, number) if number else None
 
 

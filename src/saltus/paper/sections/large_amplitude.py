@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.flow import simulate, simulate_many
 from saltus.paper.claims.claim import Measured, measured, with_fields
-from saltus.paper.figure_data import TOLERANCE, scalar_dataset, scalars
+from saltus.paper.figure_data import TOLERANCE, largest_angle, scalar_dataset, scalars
 from saltus.paper.figures.harmonic_loads import DAMPING, under_force
 from saltus.paper.figures.harmonic_loads import VERTICAL as FORCED_VERTICAL
 from saltus.paper.figures.phase_portraits import BETA0, VERTICAL, constant_load
@@ -84,7 +84,7 @@ def _bounded(starts: int) -> dict[str, float]:
         theta, velocity = rng.uniform(-20, 20, (2, starts))
         system = under_force(frequency=frequency, amplitude=STRONGEST)
         late = simulate_many(system, theta=theta, velocity=velocity, periods=120, sample="extrema", last=20)
-        size = np.maximum(late["largest_theta"].values, -late["smallest_theta"].values).max(axis=-1)
+        size = largest_angle(late)
         largest, beyond = max(largest, float(size.max())), beyond + int((size > 2 * (math.pi - BETA0)).sum())
     mu = DAMPING / 2
     bound = (STRONGEST + abs(FORCED_VERTICAL)) / math.tanh(math.pi * mu / (2 * math.sqrt(1 - mu * mu)))

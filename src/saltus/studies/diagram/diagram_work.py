@@ -185,7 +185,7 @@ def diagram_work(
         if kept is not None:
             kept.drop((0,))
         common = {"system": system.to_json(), "path": path, **identity(system)}
-        at_once = AT_ONCE if workers is not None or scheduler is not None else 1
+        at_once = BRANCHES_AT_ONCE if workers is not None or scheduler is not None else 1
         try:
             yield DiagramWork(system, path, Parts(common, store, processes, scheduler), at_once)
         except KeyboardInterrupt:
@@ -197,7 +197,7 @@ def diagram_work(
             kept.write((0,), finished({}, {"diagram": np.zeros(1)}))
 
 
-AT_ONCE = 8  # branches: the same number whoever computes them, so that what is kept does not depend on that
+BRANCHES_AT_ONCE = 8  # branches: the same number whoever computes them, so that what is kept does not depend on that
 
 
 def diagram_plan(system: System, path: str, bounds: tuple[float, float], window: Any, seed: int) -> Plan:
