@@ -16,6 +16,7 @@ from saltus.plots.ensembles import draw_ensemble
 from saltus.plots.motion import draw_motion
 from saltus.plots.plane import draw_plane
 from saltus.plots.sweep import draw_sweep
+from saltus.public_functions import bound_arguments
 
 DRAWINGS: dict[str, Callable[..., Any]] = {
     "motion": draw_motion,
@@ -66,4 +67,5 @@ def plot(result: Any, **options: Any) -> Any:
         draw = draw_stability_chart
     if draw is None:
         raise ParameterError(f"nothing draws a result of the kind {shown(data.attrs.get('kind', ''))}", "result")
+    bound_arguments(draw, (data,), options)  # what it does not take is refused with what it does
     return draw(data, **options)

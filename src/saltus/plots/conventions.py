@@ -110,8 +110,10 @@ def figure_of(axes: Any) -> Figure:
 
 
 def outside_legend(figure: Any, **options: Any) -> None:
-    """A legend below all panels of a figure; where nothing lays the figure out, at its lower edge."""
-    figure.legend(loc="outside lower center" if figure.get_layout_engine() is not None else "lower center", **options)
+    """A legend below all panels of a figure, which is laid out so that it covers nothing."""
+    if figure.get_layout_engine() is None:
+        figure.set_layout_engine("constrained")
+    figure.legend(loc="outside lower center", **options)
 
 
 def legend_of(ax: Any, own: bool, handles: Iterable[Any], **options: Any) -> None:

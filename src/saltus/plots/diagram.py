@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from saltus.plots.axis_names import parameter_name, peak, symbol, unit_in_brackets
@@ -28,13 +29,19 @@ DRAWN_STATES = StateSettings()
 
 
 @styled
-def draw_diagram(tree: Any, *, figure: Figure | None = None) -> np.ndarray:
-    """Draw the DataTree of `response_spectrum` or `bifurcation_diagram` into a figure; returns its axes, (1 or 2,)."""
+def draw_diagram(tree: Any, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
+    """Draw the DataTree of `response_spectrum` or `bifurcation_diagram`; returns its axes, (1 or 2,).
+
+    In a figure the states at phase 0 stand below the branches; into axes that are given the branches alone are drawn.
+    """
     low, high = (float(x) for x in tree.attrs["bounds"])
     names, unit = tree.attrs["coordinate"], _unit(tree)
-    simulated = "stroboscopic" in tree.children
-    figure = new_figure(DOUBLE_COLUMN, 150.0 if simulated else 95.0) if figure is None else figure
-    axes = figure.subplots(1 + simulated, 1, sharex=True, squeeze=False, height_ratios=[3, 2][: 1 + simulated])[:, 0]
+    simulated = "stroboscopic" in tree.children and ax is None
+    if ax is None:
+        figure = new_figure(DOUBLE_COLUMN, 150.0 if simulated else 95.0) if figure is None else figure
+        axes = figure.subplots(1 + simulated, 1, sharex=True, squeeze=False, height_ratios=[3, 2][: 1 + simulated])[:, 0]
+    else:
+        axes = np.array([ax])
     axes[0].set_xlim(low, high)
     top = _top(tree, low, high)
     axes[0].set_ylim(-0.02 * top, 1.08 * top)  # so that marks on the axis are not cut
@@ -48,8 +55,8 @@ def draw_diagram(tree: Any, *, figure: Figure | None = None) -> np.ndarray:
         axes[1].set_ylabel(f"${symbol(names.split()[0])}$ at phase 0{unit}")
         axes[1].set_title("stroboscopic points of direct simulation", loc="left", pad=3)
     axes[-1].set_xlabel(parameter_name(tree.attrs["path"]))
-    response_legend(figure, [tree], limits=min(limits, default=np.inf) < 1.08 * top)
-    return np.asarray(axes)
+    response_legend(figure if ax is None else ax, [tree], limits=min(limits, default=np.inf) < 1.08 * top)
+    return axes if ax is None else ax
 
 
 def _unit(tree: Any) -> str:

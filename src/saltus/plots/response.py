@@ -5,15 +5,19 @@ They are drawn from the DataTree of a study: its branches (see `branch_tables.py
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 
 from saltus.branch_lines import ModelValidity, margins_of, smooth_lines, validity_of
 from saltus.branch_tables import branches_of
 from saltus.plots.conventions import (
+    DOUBLE_COLUMN,
     INK,
     LIMIT,
     LIMIT_LINE,
@@ -33,6 +37,7 @@ class ResponseSettings:
     inset_margin: float = 0.05  # The ticks of an inset take this share of the axes.
     inset_weight: float = 0.65  # Lines in an inset are drawn with this share of their width, as they lie closer together.
     dotted_values: int = 25  # Simulated motions are drawn at about so many values: more dots hide the lines that they confirm.
+    letters: float = 880.0  # In a column twice as wide so many letters of one point stand beside one another.
     mark_distance: float = 1.5  # Marks of one kind that are nearer, in mm, are left to the insets and to the data.
 
 
@@ -236,8 +241,8 @@ def free_place(
     return (*best, *size)
 
 
-def response_legend(figure: Any, spectra: list[Any], *, limits: bool = True, critical: bool = False, columns: int = 4) -> None:
-    """One legend for all panels, below them, of what is in them."""
+def response_legend(where: Any, spectra: list[Any], *, limits: bool = True, critical: bool = False, columns: int = 4) -> None:
+    """One legend of what is in all panels: below those of a figure, or within axes."""
     from matplotlib.legend_handler import HandlerTuple
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -259,16 +264,21 @@ def response_legend(figure: Any, spectra: list[Any], *, limits: bool = True, cri
     found = {str(kind) for spectrum in spectra for kind in spectrum["bands"]["kind"].values}
     more += [Patch(color=BANDS[kind], label=BAND_NAMES[kind]) for kind in BANDS if kind in found]
     handlers: dict[Any, Any] = {tuple: HandlerTuple(ndivide=None, pad=0.3)}
+    entries: dict[str, Any] = {"handles": [*handles, *more], "labels": [*labels, *(handle.get_label() for handle in more)]}
+    if isinstance(where, Axes):
+        where.legend(**entries, handler_map=handlers, loc="best", handlelength=3.6)
+        return
+    width = where.get_figwidth() * 25.4 / DOUBLE_COLUMN
+    letters = round(SETTINGS.letters * width / mpl.rcParams["font.size"])
     outside_legend(
-        figure,
-        handles=[*handles, *more],
-        labels=[*labels, *(handle.get_label() for handle in more)],
+        where,
+        **entries,
         handler_map=handlers,
-        ncols=columns,
+        ncols=max(1, round(columns * min(1.0, width))),
         columnspacing=1.2,
         handletextpad=0.5,
         handlelength=3.6,
-        title=missed_states(spectra),
+        title=textwrap.fill(missed_states(spectra) or "", max(20, letters)) or None,
         title_fontsize="medium",
     )
 
