@@ -53,7 +53,7 @@ RESULTS = {
     "ensemble": lambda: saltus.simulate_many(SYSTEM, theta=np.linspace(0.1, 0.3, 5), periods=3),
     "grid": grid,
 }
-PANELS = {"motion": 2, "spectrum": 2}
+PANELS = {"motion": 2, "spectrum": 2}  # in a figure; into axes that are given only the first one is drawn
 
 
 @pytest.mark.parametrize("name", RESULTS)
@@ -64,13 +64,14 @@ def test_a_result_is_drawn_into_axes_that_are_given(name):
         axes = saltus.plot(result, figure=figure)
         assert len(axes) <= PANELS[name]
         assert all(isinstance(ax, Axes) and ax.figure is figure and ax.has_data() for ax in axes)
-    else:
-        ax = figure.subplots()
-        ax.set_title("mine")
-        assert saltus.plot(result, ax=ax) is ax
-        assert ax.has_data()
-        assert ax.get_title() == "mine"
-        assert ax.xaxis.label.get_fontsize() == size
+        figure.clear()
+    ax = figure.subplots()
+    ax.set_title("mine")
+    assert saltus.plot(result, ax=ax) is ax
+    assert figure.axes[0] is ax
+    assert ax.has_data()
+    assert ax.get_title() == "mine"
+    assert ax.xaxis.label.get_fontsize() == size
     figure.canvas.draw()
     plt.close(figure)
     own = saltus.plot(result)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, overload
@@ -321,14 +321,17 @@ class Motion:
         ParameterError
             A motion computed with dense=False and without samples.
         """
-        if self.sampled_validity is not None:
-            return self.sampled_validity
-        if self.dense is None and self.time > self.start:
-            raise ParameterError("a motion computed with dense=False has no validity; leave dense out, or give samples=...")
-        check = ValidityCheck(self.system)
-        if self.dense is not None:
-            check.add(self.dense)
-        return check.result(self.time - self.start)
+        found = self.sampled_validity
+        if found is None:
+            if self.dense is None and self.time > self.start:
+                raise ParameterError("a motion computed with dense=False has no validity; leave dense out, or give samples=...")
+            check = ValidityCheck(self.system)
+            if self.dense is not None:
+                check.add(self.dense)
+            found = check.result(self.time - self.start)
+        if self.limit is None or found.first.get(self.limit, self.time) is not None:
+            return found
+        return replace(found, first=found.first | {self.limit: self.time})  # it ended at the very instant
 
     def samples(self, count: int) -> Samples:
         """So many states, evenly over the motion, its start and its end among them.

@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from saltus.plots.axis_names import symbol, unit_in_brackets
@@ -22,14 +23,18 @@ PAIRS = (STABLE, UNSTABLE, LIMIT, "#E69F00", INK, SEPARATRIX)  # of more than tw
 
 
 @styled
-def draw_motion(dataset: xarray.Dataset, *, figure: Figure | None = None) -> np.ndarray:
+def draw_motion(dataset: xarray.Dataset, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
     """The coordinates over time, and velocities over coordinates, of a motion as `Motion.to_xarray` gives it; returns both axes.
 
     The phase portrait shows all of the motion in grey and its last forcing period on top; without a forcing period, all of it.
-    An open circle marks the start, a full one the end. Green lines mark the limits of the mechanism that are reached.
+    An open circle marks the start, a full one the end. Green lines mark the limits of the mechanism that are reached. Into axes
+    that are given the coordinates over time alone are drawn.
     """
-    figure = new_figure(DOUBLE_COLUMN, 68.0) if figure is None else figure
-    history, portrait = figure.subplots(1, 2, width_ratios=(1.75, 1))
+    if ax is None:
+        figure = new_figure(DOUBLE_COLUMN, 68.0) if figure is None else figure
+        history, portrait = figure.subplots(1, 2, width_ratios=(1.75, 1))
+    else:
+        history, portrait = ax, None
     names = coordinates(dataset)
     period = _forcing_period(dataset)
     several = [{"color": PAIRS[i // 2 % len(PAIRS)], "ls": ("-", DASHED)[i % 2]} for i in range(len(names))]
@@ -37,14 +42,15 @@ def draw_motion(dataset: xarray.Dataset, *, figure: Figure | None = None) -> np.
         time, position, velocity = arcs(dataset, name)
         label = f"${symbol(name)}$" if len(names) > 1 else None
         history.plot(time, position, lw=0.9, label=label, **line)
-        _portrait(portrait, (time, position, velocity), period, line)
+        if portrait is not None:
+            _portrait(portrait, (time, position, velocity), period, line)
     _labels(history, portrait, dataset, names)
     limit = _limit_angle(dataset)
     if limit is not None:
-        for ax, axis in ((history, "y"), (portrait, "x")):
+        for panel, axis in ((history, "y"), (portrait, "x"))[: 1 if portrait is None else 2]:
             for angle in (limit, 2 * limit):
-                limit_lines(ax, angle, axis=axis)
-    return np.array([history, portrait])
+                limit_lines(panel, angle, axis=axis)
+    return np.array([history, portrait]) if ax is None else ax
 
 
 def coordinates(dataset: xarray.Dataset) -> list[str]:
@@ -104,9 +110,13 @@ def _labels(history: Any, portrait: Any, dataset: xarray.Dataset, names: list[st
         places = ", ".join(f"${symbol(name)}$" for name in names)
         speeds = ", ".join(rf"$\dot{{{symbol(name)}}}$" for name in names)
     history.set(xlabel=r"$\tau$", ylabel=f"{places}{unit}", xlim=(float(dataset.time[0]), _end(dataset)))
+    history.axhline(0.0, color=FAINT, lw=0.5, zorder=0)
+    if portrait is None:
+        if len(names) > 1:
+            history.legend(loc="best")
+        return
     portrait.set(xlabel=f"{places}{unit}", ylabel=f"{speeds}{unit}")
-    for ax in (history, portrait):
-        ax.axhline(0.0, color=FAINT, lw=0.5, zorder=0)
+    portrait.axhline(0.0, color=FAINT, lw=0.5, zorder=0)
     portrait.axvline(0.0, color=FAINT, lw=0.5, zorder=0)
     if len(names) > 1:
         above = "outside upper center" if history.figure.get_layout_engine() is not None else "upper center"
