@@ -167,14 +167,14 @@ def test_steps_of_a_segment_are_checked_with_the_equation_of_its_own_side(side, 
     load = Load(frequency=1.0, force=Harmonic(0.2))
     problem = Problem(System(model=SteepBelow(), load=load, impact=VelocityReduction(0.9)), Signature((), 1))
     spans, sides = np.array([[0.0, 1.5, 0.0]]), np.array([[0, side]])
-    flown = problem.fly(Segments(spans, sides, np.array([start])), problem.values)
+    followed = problem.follow_segments(Segments(spans, sides, np.array([start])), problem.values)
     model = problem.system.model
 
     def rate(t, y):
         return [y[1], model.acceleration(t, y[0], y[1], side, load)]
 
     expected = solve_ivp(rate, (0.0, 1.5), start, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-3).y[:, -1]
-    assert flown.ends[0, at.KINDS : at.KINDS + 2] == pytest.approx(expected, abs=1e-9)
+    assert followed.ends[0, at.KINDS : at.KINDS + 2] == pytest.approx(expected, abs=1e-9)
 
 
 def test_lowest_gap_inside_a_segment_and_its_instant():

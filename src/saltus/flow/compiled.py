@@ -120,9 +120,9 @@ def contacts_module() -> ModuleType:
 
 @cache
 def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
-    """What periodic orbits are solved with: `fly_segments` and `impact_equations` of `segments.py`."""
+    """What periodic orbits are solved with: `follow_segments` and `impact_equations` of `segments.py`."""
     module = load_module("segments", _text(kernel_layout, roots, steps, contact, contact_side, chatter, segments))
-    return entry_point(module.fly_segments), entry_point(module.impact_equations)
+    return entry_point(module.follow_segments), entry_point(module.impact_equations)
 
 
 @cache

@@ -212,7 +212,7 @@ def copy_state(where, state, work, ends, columns, first):
 
 
 @cached_jit(SEGMENTS)
-def fly_segments(where, settings, env, model, spans, sides, states, ends, columns, looks):
+def follow_segments(where, settings, env, model, spans, sides, states, ends, columns, looks):
     """Follow all segments; returns how many of them have succeeded.
 
     A segment's columns are d/d(speed before its impact), d/d(its start) and the parameters, or, started from a state (its

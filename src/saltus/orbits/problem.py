@@ -86,15 +86,15 @@ class Equations:
 
 
 class Segments(NamedTuple):
-    """Smooth segments, as `fly_segments` of the flow takes them."""
+    """Smooth segments, as `follow_segments` of the flow takes them."""
 
     spans: np.ndarray  # (n, 3): when each begins and ends, and the speed at which the gap closed before it
     sides: np.ndarray  # (n, 2): the side before the impact with which it begins, 0 for none, and that along it
     states: np.ndarray  # (n, 2 d): its first state, where it begins with no impact
 
 
-class Flown(NamedTuple):
-    """The results of `fly_segments` for such segments."""
+class FollowedSegments(NamedTuple):
+    """The results of `follow_segments` for such segments."""
 
     ends: np.ndarray
     columns: np.ndarray  # the derivatives of the ends
@@ -207,21 +207,21 @@ class Problem:
         if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
             return None
         segments = self._segments(unknowns, frequency)
-        flown = self.fly(segments, values, look)
-        if flown is None:
+        followed = self.follow_segments(segments, values, look)
+        if followed is None:
             return None
         if not self.signature.sides:
-            return self._shooting(unknowns, frequency, flown)
-        return self._crossing(unknowns, frequency, segments, flown)
+            return self._shooting(unknowns, frequency, followed)
+        return self._crossing(unknowns, frequency, segments, followed)
 
     def carried(self, state: np.ndarray, begin: float, end: float, values: np.ndarray) -> np.ndarray | None:
         """The state at phase `end` of the smooth motion without impacts from a state at phase `begin`."""
         frequency = self.frequency(values)
         spans, sides = np.array([[begin / frequency, end / frequency, 0.0]]), np.array([[0, *self._along()]])
-        flown = self.fly(Segments(spans, sides, state.reshape(1, -1)), values)
-        return None if flown is None else flown.ends[0, at.KINDS : at.KINDS + 2 * self.own]
+        followed = self.follow_segments(Segments(spans, sides, state.reshape(1, -1)), values)
+        return None if followed is None else followed.ends[0, at.KINDS : at.KINDS + 2 * self.own]
 
-    def fly(self, segments: Segments, values: np.ndarray, look: bool = False) -> Flown | None:
+    def follow_segments(self, segments: Segments, values: np.ndarray, look: bool = False) -> FollowedSegments | None:
         """The smooth motion along segments, with the extrema within each if `look`; None where one cannot be followed."""
         parameters = self._values.copy()
         parameters[self._places] = values
@@ -230,7 +230,7 @@ class Problem:
         ends, columns = np.zeros((n, at.KINDS + 6 * own)), np.zeros((n, 4 * own, self._where[Where.COLUMNS]))
         looks = np.zeros((n if look else 0, at.LEAST_MARGIN + max(1, self._where[Where.MARGINS])))
         done = load_segments()[0](self._where, self._settings, env, model, *segments, ends, columns, looks)
-        return None if done < n else Flown(ends, columns, looks, np.sign(model[4][1:]))
+        return None if done < n else FollowedSegments(ends, columns, looks, np.sign(model[4][1:]))
 
     def _segments(self, unknowns: np.ndarray, frequency: float) -> Segments:
         """The segments between the impacts."""
@@ -255,9 +255,9 @@ class Problem:
         """The side of each segment, 0 for all sides."""
         return (0,) if self.passes_contact else self.signature.along()
 
-    def _shooting(self, unknowns: np.ndarray, frequency: float, flown: Flown) -> Equations:
+    def _shooting(self, unknowns: np.ndarray, frequency: float, followed: FollowedSegments) -> Equations:
         own, sign = self.own, -1.0 if self.signature.symmetric else 1.0
-        ends, columns, looks, _ = flown
+        ends, columns, looks, _ = followed
         state = ends[0, at.KINDS : at.KINDS + 2 * own]
         rates = ends[0, at.KINDS + own : at.KINDS + 3 * own]
         parameters = sign * columns[0, : 2 * own, 2 * own :]
@@ -266,8 +266,8 @@ class Problem:
         here, there = sign * columns[:, : 2 * own, : 2 * own], -np.eye(2 * own)[None]
         return Equations(sign * state - unknowns, here, there, parameters, ends, looks)
 
-    def _crossing(self, unknowns: np.ndarray, frequency: float, segments: Segments, flown: Flown) -> Equations:
-        spans, (ends, columns, looks, rates) = segments.spans, flown
+    def _crossing(self, unknowns: np.ndarray, frequency: float, segments: Segments, followed: FollowedSegments) -> Equations:
+        spans, (ends, columns, looks, rates) = segments.spans, followed
         n, count = len(spans), len(self.paths)
         sign = np.where(segments.sides[:, 1] > 0, rates[0], rates[1])
         residual, here, there = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))

@@ -247,10 +247,10 @@ def _between(problem: Problem, motion: Motion, excursions: np.ndarray) -> tuple[
     states[opened] = np.stack(motion.at(into), axis=1)
     spans = np.stack([begins, impacts.time, approach], axis=1)
     along = impacts.side.astype(np.int64)
-    flown = problem.fly(Segments(spans, np.stack([before, along], axis=1), states), problem.values, look=True)
-    if flown is None:
+    followed = problem.follow_segments(Segments(spans, np.stack([before, along], axis=1), states), problem.values, look=True)
+    if followed is None:
         return None, np.empty(0)
-    ends, _, looks, rates = flown
+    ends, _, looks, rates = followed
     sign = np.where(along > 0, rates[0], rates[-1])
     closed = np.stack([ends[:, at.KINDS] - contact, -sign * ends[:, at.KINDS + 1] - speeds], axis=1)
     nothing = np.empty((0, 2, 2))

@@ -60,7 +60,7 @@ def draw(data: Any) -> Any:
         if name in ZOOMED:
             zoom(axes[name], tree, ZOOMED[name])
         if name in LOOPS:
-            whole_loop(axes[name], tree)
+            closed_loop(axes[name], tree)
     for name in rows[-1]:
         axes[name].set_xlabel(r"frequency $\Omega$")
     response_legend(figure, list(panels.values()))
@@ -87,7 +87,7 @@ def draw_panel(ax: Any, tree: Any, name: str, title: str, unit: str) -> None:
     note_missed(ax, tree)
 
 
-def whole_loop(ax: Any, tree: Any) -> None:
+def closed_loop(ax: Any, tree: Any) -> None:
     """An inset, over a logarithmic axis, with the closed loop that reaches farthest beyond the range."""
     closed = [branch for _, branch in detached(tree) if branch.attrs["closed"]]
     if not closed:
