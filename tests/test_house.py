@@ -24,6 +24,7 @@ SHARED = {
     "errors",
     "enumerations",
     "notebook",
+    "result",
     "checks",
     "files",
     "progress",

@@ -184,8 +184,8 @@ def test_the_legend_says_what_is_violated_and_what_is_beyond():
     model, violated, farther = "stable, unstable (model holds)", "reaction violated", "beyond reach"
     cases = [([valid], [model]), ([valid, wrong], [model, violated]), ([wrong, beyond], [violated, farther])]
     for branches, expected in cases:
-        assert [label for label, _ in response.line_labels([diagram(*branches)])] == expected
-    assert [label for label, _ in response.line_labels([diagram(folded())])] == ["stable", "unstable"]
+        assert [label for label, _ in response.line_labels(branches)] == expected
+    assert [label for label, _ in response.line_labels([folded()])] == ["stable", "unstable"]
 
 
 def test_the_extremes_are_those_within_the_range():

@@ -220,4 +220,9 @@ def _dataset(system: System, path: str, grid: np.ndarray, followed: _Followed, n
         "value": variable("value", grid, "1", path),
         "attractor": ("attractor", np.array(identities, dtype=int), {"long_name": "identity; 0 is rest"}),
     }
-    return xarray.Dataset(variables, axes, about(system, "attractors along a parameter", path=path, **numbers))
+    numbers |= {"coordinate": " ".join(system.model.coordinates)}
+    return xarray.Dataset(
+        variables,
+        axes,
+        about(system, "attractors along a parameter", path=path, **numbers),
+    )

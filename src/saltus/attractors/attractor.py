@@ -13,6 +13,7 @@ import numpy as np
 from saltus.attractors.kind import AttractorKind
 from saltus.checks import Window
 from saltus.orbits import PeriodicOrbit
+from saltus.result import Result
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ class Attractor:
 
 
 @dataclass(frozen=True, eq=False)
-class Attractors:
+class Attractors(Result):
     """The attractors that were found, by their labels, and what was searched.
 
     Attributes

@@ -10,6 +10,7 @@ import numpy as np
 
 from saltus.errors import ParameterError, shown
 from saltus.public_functions import answered
+from saltus.result import Result
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 PARTIAL = {"basin_cells": "the cells of basins", "diagram": "the parts of a diagram"}  # what stores keep beside a netCDF file
 LONGEST_MATLAB_NAME = 63  # characters that MATLAB takes
-Result = Any  # a Dataset or a DataTree, or what has `to_xarray`
 
 
 @answered
@@ -101,7 +101,7 @@ def kind_of(data: Any) -> str:
 
 
 @answered
-def to_mat(path: str | Path, result: Result) -> Path:
+def to_mat(path: str | Path, result: xarray.Dataset | xarray.DataTree | Result) -> Path:
     """Write a result as a MATLAB file (version 5), which `load` of MATLAB and Octave reads; returns its path.
 
     Each variable and coordinate is an array under its name, in which what MATLAB does not take becomes "_"; texts are cell
@@ -112,7 +112,7 @@ def to_mat(path: str | Path, result: Result) -> Path:
     path
         Of the file; ".mat" is appended where it has no suffix.
     result
-        A Dataset, a DataTree, or what has `to_xarray`, such as a motion or a branch.
+        A Dataset, a DataTree, or a result with `to_xarray`, such as a motion or a branch.
 
     Raises
     ------

@@ -17,10 +17,11 @@ from saltus.flow.stops import Stop
 from saltus.flow.validity import Validity, ValidityCheck
 from saltus.notebook import html_table
 from saltus.public_functions import Numbers, answering
+from saltus.result import Result, table_of
 from saltus.systems import System
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
+    import pandas
     import xarray
 
 
@@ -163,7 +164,7 @@ class Samples:
 
 @answering("at", "closed_at", "samples", "to_pandas", "to_xarray")
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(Result):
     """An exact motion of a system.
 
     The coordinate at the end has the model's own name: `motion.theta`, or `motion.x` for a wall oscillator; all of them are in
@@ -358,8 +359,7 @@ class Motion:
         times
             Dimensionless times, (n,).
         """
-        data = self.to_xarray(times)
-        return data.drop_vars([name for name in data.data_vars if "time" not in data[name].dims]).to_dataframe()
+        return table_of(self.to_xarray(times))
 
     def _repr_html_(self) -> str:
         names = self.system.model.coordinates

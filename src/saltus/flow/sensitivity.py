@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,13 +14,18 @@ from saltus.flow.contacts.contact_layout import ImpactDetail
 from saltus.flow.kernel_layout import GrazingDetail
 from saltus.flow.memory_layout import RestDetail
 from saltus.flow.motion import EventKind, Motion
+from saltus.flow.motion_dataset import state_names
 from saltus.flow.request import MotionRequest
 from saltus.flow.simulation import Followed, follow
 from saltus.flow.stops import Stop
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
+from saltus.result import Result, result_dataset
 from saltus.systems import System, check_system, constrained_acceleration
 from saltus.taylor import FREQUENCY
+
+if TYPE_CHECKING:
+    import xarray
 
 IRREGULAR = {
     ImpactDetail.NO_SPEED: "at time {time:.9g} a contact is reached without speed, where the motion has no derivative",
@@ -32,7 +37,7 @@ IRREGULAR = {
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivities:
+class Sensitivities(Result):
     """The derivatives of a motion of n degrees of freedom; a state is (coordinates, velocities), 2 n numbers.
 
     They hold for the motion that `simulate` returns for the same arguments: from the same `time` on, whatever the load's phase
@@ -80,6 +85,21 @@ class Sensitivities:
     def determinant(self) -> float:
         """Of `state`: by what factor the flow has scaled volumes of states; 0 after rest, nan where `state` is."""
         return float(np.linalg.det(self.state)) if np.isfinite(self.state).all() else math.nan
+
+    def to_xarray(self) -> xarray.Dataset:
+        """`derivative` (state, to) of the state at the end, and `event_time_derivative` (event, to) of the events' times."""
+        system = self.motion.system
+        names = state_names(system.model.coordinates)
+        to = [*(f"start_{name}" for name in names), *self.parameter_paths]
+        columns: dict[str, tuple[Any, ...]] = {
+            "derivative": (("state", "to"), np.hstack([self.state, self.parameters]), "1", "of the state at the end"),
+            "event_time": ("event", [event.time for event in self.motion.events], "1", "times of the motion's events"),
+            "event_kind": ("event", [event.kind.value for event in self.motion.events], "1", "what they are"),
+            "event_time_derivative": (("event", "to"), self.event_times, "1", "of the events' times"),
+            "grazing_time": ("grazing", self.grazings, "1", "times at which the motion touches the contact"),
+        }
+        facts = {"end_time": self.motion.time, "undefined": self.undefined or ""}
+        return result_dataset("sensitivities", columns, {"state": list(names), "to": to}, system, tol=self.motion.tol, **facts)
 
     def __repr__(self) -> str:
         to = ", ".join(("state", *self.parameter_paths))

@@ -16,6 +16,7 @@ from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.resting_family import RestingPoint
 from saltus.orbits.special_point import OrbitEnd, SpecialPoint
 from saltus.public_functions import answering
+from saltus.result import Result
 
 if TYPE_CHECKING:
     import xarray
@@ -26,7 +27,7 @@ START = End(OrbitEnd.START)
 
 @answering("at")
 @dataclass(frozen=True, eq=False)
-class Branch(Course[OrbitPoint | RestingPoint, SpecialPoint]):
+class Branch(Result, Course[OrbitPoint | RestingPoint, SpecialPoint]):
     """A branch: its points in order, the special ones among them, and why it ends on both sides.
 
     A family of resting orbits is a branch as well: `special` then holds grazings (GR), the zeros of margins and functions, and

@@ -32,6 +32,7 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
     data |= {name: ("point", values, attrs) for name, values, attrs in _columns(orbits)}
     data |= _multipliers(orbits) | _unknowns(orbits) | _special(branch.special) | _rests(orbits)
     attributes: dict[str, Any] = {
+        "kind": "branch",
         "path": branch.path,
         "coordinate": " ".join(problem.system.model.coordinates),
         "ends": [str(end) for end in branch.ends],

@@ -16,6 +16,7 @@ from saltus.flow import Motion, Stop, simulate
 from saltus.progress import Progress, silent
 from saltus.provenance import provenance
 from saltus.public_functions import answered
+from saltus.result import Result
 from saltus.systems import Constant, System, check_system
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class FreeOutcome(Sentence):
 
 
 @dataclass(frozen=True)
-class FreeOrbit:
+class FreeOrbit(Result):
     """A free periodic motion of a system with one coordinate, which begins at rest at one of its two turning points.
 
     Where a wall throws it back, the wall is the other turning point.
@@ -92,6 +93,13 @@ class FreeOrbit:
     def motion(self) -> Motion:
         """One period of it."""
         return _followed(self.system, self.amplitude, self.period)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """One period of it over `time`, with its numbers as attributes."""
+        data = self.motion().to_xarray()
+        numbers = {name: getattr(self, name) for name in ("amplitude", "turning", "period", "impact_speed", "defect")}
+        data.attrs |= {"title": "free orbit computed by saltus", "kind": "free_orbit"} | numbers
+        return data
 
 
 @answered

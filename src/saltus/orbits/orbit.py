@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,12 +19,16 @@ from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.public_functions import answering
+from saltus.result import Result
 from saltus.systems import System
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @answering("motion", "defect_after")
 @dataclass(frozen=True, eq=False)
-class PeriodicOrbit:
+class PeriodicOrbit(Result):
     """A periodic orbit of the exact system, solved to rounding.
 
     Phases and speeds are those of one period of the orbit, q forcing periods, in the order of the impacts.
@@ -320,6 +324,16 @@ class PeriodicOrbit:
     def validity(self) -> Validity:
         """Which limits of the mechanism it passes, and the share of time with a wrong reaction (errata 20, 21)."""
         return self.motion().validity
+
+    def to_xarray(self) -> xarray.Dataset:
+        """One period of it over `time`, its `multiplier_real` and `multiplier_imag`, and its numbers as attributes."""
+        data = self.motion().to_xarray()
+        for part in ("real", "imag"):
+            values = getattr(self.multipliers, part)
+            data[f"multiplier_{part}"] = ("multiplier", values, {"units": "1", "long_name": f"Floquet multipliers, {part}"})
+        numbers = {"period": self.period, "symmetric": int(self.symmetric), "stable": int(self.stable), "residual": self.residual}
+        data.attrs |= {"title": "periodic orbit computed by saltus", "kind": "periodic_orbit"} | numbers
+        return data
 
     def _repr_html_(self) -> str:
         names = ("period", "duration", "frequency", "amplitude", "symmetric", "stable", "residual")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,11 @@ from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.starts import initial_states, is_still, rest_state
 from saltus.orbits.verify import same_orbit
 from saltus.progress import Progress, silent
+from saltus.result import Result, result_dataset
 from saltus.systems import System, check_system
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class Settled:
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
+class Search(Result):
     """What was found, and what was searched.
 
     Attributes
@@ -82,6 +86,7 @@ class Search:
     (array([0]), array([0]))
     """
 
+    system: System
     path: str
     orbits: tuple[PeriodicOrbit, ...]
     values: np.ndarray
@@ -92,6 +97,24 @@ class Search:
     unsettled: np.ndarray
     at_rest: np.ndarray
     settled: Settled
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The orbits over `orbit`, counts of what did not settle or came to rest over `value`, what settled over `motion`."""
+        name = self.system.model.coordinates[0]
+        unit, text = self.system.model.unit_of(name), f"max abs({name})"
+        columns: dict[str, tuple[Any, ...]] = {
+            "parameter": ("orbit", [float(orbit.solution.values[0]) for orbit in self.orbits], "1", self.path),
+            "amplitude": ("orbit", [orbit.amplitude for orbit in self.orbits], unit, text),
+            "period": ("orbit", np.array([orbit.period for orbit in self.orbits], dtype=int), "1", "forcing periods"),
+            "stable": ("orbit", np.array([orbit.stable for orbit in self.orbits], dtype=np.int8), "1", "1 where it is stable"),
+            "unsettled": ("value", self.unsettled, "1", "motions that did not settle on an orbit"),
+            "at_rest": ("value", self.at_rest, "1", "motions that came to rest"),
+            "settled_parameter": ("motion", self.settled.value, "1", self.path),
+            "settled_amplitude": ("motion", self.settled.amplitude, unit, f"{text} of what simulation has settled on"),
+            "settled_period": ("motion", self.settled.period, "1", "its forcing periods"),
+        }
+        facts = {"path": self.path, "starts": self.starts, "max_period": self.max_period, "coordinate": name}
+        return result_dataset("orbits", columns, {"value": self.values}, self.system, seed=self.seed, **facts)
 
     def __repr__(self) -> str:
         kinds = sorted({orbit.period for orbit in self.orbits})
@@ -186,7 +209,7 @@ def search_orbits(
     progress(1.0, "searching")
     columns = np.array(settled, dtype=float).reshape(-1, 4).T
     dots = Settled(columns[0], columns[1].astype(int), columns[2], columns[3])
-    return Search(path, tuple(found), grid, starts, max_period, area, seed, unsettled, at_rest, dots)
+    return Search(system, path, tuple(found), grid, starts, max_period, area, seed, unsettled, at_rest, dots)
 
 
 def _follow(system: System, path: str, grid: np.ndarray, states: np.ndarray, max_period: int) -> tuple[Recurrence, Recurrence]:

@@ -17,6 +17,7 @@ from saltus.orbits.problem import Equations
 from saltus.orbits.special_point import SpecialPoint
 from saltus.provenance import provenance
 from saltus.public_functions import answering
+from saltus.result import Result
 
 if TYPE_CHECKING:
     import xarray
@@ -93,7 +94,7 @@ class ConditionedCurve(OrbitCurve):
 
 @answering("at")
 @dataclass(frozen=True, eq=False)
-class SpecialCurve(Course[SpecialCurvePoint, SpecialPoint]):
+class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
     """A curve of special points in two parameters: its points in order, its codimension-two points, and why it ends.
 
     Attributes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,10 @@ from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.symmetry import full_period
+from saltus.result import Result, result_dataset
+
+if TYPE_CHECKING:
+    import xarray
 
 MOST_DOUBLED = 64  # forcing periods of an orbit: periods double six times
 
@@ -121,7 +126,7 @@ def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
 
 
 @dataclass(frozen=True)
-class Cascade:
+class Cascade(Result):
     """Period doublings one after the other, and how fast they follow: the ratios tend to Feigenbaum's 4.6692.
 
     Attributes
@@ -152,6 +157,19 @@ class Cascade:
         """(p_{n+1} - p_n) / (p_{n+2} - p_{n+1})."""
         steps = np.diff(self.parameters)
         return np.asarray(steps[:-1] / steps[1:])
+
+    def to_xarray(self) -> xarray.Dataset:
+        """`parameter`, `period` and `amplitude` of the doublings over `doubling`, and their `ratio` over `step`."""
+        orbit, path = self.points[0].orbit, self.points[0].orbit.problem.paths[0]
+        name = orbit.system.model.coordinates[0]
+        amplitudes = [point.amplitude for point in self.points]
+        columns: dict[str, tuple[Any, ...]] = {
+            "parameter": ("doubling", self.parameters, "1", path),
+            "period": ("doubling", self.periods, "1", "forcing periods of the orbits that double"),
+            "amplitude": ("doubling", amplitudes, orbit.system.model.unit_of(name), f"max abs({name})"),
+            "ratio": ("step", self.ratios, "1", "(p_{n+1} - p_n) / (p_{n+2} - p_{n+1}), which tends to 4.6692"),
+        }
+        return result_dataset("cascade", columns, None, orbit.system, path=path)
 
 
 def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_period: int = 32, step: float = STEP) -> Cascade:

@@ -3,15 +3,15 @@ from .claims.ledger import HEADINGS, ledger, tally
 from .figures.figure import PaperFigure
 from .parts import FIGURES
 from .report.report import report_as_pdf, report_from_results
-from .reproduction import Result, reproduce
+from .reproduction import MadeFigure, reproduce
 
 __all__ = [
     "FIGURES",
     "HEADINGS",
     "Claim",
     "ClaimVerdict",
+    "MadeFigure",
     "PaperFigure",
-    "Result",
     "ledger",
     "report_as_pdf",
     "report_from_results",

@@ -20,7 +20,7 @@ from saltus.progress import Progress, silent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
+class MadeFigure:
     """What became of one name: its files, its claims, and whether it was made anew."""
 
     name: str
@@ -32,7 +32,7 @@ class Result:
 
 def reproduce(
     names: Sequence[str] = (), output: Path | str = Path("results"), force: bool = False, progress: Progress = silent
-) -> list[Result]:
+) -> list[MadeFigure]:
     """Compute and draw the named parts of the paper (all where none is named) into `output`, and write the report.
 
     What is up to date is left alone unless `force`. An interrupt leaves complete files only, and the next run goes on from there.
@@ -75,10 +75,10 @@ def _make(figures: Mapping[str, PaperFigure], output: Path, progress: Progress) 
     return seconds
 
 
-def _result(figure: PaperFigure, output: Path, seconds: Mapping[str, float]) -> Result:
+def _result(figure: PaperFigure, output: Path, seconds: Mapping[str, float]) -> MadeFigure:
     files = tuple(output / name for name in figure.files())
     made, claims = figure.name in seconds, tuple(state.claims(figure, output))
-    return Result(name=figure.name, made=made, seconds=seconds.get(figure.name, 0.0), files=files, claims=claims)
+    return MadeFigure(name=figure.name, made=made, seconds=seconds.get(figure.name, 0.0), files=files, claims=claims)
 
 
 def _write(figure: PaperFigure, data: Any, output: Path) -> None:

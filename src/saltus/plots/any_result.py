@@ -3,32 +3,56 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 from saltus.errors import ParameterError, shown
 from saltus.plots.attractors import draw_attractors
 from saltus.plots.backbone import draw_backbone
+from saltus.plots.basin_boundary import draw_uncertainty, draw_wada
 from saltus.plots.basins import draw_basins
+from saltus.plots.chaotic_bands import draw_chaotic_bands
 from saltus.plots.chart import draw_stability_chart
+from saltus.plots.conventions import SINGLE_COLUMN, axes_or_new, style
 from saltus.plots.curves import draw_attractors_along, draw_branch, draw_special_curve
 from saltus.plots.diagram import draw_diagram
 from saltus.plots.ensembles import draw_ensemble
+from saltus.plots.exponents import draw_exponents, draw_exponents_along
+from saltus.plots.manifolds import draw_manifold, draw_separatrix
 from saltus.plots.motion import draw_motion
+from saltus.plots.orbits_found import draw_cascade, draw_search
 from saltus.plots.plane import draw_plane
+from saltus.plots.sensitivities import draw_sensitivities
 from saltus.plots.sweep import draw_sweep
+from saltus.plots.verdict import draw_verdict
 from saltus.public_functions import bound_arguments
 
 DRAWINGS: dict[str, Callable[..., Any]] = {
-    "motion": draw_motion,
-    "phase_portrait": draw_plane,
-    "response_spectrum": draw_diagram,
-    "bifurcation_diagram": draw_diagram,
-    "frequency_sweep": draw_sweep,
     "attractors": draw_attractors,
+    "attractors along a parameter": draw_attractors_along,
     "backbone": draw_backbone,
     "basins": draw_basins,
+    "bifurcation_diagram": draw_diagram,
+    "branch": draw_branch,
+    "cascade": draw_cascade,
+    "chaotic_bands": draw_chaotic_bands,
+    "ensemble": draw_ensemble,
+    "exponents": draw_exponents,
+    "free_orbit": draw_motion,
+    "frequency_sweep": draw_sweep,
+    "lyapunov_many": draw_exponents_along,
+    "manifold": draw_manifold,
+    "motion": draw_motion,
+    "orbits": draw_search,
+    "periodic_orbit": draw_motion,
+    "phase_portrait": draw_plane,
+    "response_spectrum": draw_diagram,
+    "sensitivities": draw_sensitivities,
+    "separatrix": draw_separatrix,
     "stability_chart": draw_stability_chart,
-    "attractors along a parameter": draw_attractors_along,
+    "uncertainty_exponent": draw_uncertainty,
+    "verdict": draw_verdict,
+    "wada": draw_wada,
 }  # by the attribute `kind`
 
 
@@ -38,7 +62,8 @@ def plot(result: Any, **options: Any) -> Any:
     Parameters
     ----------
     result
-        A Dataset or a DataTree that saltus has made, or what has `to_xarray`, such as a motion or a branch.
+        A Dataset or a DataTree that saltus has made, what has `to_xarray`, such as a motion or a branch, or a tuple of such, as
+        `switch_branch` and `separatrices` give them, which are drawn into the same axes.
     options
         Of the function that draws it, such as `ax=` (or `figure=`, where it has several panels) and `width=`, in mm.
 
@@ -53,19 +78,31 @@ def plot(result: Any, **options: Any) -> Any:
     >>> type(axes).__name__
     'Axes'
     """
+    if isinstance(result, (tuple, list)) and result:
+        given = options.pop("ax", None)
+        with style() if given is None else nullcontext():
+            ax = axes_or_new(given, options.pop("width", SINGLE_COLUMN), 0.8 * SINGLE_COLUMN)
+            for each in result:
+                plot(each, ax=ax, **options)
+        return ax
     data = result.to_xarray() if hasattr(result, "to_xarray") else result
     if not hasattr(data, "attrs") or not hasattr(data, "data_vars"):
         raise ParameterError(f"result must be a Dataset, a DataTree or what has to_xarray, got {shown(result)}", "result")
-    draw = DRAWINGS.get(str(data.attrs.get("kind", "")))
-    if draw is None and "branches" in getattr(data, "children", ()):
-        draw = draw_diagram
-    if draw is None and "unknowns" in data:
-        draw = draw_special_curve if "path" in data.coords else draw_branch
-    if draw is None and "stop" in data:
-        draw = draw_ensemble
-    if draw is None and {"amplitude", "outcome", "horizontal", "vertical"} <= set(data.variables):
-        draw = draw_stability_chart
+    draw = DRAWINGS.get(str(data.attrs.get("kind", ""))) or _by_content(data)
     if draw is None:
         raise ParameterError(f"nothing draws a result of the kind {shown(data.attrs.get('kind', ''))}", "result")
     bound_arguments(draw, (data,), options)  # what it does not take is refused with what it does
     return draw(data, **options)
+
+
+def _by_content(data: Any) -> Callable[..., Any] | None:
+    """What draws a dataset whose kind is of something else, as that of a curve of special points, or which has none."""
+    if "chart" in getattr(data, "children", ()):
+        return draw_stability_chart
+    if "branches" in getattr(data, "children", ()):
+        return draw_diagram
+    if "unknowns" in data and "path" in data.coords:
+        return draw_special_curve
+    if {"amplitude", "outcome", "horizontal", "vertical"} <= set(data.variables):
+        return draw_stability_chart
+    return None

@@ -7,7 +7,7 @@ from typing import Any
 
 from matplotlib.lines import Line2D
 
-from saltus.plots.axis_names import symbol
+from saltus.plots.axis_names import state_symbol, symbol
 from saltus.plots.conventions import INK, legend_of, shades
 
 UNDECIDED_COLOUR = "#ffffff"
@@ -36,8 +36,7 @@ def name_plane(ax: Any, plane: tuple[str, str], unit: str, constant: bool) -> No
     """The names of the two state variables on the axes; under a `constant` load there is no phase."""
     when = "" if constant else " at phase 0"
     ax.set_xlabel(f"${symbol(plane[0])}${when}{unit}")
-    dotted = rf"\dot{{{symbol(plane[0])}}}" if plane[1] == "velocity" else symbol(plane[1])
-    ax.set_ylabel(f"${dotted}${when}{'' if plane[1].endswith('velocity') else unit}")
+    ax.set_ylabel(f"${state_symbol(plane[1], plane)}${when}{unit}")
 
 
 def steady(dataset: Any) -> bool:

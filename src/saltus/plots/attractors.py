@@ -10,7 +10,7 @@ from matplotlib.patheffects import Normal, Stroke
 
 from saltus.plots.attractor_marks import UNDECIDED_COLOUR, attractor_colours, attractor_legend, draw_points, name_plane, steady
 from saltus.plots.axis_names import unit_in_brackets
-from saltus.plots.conventions import INK, SINGLE_COLUMN, new_figure, styled
+from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new, styled
 
 START_MARK: dict[str, Any] = {
     "linestyle": "none",
@@ -28,7 +28,7 @@ def draw_attractors(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 
     """Draw the dataset of attractors that were searched: a dot for each start, a mark for each point at phase 0; returns `ax`."""
     x, y = (str(name) for name in dataset.attrs["plane"])
     colours = attractor_colours([int(n) for n in dataset["attractor"].values])
-    own, ax = ax is None, new_figure(width, 0.82 * width + 4.2 * (len(colours) + 1) // 2).subplots() if ax is None else ax
+    own, ax = ax is None, axes_or_new(ax, width, 0.82 * width + 4.2 * (len(colours) + 1) // 2)
     ends = dataset["end"].values
     for n, colour in {**colours, -1: UNDECIDED_COLOUR}.items():
         here = ends == n

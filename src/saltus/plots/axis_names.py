@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 SYMBOLS = {"theta": r"\theta", "theta_1": r"\theta_1", "theta_2": r"\theta_2"}
 PARAMETERS = {
     "load.frequency": r"frequency $\Omega$",
@@ -37,3 +39,56 @@ def unit_in_brackets(variable: Any) -> str:
 def parameter_name(path: str) -> str:
     """What a parameter is called on an axis; its dotted path where it has no name."""
     return PARAMETERS.get(path, path)
+
+
+def quantity_name(dataset: Any, quantity: str) -> str:
+    """The symbol of the amplitude of a dataset's coordinates, or a quantity's name in words."""
+    if quantity == "amplitude" and "coordinate" in dataset.attrs:
+        return f"${peak(dataset.attrs['coordinate'])}$"
+    return quantity.replace("_", " ")
+
+
+def parameter_symbol(path: str) -> str:
+    """A parameter's symbol; its dotted path where it has none."""
+    name = parameter_name(path)
+    return name[name.index("$") : name.rindex("$") + 1] if "$" in name else path
+
+
+def plane_of(dataset: Any) -> tuple[str, str]:
+    """The two state variables over which a dataset is drawn."""
+    first, second = dataset.attrs["plane"]
+    return str(first), str(second)
+
+
+def state_symbol(name: str, plane: tuple[str, str]) -> str:
+    """The symbol of one of the two state variables of a plane, a velocity as its coordinate with a dot."""
+    return rf"\dot{{{symbol(plane[0])}}}" if name == "velocity" else symbol(name)
+
+
+def state_label(dataset: Any, name: str, plane: tuple[str, str], after: str = "") -> str:
+    """The name of an axis with a state variable, and its unit as the variable of a dataset of the same name carries it."""
+    return (
+        f"${state_symbol(name.removeprefix('section_').removeprefix('orbit_'), plane)}${after}{unit_in_brackets(dataset[name])}"
+    )
+
+
+def varied(dataset: Any, dim: str) -> tuple[str, np.ndarray]:
+    """What runs along a dimension of an ensemble, in words with its unit, and its values: a parameter, a start, or numbers."""
+    given = [name for name in dataset.variables if "." in str(name) or str(name).startswith(("start_", "initial_"))]
+    for name in (dim, *given):
+        if name in dataset.variables and dim in dataset[name].dims and dataset[name].dtype.kind in "fi":
+            rows = dataset[name].transpose(dim, ...).values.reshape(dataset.sizes[dim], -1).astype(float)
+            if name == dim or (np.ptp(rows, axis=1).max() == 0.0 and len(np.unique(rows)) == len(rows)):
+                return _start_name(dataset, str(name)), rows[:, 0]
+    return dim.replace("_", " "), np.arange(dataset.sizes[dim], dtype=float)
+
+
+def _start_name(dataset: Any, name: str) -> str:
+    """What a start is called on an axis; a parameter or a dimension of the user's own by its name."""
+    state = name.removeprefix("start_").removeprefix("initial_")
+    if state == name:
+        return parameter_name(name)
+    if state == "time":
+        return r"$\tau$ at the start"
+    coordinate = next(iter(dataset.data_vars))
+    return f"${state_symbol(state, (str(coordinate), state))}$ at the start{unit_in_brackets(dataset[name])}"

@@ -7,7 +7,7 @@ from typing import Any
 from matplotlib.axes import Axes
 
 from saltus.plots.axis_names import symbol, unit_in_brackets
-from saltus.plots.conventions import INK, SINGLE_COLUMN, new_figure, styled
+from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new, styled
 
 BACKBONE_LINE: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.1}
 
@@ -15,7 +15,7 @@ BACKBONE_LINE: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)
 @styled
 def draw_backbone(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw the dataset of `backbone`: amplitudes over the frequencies of the free orbits; returns the axes."""
-    ax = new_figure(width, 0.75 * width).subplots() if ax is None else ax
+    ax = axes_or_new(ax, width, 0.75 * width)
     ax.plot(dataset["frequency"].values, dataset["amplitude"].values, **BACKBONE_LINE)
     ax.set_xlabel(r"frequency $2\pi/T$ of free motions")
     ax.set_ylabel(f"${symbol(dataset.attrs['coordinate'])}$ at the turning point{unit_in_brackets(dataset['amplitude'])}")

@@ -20,7 +20,7 @@ from saltus.plots.attractor_marks import (
     steady,
 )
 from saltus.plots.axis_names import unit_in_brackets
-from saltus.plots.conventions import INK, SINGLE_COLUMN, new_figure, styled
+from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new, styled
 from saltus.plots.marks import cell_edges
 
 BOUNDARY: dict[str, Any] = {"color": INK, "linewidth": 0.7, "zorder": 4}
@@ -54,7 +54,7 @@ def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), *, ax: Axes | None 
     y, x = (str(dim) for dim in dataset["label"].dims)
     colours, left = attractor_colours([int(n) for n in dataset["attractor"].values]), float(dataset.attrs.get("undecided", 0.0))
     rows = -(-min(len(colours), MOST_NAMED) // 2)
-    own, ax = ax is None, new_figure(width, 0.86 * width + 4.2 * (rows + bool(left))).subplots() if ax is None else ax
+    own, ax = ax is None, axes_or_new(ax, width, 0.86 * width + 4.2 * (rows + bool(left)))
     _paint(ax, dataset, (x, y), colours)
     curves = [np.stack([dataset[f"boundary_{x}"], dataset[f"boundary_{y}"]], 1)] if f"boundary_{x}" in dataset else []
     for states in (*curves, *manifolds):

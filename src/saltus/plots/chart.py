@@ -15,7 +15,7 @@ from matplotlib.patheffects import Normal, Stroke
 
 from saltus.branch_lines import border_curves
 from saltus.plots.axis_names import parameter_name, peak, unit_in_brackets
-from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, legend_of, new_figure, outside_legend, styled
+from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, axes_or_new, legend_of, outside_legend, styled
 from saltus.plots.marks import cell_edges
 
 COLOURS = "viridis_r"  # large amplitudes dark, beside the white of rest small ones light
@@ -47,7 +47,7 @@ CLOSED_FORM: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "white
 def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
     """Draw a chart as it is stored, or a tree of one with its borders, with its scale and what its marks mean; returns `ax`."""
     chart = data["chart"].to_dataset() if data_is_tree(data) else data
-    own, ax = ax is None, new_figure(1.2 * SINGLE_COLUMN, 98.0).subplots() if ax is None else ax
+    own, ax = ax is None, axes_or_new(ax, 1.2 * SINGLE_COLUMN, 98.0)
     cells = draw_chart(ax, chart)
     path = list(chart.attrs.get("path", ("horizontal", "vertical")))
     ax.set_xlabel(parameter_name(path[0]))

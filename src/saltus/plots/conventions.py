@@ -14,6 +14,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 P = ParamSpec("P")
@@ -46,7 +47,9 @@ RC: Any = {
     "xtick.labelsize": 8.0,
     "ytick.labelsize": 8.0,
     "legend.fontsize": 8.0,
-    "legend.frameon": False,
+    "legend.frameon": True,  # white without an edge, so that lines below do not cross the words
+    "legend.edgecolor": "none",
+    "legend.framealpha": 0.85,
     "legend.handlelength": 2.4,
     "axes.linewidth": 0.6,
     "axes.edgecolor": INK,
@@ -56,6 +59,8 @@ RC: Any = {
     "ytick.direction": "in",
     "xtick.top": True,
     "ytick.right": True,
+    "xtick.major.pad": 4.5,  # so that the numbers at the corner of two axes stay apart
+    "ytick.major.pad": 4.5,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
     "xtick.minor.width": 0.4,
@@ -98,6 +103,15 @@ def new_figure(width: float = SINGLE_COLUMN, height: float = 65.0, **options: An
     return Figure(figsize=(width / 25.4, height / 25.4), **options)
 
 
+def axes_or_new(ax: Axes | None, width: float, height: float) -> Axes:
+    """The axes that are given, or those of a figure of its own, of this size in mm."""
+    if ax is not None:
+        return ax
+    new = new_figure(width, height).subplots()
+    new.locator_params(axis="x", nbins=6)  # numbers of five digits then stay apart in one column
+    return new
+
+
 def shades(n: int, first: float = 0.0, last: float = 0.78) -> list[Any]:
     """`n` colours of an ordered family, from dark to light: their order is also that of their greys."""
     return list(mpl.colormaps["viridis"](np.linspace(first, last, n))) if n > 1 else [mpl.colormaps["viridis"](first)]
@@ -122,6 +136,12 @@ def legend_of(ax: Any, own: bool, handles: Iterable[Any], **options: Any) -> Non
         outside_legend(ax.figure, handles=list(handles), **options)
     else:
         ax.legend(handles=list(handles), loc="best")
+
+
+def marks_of(ax: Axes) -> dict[str, Any]:
+    """What a legend of axes would hold: what was drawn several times with one label stands once."""
+    handles, labels = ax.get_legend_handles_labels()
+    return dict(zip(labels, handles, strict=True))
 
 
 DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (1, 1.2)))

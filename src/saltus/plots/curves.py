@@ -9,15 +9,15 @@ from matplotlib.axes import Axes
 
 from saltus.branch_lines import smooth_lines
 from saltus.plots.attractor_marks import attractor_colours
-from saltus.plots.axis_names import parameter_name, unit_in_brackets
-from saltus.plots.conventions import INK, SINGLE_COLUMN, new_figure, styled
-from saltus.plots.response import MARK_NAMES, MARKS, line_style
+from saltus.plots.axis_names import parameter_name, quantity_name, unit_in_brackets
+from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new, marks_of, outside_legend, styled
+from saltus.plots.response import MARK_NAMES, MARKS, line_handles, line_style
 
 
 @styled
 def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw the dataset of a branch: stable motions solid, unstable ones dashed, and its special points; returns `ax`."""
-    ax = new_figure(width, 0.75 * width).subplots() if ax is None else ax
+    own, ax = ax is None, axes_or_new(ax, width, 0.75 * width)
     for line in smooth_lines(dataset, quantity):
         ax.plot(*line.places.T, **line_style(line.stable, line.validity))
     kinds = dataset["kind"].values
@@ -25,17 +25,22 @@ def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = 
         if (kinds == kind).any():
             places = (dataset[f"special_{name}"].values[kinds == kind] for name in ("parameter", quantity))
             ax.plot(*places, ls="none", mfc="white", mec=INK, mew=0.5, zorder=5, label=MARK_NAMES[kind], **mark)
-    if ax.get_legend_handles_labels()[0]:
-        ax.legend(loc="best")
+    handles, labels, handlers = line_handles([dataset])
+    named = dict(zip(labels, handles, strict=True)) | marks_of(ax)
+    legend = {"handles": [*named.values()], "labels": [*named], "handler_map": handlers, "handlelength": 3.6}
+    if own:
+        outside_legend(ax.figure, ncols=2, **legend)
+    else:
+        ax.legend(loc="best", **legend)
     ax.set_xlabel(parameter_name(dataset.attrs["path"]))
-    ax.set_ylabel(f"{quantity.replace('_', ' ')}{unit_in_brackets(dataset[quantity])}")
+    ax.set_ylabel(f"{quantity_name(dataset, quantity)}{unit_in_brackets(dataset[quantity])}")
     return ax
 
 
 @styled
 def draw_special_curve(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw a curve of special points in the plane of its two parameters, as `SpecialCurve.to_xarray` gives it; returns `ax`."""
-    ax = new_figure(width, 0.75 * width).subplots() if ax is None else ax
+    ax = axes_or_new(ax, width, 0.75 * width)
     ax.plot(
         *dataset["parameter"].values.T, color=INK, label=MARK_NAMES.get(str(dataset.attrs["kind"]), str(dataset.attrs["kind"]))
     )
@@ -49,7 +54,7 @@ def draw_special_curve(dataset: Any, *, ax: Axes | None = None, width: float = S
 @styled
 def draw_attractors_along(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
     """Draw the amplitudes of `attractors_along`, each attractor in a colour of its own; returns `ax`."""
-    ax = new_figure(width, 0.62 * width).subplots() if ax is None else ax
+    ax = axes_or_new(ax, width, 0.62 * width)
     numbers = [int(number) for number in dataset["attractor"].values]
     for number, colour in attractor_colours(numbers).items():
         sizes = dataset["amplitude"].sel(attractor=number).values
@@ -58,6 +63,6 @@ def draw_attractors_along(dataset: Any, *, ax: Axes | None = None, width: float 
         ax.plot(dataset["value"].values, sizes, color=colour, marker=".", ms=3.5, mec=INK, mew=0.2, label=label)
     ax.set_xlim(*np.sort(dataset["value"].values[[0, -1]]))
     ax.set_xlabel(parameter_name(dataset.attrs["path"]))
-    ax.set_ylabel(f"amplitude{unit_in_brackets(dataset['amplitude'])}")
+    ax.set_ylabel(f"{quantity_name(dataset, 'amplitude')}{unit_in_brackets(dataset['amplitude'])}")
     ax.legend(loc="best")
     return ax

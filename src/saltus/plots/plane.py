@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from saltus.plots.axis_names import symbol, unit_in_brackets
-from saltus.plots.conventions import FAINT, SEPARATRIX_LINE, SINGLE_COLUMN, STABLE, UNSTABLE, legend_of, new_figure, styled
+from saltus.plots.conventions import FAINT, SEPARATRIX_LINE, SINGLE_COLUMN, STABLE, UNSTABLE, axes_or_new, legend_of, styled
 from saltus.plots.marks import fixed_points
 from saltus.plots.phase_lines import draw_arrows, lines_apart
 
@@ -25,7 +25,7 @@ def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * SIN
     """
     name = dataset.attrs["coordinate"]
     window = np.asarray(dataset.attrs["window"], dtype=float).reshape(2, 2)
-    own, ax = ax is None, new_figure(width, 0.85 * width).subplots() if ax is None else ax
+    own, ax = ax is None, axes_or_new(ax, width, 0.85 * width)
     ax.set_xlim(*window[0])
     ax.set_ylim(*window[1])
     ax.axhline(0.0, color=FAINT, lw=0.4, zorder=0)
@@ -42,7 +42,7 @@ def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * SIN
     for artist in (*ax.texts, *ax.lines):
         artist.set_in_layout(False)  # what is outside the window would take room beside it
     ax.set_xlabel(rf"${symbol(name)}${unit_in_brackets(dataset[name])}")
-    ax.set_ylabel(rf"$\dot{{{symbol(name)}}}$")
+    ax.set_ylabel(rf"$\dot{{{symbol(name)}}}${unit_in_brackets(dataset[name])}")
     _legend(ax, own, stable, bool(dataset.sizes["separatrix"]))
     return ax
 

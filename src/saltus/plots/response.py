@@ -243,15 +243,10 @@ def free_place(
 
 def response_legend(where: Any, spectra: list[Any], *, limits: bool = True, critical: bool = False, columns: int = 4) -> None:
     """One legend of what is in all panels: below those of a figure, or within axes."""
-    from matplotlib.legend_handler import HandlerTuple
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    handles: list[Any] = []
-    for label, styles in line_labels(spectra):
-        pair = tuple(Line2D([], [], label=label, **style) for style in styles)
-        handles.append(pair if len(pair) > 1 else pair[0])
-    labels = [(handle[0] if isinstance(handle, tuple) else handle).get_label() for handle in handles]
+    handles, labels, handlers = line_handles([branch for spectrum in spectra for _, branch in branches_of(spectrum)])
     more: list[Any] = [Line2D([], [], label="direct simulation", **{**DOTS, "markersize": 4})]
     if limits:
         more.append(Line2D([], [], label=r"straight line, $\pi-\beta_0$", **LIMIT_LINE))
@@ -263,7 +258,6 @@ def response_legend(where: Any, spectra: list[Any], *, limits: bool = True, crit
             more.append(Line2D([], [], linestyle="none", label=MARK_NAMES[kind], **_mark(style)))
     found = {str(kind) for spectrum in spectra for kind in spectrum["bands"]["kind"].values}
     more += [Patch(color=BANDS[kind], label=BAND_NAMES[kind]) for kind in BANDS if kind in found]
-    handlers: dict[Any, Any] = {tuple: HandlerTuple(ndivide=None, pad=0.3)}
     entries: dict[str, Any] = {"handles": [*handles, *more], "labels": [*labels, *(handle.get_label() for handle in more)]}
     if isinstance(where, Axes):
         where.legend(**entries, handler_map=handlers, loc="best", handlelength=3.6)
@@ -290,9 +284,22 @@ def missed_states(spectra: list[Any]) -> str | None:
     return "missed: random states that end on a motion that is not drawn, and the 95 % interval of their share"
 
 
-def line_labels(spectra: list[Any]) -> list[tuple[str, list[dict[str, Any]]]]:
+def line_handles(branches: list[Any]) -> tuple[list[Any], list[str], dict[Any, Any]]:
+    """Handles and labels of the lines of branches, and what draws the handles, as a legend takes them."""
+    from matplotlib.legend_handler import HandlerTuple
+    from matplotlib.lines import Line2D
+
+    labels = line_labels(branches)
+    pairs = [tuple(Line2D([], [], **style) for style in styles) for _, styles in labels]
+    return (
+        [pair if len(pair) > 1 else pair[0] for pair in pairs],
+        [label for label, _ in labels],
+        {tuple: HandlerTuple(ndivide=None, pad=0.3)},
+    )
+
+
+def line_labels(branches: list[Any]) -> list[tuple[str, list[dict[str, Any]]]]:
     """What the lines of branches mean, with the styles of stable and unstable ones; by validity where any margin bears on it."""
-    branches = [branch for spectrum in spectra for _, branch in branches_of(spectrum)]
     names = {kind: sorted({name for branch in branches for name in margins_of(branch, kind)}) for kind in ModelValidity}
     if not any(names.values()):
         return [(name, [line_style(name == "stable", ModelValidity.HOLDS)]) for name in ("stable", "unstable")]

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,10 @@ from saltus.attractors.attractor import UNDECIDED
 from saltus.checks import check_count
 from saltus.errors import ParameterError
 from saltus.public_functions import Numbers, answered
+from saltus.result import Result, result_dataset
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @dataclass(frozen=True)
@@ -119,7 +123,7 @@ def _boxes(grid: np.ndarray, box: int) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class UncertaintyExponent:
+class UncertaintyExponent(Result):
     """f(eps) ~ eps^alpha, the share of states with a different end within eps (Grebogi et al., Phys. Lett. A 99 (1983) 415).
 
     Attributes
@@ -152,6 +156,12 @@ class UncertaintyExponent:
     def dimension(self) -> float:
         """The dimension of the boundary, D - alpha."""
         return self.cells - self.alpha
+
+    def to_xarray(self) -> xarray.Dataset:
+        """`share` over `distance`, with `alpha`, its `error` and the `dimension` as attributes."""
+        columns = {"share": ("distance", self.shares, "1", "states with a different end within the distance")}
+        facts: dict[str, Any] = {"alpha": self.alpha, "error": self.error, "dimension": self.dimension}
+        return result_dataset("uncertainty_exponent", columns, {"distance": self.distances}, **facts)
 
 
 @answered
@@ -236,7 +246,7 @@ class WadaVerdict(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Wada:
+class Wada(Result):
     """How near to the boundary all basins are (after Daza et al., Sci. Rep. 5 (2015) 16579).
 
     Attributes
@@ -269,6 +279,12 @@ class Wada:
         if len(self.labels) < 3 or share <= FRACTAL.fails:
             return WadaVerdict.NOT_WADA
         return WadaVerdict.WADA if share >= FRACTAL.agrees else WadaVerdict.UNDECIDED
+
+    def to_xarray(self) -> xarray.Dataset:
+        """`share` over `radius`, with the verdict as an attribute."""
+        columns = {"share": ("radius", self.shares, "1", "boundary cells that have all labels within the radius")}
+        facts: dict[str, Any] = {"labels": list(self.labels), "verdict": str(self.verdict), "boundary_cells": self.boundary_cells}
+        return result_dataset("wada", columns, {"radius": self.radii}, **facts, agrees=FRACTAL.agrees, fails=FRACTAL.fails)
 
     @property
     def resolution(self) -> str:

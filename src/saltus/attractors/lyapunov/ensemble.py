@@ -183,5 +183,7 @@ def _dataset(run: _Many, measures: dict[str, np.ndarray], states: np.ndarray, nu
         dims = (*inputs.dims, *(("index",) if array.ndim > 1 else ()))
         variables[key] = dims, array.reshape((*inputs.shape, *array.shape[1:])), {"units": units, "long_name": text}
     variables["ending"][2].update(flag_values=np.arange(len(ENDINGS), dtype=np.int8), flag_meanings=" ".join(ENDINGS))
-    attributes = {"title": "Lyapunov exponents computed by saltus"} | provenance(run.system, tol=run.tol, **numbers)
+    attributes = {"title": "Lyapunov exponents computed by saltus", "kind": "lyapunov_many"} | provenance(
+        run.system, tol=run.tol, **numbers
+    )
     return xarray.Dataset(variables, coords=inputs.coords, attrs=attributes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,13 +16,17 @@ from saltus.attractors.lyapunov.two_trajectory import separation_growth
 from saltus.flow import Motion, Stop, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import Numbers
+from saltus.result import Result, result_dataset
 from saltus.systems import System
+
+if TYPE_CHECKING:
+    import xarray
 
 DERIVATIVE_ROUNDING = 1e-13  # of a derivative, relative to the largest one
 
 
 @dataclass(frozen=True, eq=False)
-class Exponents:
+class Exponents(Result):
     """The exponents of a motion, per unit of dimensionless time, largest first.
 
     They are -inf where the motion comes to rest with a loss at impacts: states beside it are at the same rest after a finite
@@ -101,6 +105,22 @@ class Exponents:
         """Whether the largest exponent is above 0 by more than its error and the resolution, in all and in both halves."""
         largest = Estimate(self.values[0], self.errors[0], self.halves[:, 0], self.half_errors[:, 0])
         return bool(largest.positive(self.duration))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """`exponent`, its `error` and those of both halves over `index`, and the checks."""
+        per_time = "per unit of dimensionless time"
+        columns: dict[str, tuple[Any, ...]] = {
+            "exponent": ("index", self.values, "1", f"Lyapunov exponents, {per_time}, largest first"),
+            "error": ("index", self.errors, "1", "half width of the 95 % interval of the exponent"),
+            "at_half": ("index", self.halves[0], "1", "the exponents from the first half of the run"),
+            "later_half": ("index", self.halves[1], "1", "the exponents from the second half of the run"),
+            "divergence": ((), self.divergence, "1", f"mean divergence, {per_time}, which is the sum of the exponents"),
+            "stroboscopic": ((), self.stroboscopic, "1", "the largest exponent from two trajectories"),
+            "stroboscopic_error": ((), self.stroboscopic_error, "1", "half width of its 95 % interval"),
+            "resolution": ((), self.resolution, "1", "2 ln(t) / t, what growth by the square of the time would give"),
+        }
+        facts: dict[str, Any] = {"periods": self.periods, "duration": self.duration, "note": self.note or ""}
+        return result_dataset("exponents", columns, **facts)
 
     def __repr__(self) -> str:
         values = ", ".join(f"{x:.5g} +- {e:.1g}" for x, e in zip(self.values, self.errors, strict=True))

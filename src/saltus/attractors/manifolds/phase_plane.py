@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,11 @@ from saltus.attractors.manifolds.manifold_growth import has_left
 from saltus.attractors.manifolds.saddle_manifolds import PLANE
 from saltus.checks import Box, Window, check_number, check_window
 from saltus.flow import Motion, simulate
+from saltus.result import Result, result_dataset
 from saltus.systems import System, VelocityReduction, reversed_system
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,7 @@ class SeparatrixEnd(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Separatrix:
+class Separatrix(Result):
     """A branch of the stable manifold of a saddle, followed back in time from it; nan where an impact makes the velocity jump.
 
     Attributes
@@ -67,12 +71,26 @@ class Separatrix:
     True
     """
 
+    system: System
     saddle: float
     time: np.ndarray
     theta: np.ndarray
     velocity: np.ndarray
     impacts: np.ndarray
     end: SeparatrixEnd
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Coordinate and velocity over `time`, and the impacts over `impact`."""
+        name = self.system.model.coordinates[0]
+        unit = self.system.model.unit_of(name)
+        columns: dict[str, tuple[Any, ...]] = {
+            name: ("time", self.theta, unit, f"{name} along the separatrix"),
+            "velocity": ("time", self.velocity, unit, f"d {name} / d tau"),
+            "impact_time": ("impact", self.impacts[:, 0], "1", "times of the impacts of the forward motion"),
+            "impact_velocity_before": ("impact", self.impacts[:, 1], unit, "velocities just before them"),
+        }
+        facts = {"saddle": self.saddle, "end": str(self.end), "plane": [name, "velocity"]}
+        return result_dataset("separatrix", columns, {"time": self.time}, self.system, **facts)
 
 
 def saddles(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
@@ -118,15 +136,15 @@ def separatrices(system: System, window: Box = PLANE, *, span: float = 60.0, ste
     check_number("step", step, above=0.0)
     points = saddles(system, window)
     places = np.array([point.place for point in points])
-    backward = reversed_system(system)
-    return tuple(_branch(backward, point, away, places, area, (span, step)) for point in points for away in (1.0, -1.0))
+    return tuple(_branch(system, point, away, places, area, (span, step)) for point in points for away in (1.0, -1.0))
 
 
 def _branch(
-    backward: System, saddle: Equilibrium, away: float, saddles: np.ndarray, window: Window, times: tuple[float, float]
+    system: System, saddle: Equilibrium, away: float, saddles: np.ndarray, window: Window, times: tuple[float, float]
 ) -> Separatrix:
     """The branch to one side of a saddle, for at most a span of time with a step; `saddles` are the places of all, (n,)."""
     assert saddle.eigenvalues is not None
+    backward = reversed_system(system)
     span, step = times
     theta, velocity = saddle.place + away * SETTINGS.offset, -away * SETTINGS.offset * saddle.eigenvalues[1].real
     now, end, left = 0.0, SeparatrixEnd.SPAN, False
@@ -149,7 +167,7 @@ def _branch(
         now, theta, velocity = now + SETTINGS.span, motion.position, motion.velocity
     time, thetas, velocities = np.concatenate(parts, axis=1)
     contacts = np.concatenate(impacts) * np.array([-1.0, 1.0])
-    return Separatrix(saddle.place, -time, thetas, -velocities, contacts, end)
+    return Separatrix(system, saddle.place, -time, thetas, -velocities, contacts, end)
 
 
 def _sampled(motion: Motion, begin: float, step: float) -> np.ndarray:

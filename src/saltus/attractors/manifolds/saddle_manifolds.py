@@ -13,10 +13,11 @@ P^{-1} is the flow of the reversed system over a period, event by event, as exac
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.attractors.attractors_dataset import state_plane, state_units
 from saltus.attractors.manifolds.manifold_growth import Growth, GrowthEnd, Level, Segment
 from saltus.attractors.orbit_certificate import start_at
 from saltus.attractors.stroboscopic_section import section_states
@@ -25,7 +26,11 @@ from saltus.errors import MotionError, ParameterError
 from saltus.flow import last_states, motions_from, sensitivities
 from saltus.orbits import PeriodicOrbit
 from saltus.public_functions import answered
+from saltus.result import Result, result_dataset
 from saltus.systems import System, reversed_system
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @dataclass(frozen=True)
@@ -53,7 +58,7 @@ class ManifoldBranch:
 
 
 @dataclass(frozen=True, eq=False)
-class Manifold:
+class Manifold(Result):
     """The stable or unstable manifold of a saddle orbit.
 
     Attributes
@@ -96,6 +101,18 @@ class Manifold:
         """The length of what was computed, in the units of the section."""
         chords = np.diff(self.states, axis=0)
         return float(np.nansum(np.hypot(chords[:, 0], chords[:, 1])))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The curves over `place`, nan between branches, and the orbit over `point`."""
+        plane, unit = state_plane(self.orbit.system), state_units(self.orbit.system)
+        columns: dict[str, tuple[Any, ...]] = {}
+        for i, name in enumerate(plane):
+            columns[name] = ("place", self.states[:, i], unit[name], f"{name} at phase 0 along the manifold")
+        for i, name in enumerate(plane):
+            columns[f"orbit_{name}"] = ("point", self.orbit_states[:, i], unit[name], f"{name} of the orbit at phase 0")
+            columns[f"direction_{name}"] = ("point", self.directions[:, i], "1", f"{name} of the manifold's direction there")
+        facts = {"stable": int(self.stable), "multiplier": self.multiplier, "length": self.length, "plane": list(plane)}
+        return result_dataset("manifold", columns, None, self.orbit.system, **facts)
 
     def __repr__(self) -> str:
         kind = "stable" if self.stable else "unstable"

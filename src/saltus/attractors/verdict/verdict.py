@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.attractors.attractors_dataset import state_plane, state_units
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.lyapunov.spectrum import Exponents
-from saltus.attractors.orbit_certificate import Certificate, certify, start_at, stays_at_rest
+from saltus.attractors.orbit_certificate import Certificate, certify, start_at, state_vector, stays_at_rest
 from saltus.attractors.verdict.reason import Reason
 from saltus.attractors.verdict.zero_one_test import ZeroOne
 from saltus.errors import MotionError
@@ -17,15 +18,17 @@ from saltus.flow import Recurrence, find_recurrence, simulate
 from saltus.notebook import html_table
 from saltus.orbits import PeriodicOrbit
 from saltus.progress import Progress, part_of
-from saltus.provenance import provenance
+from saltus.result import Result, result_dataset
 from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
 
+SECTION_STATES = 1000  # of a motion that does not repeat: enough for its attractor's shape to be seen
+
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class Verdict(Result):
     """Where a motion ends.
 
     Attributes
@@ -73,12 +76,32 @@ class Verdict:
     evidence: dict[str, Any] = field(default_factory=dict)
 
     def to_xarray(self) -> xarray.Dataset:
-        """The verdict and its evidence as a Dataset of single values."""
-        import xarray
+        """The verdict and its evidence as single values, and the motion at its end.
 
+        `section_<variable>` are its states at phase 0 over `state`, `curve_<variable>` one period of its orbit over `time`, if it
+        is on one.
+        """
         known = {"kind": str(self.kind), "reason": self.reason, "period": self.period or 0, "followed": self.periods}
-        values = {name: ((), value, {"units": "1"}) for name, value in (known | self.evidence).items()}
-        return xarray.Dataset(values, attrs={"title": "verdict by saltus"} | provenance(self.system))
+        columns: dict[str, tuple[Any, ...]] = {
+            name: ((), value, "1", name.replace("_", " ")) for name, value in (known | self.evidence).items()
+        }
+        plane, units = state_plane(self.system), state_units(self.system)
+        for i, name in zip((0, self.system.dimension // 2), plane, strict=True):
+            columns[f"section_{name}"] = ("state", self._section()[:, i], units[name], f"{name} at phase 0")
+        if self.orbit is not None:
+            curve = self.orbit.motion().to_xarray()
+            columns |= {f"curve_{name}": ("time", curve[name].values, units[name], f"{name} on its orbit") for name in plane}
+        return result_dataset("verdict", columns, None, self.system, plane=list(plane))
+
+    def _section(self) -> np.ndarray:
+        """States at phase 0 from the end of the motion on, (n, d): its period of them, or many where it does not repeat."""
+        end = state_vector(self.system, self.state)
+        lasting = self.kind not in (AttractorKind.REST, AttractorKind.UNDECIDED) and self.system.load.period is not None
+        if not lasting:
+            return end[None]
+        count = self.period or SECTION_STATES
+        ends = find_recurrence(self.system, end[None], count, kept=count, stop_early=False)
+        return np.asarray(ends.states[0])
 
     def _repr_html_(self) -> str:
         known = {"period": self.period or "none", "reason": self.reason, "forcing periods followed": self.periods}

@@ -87,7 +87,8 @@ def to_dataset(system: System, inputs: Inputs, wanted: Wanted, jobs: Jobs, ends:
     _add_samples(writer, ends, wanted.sample)
     if wanted.paths is not None:
         _add_derivatives(writer, jobs, ends, wanted.paths, wanted.periods)
-    attributes = {"title": "ensemble computed by saltus"} | provenance(system, tol=wanted.tol, Conventions="CF-1.8")
+    known: dict[str, Any] = {"kind": "ensemble", "Conventions": "CF-1.8"}
+    attributes = {"title": "ensemble computed by saltus"} | provenance(system, tol=wanted.tol, **known)
     attributes |= _add_inputs(writer, inputs)
     return xarray.Dataset(writer.variables, writer.coords, attributes)
 

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import Unsettled
+from saltus.provenance import provenance
+from saltus.result import Result
 from saltus.studies.diagram.simulated import SimulatedMotions
+from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
@@ -93,13 +96,25 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Bands:
+class Bands(Result):
     """The bands of chaos of a range, and all that was simulated to find them."""
 
+    system: System
     path: str
     bands: tuple[Band, ...]
     tried: Tried
     motions: SimulatedMotions
+
+    def to_xarray(self) -> xarray.DataTree:
+        """The tree of `to_datasets`, with the parameter's `path` and the range."""
+        import xarray
+
+        low, high = float(self.tried.values.min()), float(self.tried.values.max())
+        about = {"title": "bands of chaos computed by saltus", "kind": "chaotic_bands"}
+        name = self.system.model.coordinates[0]
+        where: dict[str, Any] = {"path": self.path, "bounds": [low, high], "coordinate": name}
+        root = xarray.Dataset(attrs=about | provenance(self.system, **where))
+        return xarray.DataTree.from_dict({"/": root, **self.to_datasets()})
 
     def to_datasets(self) -> dict[str, xarray.Dataset]:
         """`bands`, `exponents` (by value) and `stroboscopic` (states and peaks of what moves, a dot each)."""
@@ -128,14 +143,17 @@ class Bands:
 
         motions = self.motions
         shown = np.isfinite(motions.peaks)
-        value = np.broadcast_to(motions.value[:, None], shown.shape)
+        value, model = np.broadcast_to(motions.value[:, None], shown.shape), self.system.model
+        unit = model.unit_of(model.coordinates[0])
         columns = {
-            "position": (motions.states[..., 0], "first coordinate at phase 0, in the last forcing periods"),
-            "velocity": (motions.states[..., motions.states.shape[-1] // 2], "its velocity there"),
-            "peak": (motions.peaks, "its largest absolute value in each of these periods"),
-            "value": (value, self.path),
+            "position": (motions.states[..., 0], unit, "first coordinate at phase 0, in the last forcing periods"),
+            "velocity": (motions.states[..., motions.states.shape[-1] // 2], unit, "its velocity there"),
+            "peak": (motions.peaks, unit, "its largest absolute value in each of these periods"),
+            "value": (value, "1", self.path),
         }
-        return xarray.Dataset({name: ("dot", array[shown], {"long_name": text}) for name, (array, text) in columns.items()})
+        return xarray.Dataset(
+            {name: ("dot", array[shown], {"units": units, "long_name": text}) for name, (array, units, text) in columns.items()}
+        )
 
 
 def bands_of(tried: Tried) -> tuple[Band, ...]:

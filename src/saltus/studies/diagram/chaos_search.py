@@ -128,7 +128,7 @@ def resolve_bands(
     progress(1.0, "looking for chaos")
     tried, further = search.tried(), search.further[1:]
     motions = further[0].joined(*further[1:]) if further else begun.only(slice(0))
-    return Bands(path, bands_of(tried), tried, begun.joined(motions)), motions
+    return Bands(system, path, bands_of(tried), tried, begun.joined(motions)), motions
 
 
 RANKS = (Unsettled.PERIODIC, Unsettled.TRANSIENT, Unsettled.UNDECIDED, Unsettled.CHAOTIC)  # of several, the last one counts

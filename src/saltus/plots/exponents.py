@@ -1,0 +1,100 @@
+"""Lyapunov exponents: those of one motion with their checks, and those of many along one or two parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from saltus.errors import ParameterError
+from saltus.plots.axis_names import varied
+from saltus.plots.conventions import FAINT, INK, SINGLE_COLUMN, STABLE, STABLE_LINE, UNSTABLE_LINE, axes_or_new, legend_of, styled
+from saltus.plots.marks import cell_edges
+
+NAME = r"exponent $\lambda$ (per unit of $\tau$)"
+ZERO: dict[str, Any] = {"color": INK, "linewidth": 0.5, "zorder": 1}
+UNRESOLVED: dict[str, Any] = {"color": "#e6e6e6", "linewidth": 0.0, "zorder": 0}
+HALVES = (("at_half", "<", "first half of the run"), ("later_half", ">", "second half of the run"))
+
+
+@styled
+def draw_exponents(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+    """Draw the exponents of one motion, with 95 % intervals, those of both halves of the run, and of the other method.
+
+    Grey is what cannot be told from 0, twice the logarithm of the time over the time.
+    """
+    own, ax = ax is None, axes_or_new(ax, width, 0.75 * width)
+    values, errors = dataset["exponent"].values, dataset["error"].values
+    index = np.arange(1, len(values) + 1)
+    ax.axhline(0.0, **ZERO)
+    known = np.isfinite(values)
+    resolution = float(dataset["resolution"])
+    if known.any():
+        ax.axhspan(-resolution, resolution, label="not distinct from 0", **UNRESOLVED)
+    ax.errorbar(
+        index[known], values[known], errors[known], color=STABLE, fmt="o", ms=4.0, capsize=3.0, lw=0.9, label="exponent, 95 %"
+    )
+    for (name, marker, label), shift in zip(HALVES, (-0.12, 0.12), strict=True):
+        ax.plot(index + shift, dataset[name].values, marker=marker, ms=3.5, mfc="white", mec=INK, mew=0.6, ls="none", label=label)
+    stroboscopic = float(dataset["stroboscopic"])
+    if np.isfinite(stroboscopic):
+        ax.plot(1.24, stroboscopic, marker="x", ms=4.5, mec=INK, ls="none", label="two trajectories")
+    for place in index[~known]:
+        text = r"$-\infty$" if values[place - 1] == -np.inf else "undefined"
+        ax.annotate(text, (place, 0.0), (0, -9), textcoords="offset points", ha="center", va="top")
+    ax.set_xlim(0.5, len(values) + 0.5)
+    ax.set_xticks(index, [rf"$\lambda_{{{i}}}$" for i in index])
+    ax.tick_params(axis="x", length=0.0)
+    ax.set_ylabel(NAME)
+    if known.any():
+        legend_of(ax, own, ax.get_legend_handles_labels()[0], ncols=2)
+    return ax
+
+
+@styled
+def draw_exponents_along(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
+    """Draw the dataset of `lyapunov_many`: over one dimension all exponents with their errors, over two the largest one.
+
+    Where a motion rests its exponents are -inf or do not exist, and lines are interrupted.
+
+    Raises
+    ------
+    ParameterError
+        More than two dimensions.
+    """
+    dims = [str(dim) for dim in dataset["exponent"].dims if dim != "index"]
+    if len(dims) > 2:
+        raise ParameterError(f"exponents over {len(dims)} dimensions have no picture; select two of {dims}", "result")
+    ax = axes_or_new(ax, width, 0.62 * width)
+    if len(dims) == 2:
+        return _draw_map(ax, dataset, dims)
+    values, errors = (np.atleast_2d(dataset[name].values) for name in ("exponent", "error"))
+    label, x = varied(dataset, dims[0]) if dims else ("", np.zeros(1))
+    values = np.where(np.isfinite(values), values, np.nan)
+    ax.axhline(0.0, **ZERO)
+    marker = "o" if len(x) == 1 else None
+    for i, line in enumerate((STABLE_LINE, UNSTABLE_LINE)):
+        ax.fill_between(x, values[:, i] - errors[:, i], values[:, i] + errors[:, i], color=line["color"], alpha=0.2, lw=0.0)
+        ax.plot(x, values[:, i], label=rf"$\lambda_{i + 1}$", marker=marker, ms=4.0, **line)
+    ax.set_xlabel(label)
+    ax.set_ylabel(NAME)
+    ax.legend(loc="best")
+    return ax
+
+
+def _draw_map(ax: Axes, dataset: Any, dims: list[str]) -> Axes:
+    """The largest exponent over two dimensions; a line encloses where it is above its error and the resolution."""
+    largest = dataset["exponent"].isel(index=0).transpose(*dims).values.T
+    (first, x), (second, y) = (varied(dataset, dim) for dim in dims)
+    mesh = ax.pcolormesh(
+        cell_edges(x), cell_edges(y), np.where(np.isfinite(largest), largest, np.nan), cmap="viridis_r", rasterized=True
+    )
+    ax.set_facecolor(FAINT)
+    positive = dataset["positive"].transpose(*dims).values.T.astype(float)
+    if min(positive.shape) > 1 and 0.0 < positive.mean() < 1.0:
+        ax.contour(x, y, positive, levels=[0.5], colors=[INK], linewidths=0.9)
+    ax.set_xlabel(first)
+    ax.set_ylabel(second)
+    ax.figure.colorbar(mesh, ax=ax, label=r"largest exponent $\lambda_1$ (per unit of $\tau$)")
+    return ax
