@@ -58,6 +58,8 @@ class Search(Result):
 
     Attributes
     ----------
+    system
+        What was searched.
     path
         The dotted path of the parameter.
     orbits

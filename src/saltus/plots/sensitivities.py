@@ -11,7 +11,7 @@ from matplotlib.colors import PowerNorm
 from saltus.plots.axis_names import parameter_symbol, state_symbol
 from saltus.plots.conventions import INK, axes_or_new, styled
 
-CELL = 18.0  # mm, of one derivative
+ENTRY_WIDTH = 18.0  # mm, of one derivative
 DARKEST = 6.0  # times the largest derivative would be black: numbers are read on what is lighter
 
 
@@ -20,7 +20,7 @@ def draw_sensitivities(dataset: Any, *, ax: Axes | None = None, width: float | N
     """Draw the derivatives as a table of numbers, a row for each state variable at the end, darker if larger; returns `ax`."""
     derivative = np.asarray(dataset["derivative"].values, dtype=float)
     names, to = ([str(name) for name in dataset[dim].values] for dim in ("state", "to"))
-    size = (CELL * len(to) + 34.0 if width is None else width, 12.0 * len(names) + 26.0)
+    size = (ENTRY_WIDTH * len(to) + 34.0 if width is None else width, 12.0 * len(names) + 26.0)
     ax = axes_or_new(ax, *size)
     plane = names[0], names[len(names) // 2]
     largest = float(np.nanmax(np.abs(derivative), initial=0.0)) or 1.0

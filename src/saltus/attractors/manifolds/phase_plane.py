@@ -50,6 +50,8 @@ class Separatrix(Result):
 
     Attributes
     ----------
+    system
+        What moves.
     saddle
         The coordinate of the saddle.
     time
