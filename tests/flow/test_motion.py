@@ -65,7 +65,7 @@ def test_motion_that_ends_at_an_impact_ends_after_it():
     impact = simulate(wall, x=0.0, periods=2).impacts
     ends = impact.time[0] + np.arange(8) * np.spacing(impact.time[0])  # the impact is in by one of these: rounding says which
     kept = next(m for m in (simulate(wall, x=0.0, duration=float(end)) for end in ends) if len(m.impacts) == 1)
-    motion = simulate(wall, x=0.0, duration=kept.time, samples=[0.0, kept.time])
+    motion = simulate(wall, x=0.0, duration=kept.time, times=[0.0, kept.time])
     assert len(motion.impacts) == 1
     assert kept.at(kept.time) == (kept.x, kept.velocity)
     assert kept.x == pytest.approx(1.0, abs=1e-14)
@@ -110,7 +110,7 @@ def test_motion_that_was_not_kept_says_so():
 
 def test_samples_are_the_states_of_the_whole_motion(motion):
     times = np.concatenate([[0.0], motion.impacts.time[:2], np.linspace(3.0, motion.time, 50), [motion.time + 1.0]])
-    sampled = simulate(SYSTEM, theta=0.3, periods=3, samples=np.sort(times)).kept
+    sampled = simulate(SYSTEM, theta=0.3, periods=3, times=np.sort(times)).kept
     inside = np.sort(times)[:-1]
     assert sampled.time == pytest.approx(inside, abs=0)
     assert np.stack([sampled.position[0], sampled.velocity[0]]) == pytest.approx(np.stack(motion.at(inside)), abs=1e-15)
@@ -120,7 +120,7 @@ def test_samples_are_the_states_of_the_whole_motion(motion):
 @pytest.mark.parametrize("duration", [0.0, 1.0])
 def test_samples_include_the_start_and_the_end(start, duration):
     end = start + duration
-    motion = simulate(SYSTEM, theta=0.3, velocity=0.1, time=start, duration=duration, samples=[start, end])
+    motion = simulate(SYSTEM, theta=0.3, velocity=0.1, time=start, duration=duration, times=[start, end])
     assert motion.kept.position[0] == pytest.approx([0.3, motion.theta], abs=1e-14)
     assert motion.kept.velocity[0] == pytest.approx([0.1, motion.velocity], abs=1e-14)
 
@@ -382,11 +382,11 @@ def test_motion_after_ten_thousand_periods_goes_on_as_from_time_zero():
         ),
         ({"theta": 0.3, "stop_at": "reactions"}, "Metainterface has no margin 'reactions' to stop at; did you mean 'reaction'?"),
         (
-            {"theta": 0.3, "samples": [2.0, 1.0]},
-            "samples must be times that do not decrease, from the start 0 on, got [2.0, 1.0]",
+            {"theta": 0.3, "times": [2.0, 1.0]},
+            "times must be numbers that do not decrease, from the start 0 on, got [2.0, 1.0]",
         ),
-        ({"theta": 0.3, "samples": [-1.0]}, "samples must be times that do not decrease, from the start 0 on"),
-        ({"theta": 0.3, "samples": "all"}, "samples must be a number or an array of numbers, got 'all'"),
+        ({"theta": 0.3, "times": [-1.0]}, "times must be numbers that do not decrease, from the start 0 on"),
+        ({"theta": 0.3, "times": "all"}, "times must be a number or an array of numbers, got 'all'"),
     ],
 )
 def test_arguments_without_meaning_are_refused_in_a_sentence(arguments, sentence):

@@ -176,7 +176,7 @@ def test_motions_from_anywhere_become_it_and_stay_for_ever(name):
     expected, distances = np.stack(orbit.motion().at(times)), []
     for turn in range(orbit.period):  # an orbit of q forcing periods may begin in any of them
         shift = (72 * orbit.period + turn) * period
-        settled = simulate(system, **away, duration=shift + 2.0 * orbit.duration, samples=shift + times).kept
+        settled = simulate(system, **away, duration=shift + 2.0 * orbit.duration, times=shift + times).kept
         found = np.stack([settled.position[0], settled.velocity[0]])
         distances.append(np.abs(found - expected).max())
     assert min(distances) < 1e-11

@@ -82,7 +82,7 @@ def test_any_parameter_of_the_load_is_swept():
 
 def test_a_slow_sweep_follows_the_response_within_its_rate():
     grid = np.linspace(1.3, 1.6, 601)
-    data = saltus.frequency_sweep(oscillator(1.3, wall=50.0), grid, periods=1, settle=False, x=0.0)
+    data = saltus.frequency_sweep(oscillator(1.3, wall=50.0), grid, periods=1, stop_early=False, x=0.0)
     late = data.sel(direction="down")
     assert (late.periods == 1).all()
     assert late.amplitude.values == pytest.approx(FORCE * linear_gain(grid), rel=0.02)

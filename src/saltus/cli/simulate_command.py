@@ -43,7 +43,7 @@ def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
     output = Path("results") / study.name if output is None else output
     check_writable(output)
     with progress_bar(f"motion of {path}") as progress:
-        motion = study.run(progress=progress, samples=long_samples(study))
+        motion = study.run(progress=progress, times=long_samples(study))
         progress(1.0, "writing")
         files = write_motion(motion, study, output, plot)
     console = Console(highlight=False)

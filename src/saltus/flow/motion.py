@@ -201,7 +201,7 @@ class Motion(Result):
     dense
         The Taylor series of all its steps; None where they were not kept.
     kept
-        The states at the times that `simulate(samples=...)` was given.
+        The states at the times that `simulate(times=...)` was given.
     sampled_validity
         What its margins said, of a motion with `kept` samples.
 
@@ -325,7 +325,7 @@ class Motion(Result):
         found = self.sampled_validity
         if found is None:
             if self.dense is None and self.time > self.start:
-                raise ParameterError("a motion computed with dense=False has no validity; leave dense out, or give samples=...")
+                raise ParameterError("a motion computed with dense=False has no validity; leave dense out, or give times=...")
             check = ValidityCheck(self.system)
             if self.dense is not None:
                 check.add(self.dense)

@@ -68,7 +68,7 @@ class Recorder:
             self._kept += piece.start.size
             if self._kept > MOST.steps:
                 raise MotionError(
-                    f"more than {MOST.steps} steps before time {piece.end:.6g}, too many to be kept; give samples=times to keep "
+                    f"more than {MOST.steps} steps before time {piece.end:.6g}, too many to be kept; give times=... to keep "
                     "the states at those times instead, or dense=False to keep the events alone"
                 )
             return

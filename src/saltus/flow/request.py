@@ -38,7 +38,7 @@ class MotionRequest:
     side: int | None
     stop_at: Iterable[str]
     dense: bool
-    samples: Any = None
+    times: Any = None
     sensitivities: tuple[str, ...] | None = None  # parameters to differentiate to; None without derivatives
     # What follows from these:
     position: np.ndarray = field(init=False)
@@ -61,14 +61,14 @@ class MotionRequest:
         if self.side not in (None, 1, -1):
             raise ParameterError(f"side must be +1 or -1, got {self.side!r}", "side")
         when = clock(float(self.time), self.system.load.period, self.periods, self.duration)
-        if self.dense and self.samples is None:
+        if self.dense and self.times is None:
             _check_dense(when, self.periods, self.duration)
         return {
             "position": position,
             "speeds": speeds,
             "limits": limits,
             "clock": when,
-            "sample_times": None if self.samples is None else _sample_times(self.samples, float(self.time)),
+            "sample_times": None if self.times is None else _sample_times(self.times, float(self.time)),
         }
 
 
@@ -76,18 +76,16 @@ def _check_dense(when: Clock, periods: float | None, duration: float | None) -> 
     """Refuse a motion that is too long to be kept whole."""
     name, span = ("duration", duration) if periods is None else ("periods", periods)
     count = float(span or 0.0) / (1.0 if periods is not None else when.length or 2.0 * math.pi)
-    check_memory(name, count * LIMITS.dense, f"{count:.3g} periods of a motion kept whole (dense=False or samples=... keep less)")
+    check_memory(name, count * LIMITS.dense, f"{count:.3g} periods of a motion kept whole (dense=False or times=... keep less)")
 
 
-def _sample_times(samples: Any, start: float) -> np.ndarray:
+def _sample_times(given: Any, start: float) -> np.ndarray:
     try:
-        times = np.atleast_1d(np.asarray(samples, dtype=float))
+        times = np.atleast_1d(np.asarray(given, dtype=float))
     except (TypeError, ValueError):
         times = np.array([np.nan])
     if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0).any() or (times < start).any():
-        raise ParameterError(
-            f"samples must be times that do not decrease, from the start {start:g} on, got {samples!r}", "samples"
-        )
+        raise ParameterError(f"times must be numbers that do not decrease, from the start {start:g} on, got {given!r}", "times")
     return times
 
 

@@ -35,7 +35,7 @@ def simulate(
     side: int | None = None,
     stop_at: Iterable[str] = (),
     dense: bool = True,
-    samples: Numbers | None = None,
+    times: Numbers | None = None,
     progress: Progress = silent,
     **coordinates: float,
 ) -> Motion:
@@ -59,8 +59,8 @@ def simulate(
         Margins of the model that end the motion, such as "kinematic_limit"; its own `stops` always do.
     dense
         Keep the motion between the events; False keeps the events alone.
-    samples
-        Times at which to keep the states instead, for a motion too long to be kept whole.
+    times
+        At which to keep the states instead, for a motion too long to be kept whole.
     progress
         Called with the fraction done and what is being done, now and then.
     coordinates
@@ -90,7 +90,7 @@ def simulate(
         side=side,
         stop_at=stop_at,
         dense=dense,
-        samples=samples,
+        times=times,
     )
     return follow(request, progress).motion
 

@@ -53,7 +53,7 @@ class SweepRequest:
     path: str
     values: Any
     periods: int
-    settle: bool
+    stop_early: bool
     max_period: int
     tol: float
     velocity: Any
@@ -96,10 +96,10 @@ class SweepRequest:
             state[None],
             self.periods,
             max_period=self.max_period,
-            kept=2 * self.max_period + 2 if self.settle else min(self.periods, self.max_period),
+            kept=2 * self.max_period + 2 if self.stop_early else min(self.periods, self.max_period),
             extrema=True,
             impact_count=True,
-            stop_early=self.settle,
+            stop_early=self.stop_early,
             tol=self.tol,
             threads=1,
         )
@@ -122,7 +122,7 @@ def frequency_sweep(
     *,
     path: str = "load.frequency",
     periods: int = 1000,
-    settle: bool = True,
+    stop_early: bool = True,
     max_period: int = 16,
     velocity: float = 0.0,
     tol: float = 1e-11,
@@ -132,13 +132,13 @@ def frequency_sweep(
     """The response while a parameter goes up and down again, as in an experiment: each value begins with the state of the last
     one.
 
-    Stepwise (`settle`), each value is kept until the motion repeats itself. Slowly and steadily (`settle=False`), it is kept for
-    exactly `periods` forcing periods: with 1 and many values the parameter changes in each period. Values change at phase 0 of
-    the load, so that the phase of a harmonic does not jump.
+    Stepwise (`stop_early`), each value is kept until the motion repeats itself. Slowly and steadily (`stop_early=False`), it is
+    kept for exactly `periods` forcing periods: with 1 and many values the parameter changes in each period. Values change at
+    phase 0 of the load, so that the phase of a harmonic does not jump.
 
     A step of the amplitude that is large beside its neighbours, or at which impacts or period change, is swept again in parts, to
-    a thousandth, and what is then left of it is a jump (without `settle` it is reported as it is). Where up and down differ there
-    is hysteresis.
+    a thousandth, and what is then left of it is a jump (without `stop_early` it is reported as it is). Where up and down differ
+    there is hysteresis.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def frequency_sweep(
         Its dotted path.
     periods
         Forcing periods at each value, at most or exactly.
-    settle
+    stop_early
         Whether a value is left as soon as the motion repeats itself.
     max_period
         The longest period looked for.
@@ -181,7 +181,7 @@ def frequency_sweep(
     (0, 0)
     """
     asked = SweepRequest(
-        system=system, path=path, values=values, periods=periods, settle=settle, max_period=max_period, tol=tol,
+        system=system, path=path, values=values, periods=periods, stop_early=stop_early, max_period=max_period, tol=tol,
         velocity=velocity, coordinates=coordinates,
     )  # fmt: skip
     up = _swept(asked, asked.grid, asked.start, lambda done: progress(0.5 * done, f"{path} up"))
@@ -241,7 +241,7 @@ def _located(asked: SweepRequest, run: _OneWay, i: int) -> tuple[float, float, f
     first, last = (float(value) for value in run.values[i : i + 2])
     a, b = (amplitude_of(row) for row in run.rows[i : i + 2])
     found, low, state = (first, last, a, b), first, run.rows[i].last[0]
-    for parts in SETTINGS.parts if asked.settle else ():
+    for parts in SETTINGS.parts if asked.stop_early else ():
         while low != last:
             here = low + (last - first) / parts
             here = last if abs(here - last) < 0.5 * abs(last - first) / parts else here
@@ -312,7 +312,7 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
         "path": asked.path,
         "coordinate": name,
         "periods": asked.periods,
-        "settle": str(asked.settle),
+        "stop_early": str(asked.stop_early),
         **start,
     }
     data.attrs = {"title": "sweep computed by saltus", "kind": "frequency_sweep"}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from saltus.result import Result
 from saltus.systems import Harmonic, Metainterface, System
 from saltus.theory.quasi_static import critical_horizontal, fold_horizontal, subcritical_vertical, unloaded_fold
 
@@ -18,7 +19,7 @@ LOAD_PLANE = ("load.horizontal.amplitude", "load.vertical")  # the two parameter
 
 
 @dataclass(frozen=True, eq=False)
-class QuasiStaticBorder:
+class QuasiStaticBorder(Result):
     """Both parts of the border over the vertical load V; the true border is the lesser of them (erratum 23).
 
     Attributes
