@@ -101,7 +101,7 @@ def test_what_is_no_result_is_told(refused, tmp_path):
         ("empty.nc", "is no netCDF file that can be read"),
         ("cut.nc", "is damaged: it has 700 bytes, and its data end at"),
         ("folder", "is not a store: it has no zarr.json"),
-        ("foreign.nc", "it does not say of what kind it is; it draws motion, phase_portrait"),
+        ("foreign.nc", "it does not say of what kind it is; it draws attractors, "),
         ("other.nc", "its kind is 'rain fall'"),
     ):
         assert problem in refused("plot", tmp_path / name)

@@ -29,6 +29,6 @@ def draw_verdict(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_
     ax.set_ylabel(state_label(dataset, f"section_{plane[1]}", plane))
     ax.legend(loc="best", markerscale=4.0 if many else 1.0)
     if own:
-        sentence = f"{dataset['kind'].values}: {dataset['reason'].values}"
+        sentence = f"{dataset['kind'].values}: {dataset['reason'].values}".replace("+-", "\u00b1")
         ax.set_title("\n".join(textwrap.wrap(sentence, LINE_LENGTH)), loc="left", fontsize=8)
     return ax
