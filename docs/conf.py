@@ -57,6 +57,7 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
     "only_warn_on_example_error": False,
     "min_reported_time": 5,
+    "write_computation_times": False,  # whose pages would load scripts from elsewhere
     "nested_sections": False,
     "reset_modules": ("gallery_order.reset",),
 }
@@ -67,6 +68,7 @@ html_static_path = ["_static"]
 html_css_files = ["saltus.css"]
 html_show_sourcelink = False
 html_copy_source = False
+html_show_search_summary = False  # a page that is opened as a file may not fetch the others
 html_theme_options = {
     "navbar_align": "left",
     "show_toc_level": 2,

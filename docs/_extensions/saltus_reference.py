@@ -9,6 +9,7 @@ from pathlib import Path
 
 import typer
 from public_names import ROOMS, public_names
+from sphinx.ext import autosummary
 
 import saltus
 from saltus.cli.app import app
@@ -20,6 +21,7 @@ FOLDER = Path(__file__).parents[1] / "reference" / "api"
 
 def setup(application):
     """Called by Sphinx."""
+    autosummary.WELL_KNOWN_ABBREVIATIONS += ("Fig.", "Figs.")  # after which the first sentence of a docstring goes on
     application.connect("builder-inited", write_all)
     application.connect("autodoc-process-docstring", plain_text_as_rst, priority=400)  # before napoleon
     application.connect("missing-reference", where_it_is_public)
@@ -168,12 +170,11 @@ def _default(value):
 def known_errata():
     """The errata 1 to 28 of the paper that were known; what follows was found while building saltus (docs/errata.md)."""
     known = tomllib.loads((files("saltus.paper") / "errata.toml").read_text(encoding="utf-8"))
-    lines = ["# The known errata of the paper, 1 to 28", "", "What is right, as short as can be. The derivations are in the"]
-    lines += ["docstrings that name them, and in the tests called after them. From 29 on they are our own:"]
-    lines += ["[disagreements](../../errata.md).", ""]
-    lines += ["| | where | what is right |", "|---|---|---|"]
+    lines = ["# The known errata of the paper, 1 to 28", "", "What is right, and why. Each is proved again by a test that is"]
+    lines += ["called after it. From 29 on they are our own: [disagreements](../../errata.md).", ""]
     for number, erratum in known.items():
         if int(number) <= 28:
-            cells = [erratum[key].replace("|", r"\|").replace("*", r"\*").replace("\n", " ") for key in ("place", "correct")]
-            lines.append(f"| {number} | {cells[0]} | {cells[1]} |")
-    return "\n".join(lines) + "\n"
+            keys = ("place", "correct", "derivation")
+            place, correct, derivation = (re.sub(r"([*|])", r"\\\1", erratum[key]).replace("\n", " ") for key in keys)
+            lines += [f"## {number}. {place}", "", correct, "", f"*Derivation.* {derivation}", ""]
+    return "\n".join(lines)
