@@ -1,8 +1,10 @@
-"""Results in a notebook: a title and a table of facts, as HTML in which every text is escaped."""
+"""Results in a notebook: a title and a table of facts, as HTML in which every text is escaped; and pictures."""
 
 from __future__ import annotations
 
 import html
+import io
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,6 +17,15 @@ def html_table(title: str, facts: Mapping[str, Any]) -> str:
     rows = [f"<tr><th {CELL}>{_text(name)}</th><td {CELL}>{_text(value)}</td></tr>" for name, value in facts.items()]
     more = f"<tr><td {CELL} colspan='2'>and {len(rows) - MOST_ROWS} more</td></tr>" if len(rows) > MOST_ROWS else ""
     return f"<div><strong>{_text(title)}</strong><table>{''.join(rows[:MOST_ROWS])}{more}</table></div>"
+
+
+def show_below_cell(figure: Any) -> None:
+    """Show a figure below the cell that makes it, where this is a notebook; elsewhere do nothing."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    if hasattr(shell, "kernel"):
+        picture, notebook = io.BytesIO(), sys.modules["IPython"].display
+        figure.savefig(picture, format="png", dpi=110)
+        notebook.display(notebook.Image(picture.getvalue()))
 
 
 def _text(value: Any) -> str:

@@ -5,6 +5,8 @@ Which functions there are is read from the public face: of a new one the first t
 
 import inspect
 import itertools
+import sys
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -196,3 +198,19 @@ def test_every_function_that_draws_a_whole_result_takes_axes():
     whole = {*plots.DRAWINGS.values(), plots.draw_special_curve}
     for draw in whole:
         assert "ax" in inspect.signature(draw).parameters, draw
+
+
+def test_a_picture_stands_below_the_cell_of_a_notebook_and_one_in_own_axes_does_not(monkeypatch):
+    pictures, shell = [], SimpleNamespace(kernel=None)
+    display = SimpleNamespace(Image=lambda data: data, display=pictures.append)
+    motion = saltus.simulate(SYSTEM, theta=0.3, periods=1)
+    ax = Figure().subplots()
+    with monkeypatch.context() as notebook:
+        notebook.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell, display=display, version_info=(9, 0)))
+        saltus.plot(motion)
+        assert len(pictures) == 1
+        assert pictures[0].startswith(b"\x89PNG")
+        saltus.plot(motion, ax=ax)
+        del shell.kernel  # a terminal of IPython
+        saltus.plot(motion)
+    assert len(pictures) == 1

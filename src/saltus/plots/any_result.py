@@ -7,13 +7,14 @@ from contextlib import nullcontext
 from typing import Any
 
 from saltus.errors import ParameterError, shown
+from saltus.notebook import show_below_cell
 from saltus.plots.attractors import draw_attractors
 from saltus.plots.backbone import draw_backbone
 from saltus.plots.basin_boundary import draw_uncertainty, draw_wada
 from saltus.plots.basins import draw_basins
 from saltus.plots.chaotic_bands import draw_chaotic_bands
 from saltus.plots.chart import draw_stability_chart
-from saltus.plots.conventions import SINGLE_COLUMN, axes_or_new, style
+from saltus.plots.conventions import SINGLE_COLUMN, axes_or_new, figure_of, style
 from saltus.plots.curves import draw_attractors_along, draw_branch, draw_special_curve
 from saltus.plots.diagram import draw_diagram
 from saltus.plots.ensembles import draw_ensemble
@@ -57,7 +58,7 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
 
 
 def plot(result: Any, **options: Any) -> Any:
-    """Draw any result; returns the axes, or of several panels an array of them.
+    """Draw any result; returns the axes, or of several panels an array of them. In a notebook the picture stands below the cell.
 
     Parameters
     ----------
@@ -84,6 +85,8 @@ def plot(result: Any, **options: Any) -> Any:
             ax = axes_or_new(given, options.pop("width", SINGLE_COLUMN), 0.8 * SINGLE_COLUMN)
             for each in result:
                 plot(each, ax=ax, **options)
+        if given is None:
+            show_below_cell(figure_of(ax))
         return ax
     data = result.to_xarray() if hasattr(result, "to_xarray") else result
     if not hasattr(data, "attrs") or not hasattr(data, "data_vars"):
@@ -92,7 +95,10 @@ def plot(result: Any, **options: Any) -> Any:
     if draw is None:
         raise ParameterError(f"nothing draws a result of the kind {shown(data.attrs.get('kind', ''))}", "result")
     bound_arguments(draw, (data,), options)  # what it does not take is refused with what it does
-    return draw(data, **options)
+    axes = draw(data, **options)
+    if not options.keys() & {"ax", "figure"}:
+        show_below_cell(figure_of(axes))
+    return axes
 
 
 def _by_content(data: Any) -> Callable[..., Any] | None:

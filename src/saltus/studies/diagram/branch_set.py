@@ -72,7 +72,7 @@ class BranchSet:
                 return
             self.grown.add(id(widest))
             self._grow(widest)
-            progress(1.0, f"following, {len(self.placed)} branches")
+            progress(1.0, f"following, branches: {len(self.placed)}")
 
     @property
     def branches(self) -> list[Branch]:

@@ -116,7 +116,7 @@ class DiagramSearch:
                     self._prepare(runs[number:])
                     self.found.place[row] = self._follow(row, while_stable=self._is_narrow(run))
                 known = len(self.branches.placed)
-                progress(known / (known + len(rows)), f"following, {known} branches")
+                progress(known / (known + len(rows)), f"following, branches: {known}")
 
     def _place(self) -> None:
         """Look for all attractors that lie on no branch on the branches on which they were not looked for yet."""
