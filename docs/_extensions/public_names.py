@@ -57,4 +57,5 @@ def public_names():
 
 def _answers(package, name):
     found = getattr(package, name)
-    return inspect.isfunction(found) and hasattr(found, "answers")
+    """Whether it is a function for users; those that draw are told by `saltus.plot`, which draws all."""
+    return inspect.isfunction(found) and hasattr(found, "answers") and package.__name__ != "saltus.plots"

@@ -9,11 +9,11 @@ from shared_systems import forced
 
 from saltus import ParameterError, continue_orbit, find_orbit
 from saltus.continuation import CurveEnd
-from saltus.orbits import RestingOrbit
+from saltus.orbits import OrbitEnd, RestingOrbit, SpecialKind
 
 STEP = 0.1  # that of `continue_orbit`
 # Among them branches that cross others, nearly meet others, have tori, many grazings, or no damping.
-FEW = (4, 7, 8, 9, 10, 12, 19, 25, 29, 36, 68, 166, 306, 346, 433, 491, 503)  # every model is among them
+FEW = (4, 7, 8, 9, 10, 12, 19, 25, 29, 36, 68, 166, 306, 346, 418, 433, 491, 503)  # every model is among them
 MANY = range(400, 600)
 
 
@@ -86,6 +86,18 @@ def test_special_points_stability_and_ends_of_many_branches(seed):
         same_specials(seed)
     between_specials(seed)
     ends_on_its_bounds(seed)
+
+
+def test_a_doubled_orbit_without_impacts_ends_where_it_is_born():
+    """A family of period 2 turns sharply at the doubling of its parent, whose own branch tells where that is (seed 418)."""
+    doubled = followed(418, STEP)
+    assert [end.reason for end in doubled.ends] == [OrbitEnd.IMAGE, OrbitEnd.IMAGE]
+    last = doubled.orbits[-1]
+    once = find_orbit(last.system, x=last.x, velocity=last.velocity, period=1, parameters=(FREQUENCY,))
+    parent = continue_orbit(once, FREQUENCY, (2.0, 3.0))
+    born = [s.parameter for s in parent.special if s.kind == SpecialKind.PD]
+    for end in doubled.ends:
+        assert min(abs(value - end.parameter) for value in born) < 1e-9
 
 
 def test_three_pairs_of_special_points_that_lie_within_one_step_each():

@@ -16,12 +16,14 @@ import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from results_to_draw import FREE, RESULTS, SYSTEM, WITHOUT, chart
-from test_public_face import public
+from test_public_face import VALUES, answer, asked_of, names_it, public
 
 import saltus
 from saltus import plots
 from saltus.errors import ParameterError
 from saltus.files import write_dataset
+from saltus.plots.any_result import DRAWINGS, _by_content
+from saltus.public_functions import fits
 from saltus.result import Result
 
 PANELS = ("saltus.simulate", "saltus.find_orbit", "saltus.free_orbit", "saltus.doubling_cascade", "saltus.chaotic_bands")
@@ -214,3 +216,40 @@ def test_a_picture_stands_below_the_cell_of_a_notebook_and_one_in_own_axes_does_
         del shell.kernel  # a terminal of IPython
         saltus.plot(motion)
     assert len(pictures) == 1
+
+
+def drawn(results):
+    """Each function that draws, with a dataset that it draws."""
+    found = {}
+    for name in RESULTS:
+        result = results(name)
+        for each in result if isinstance(result, tuple) else (result,):
+            data = each.to_xarray() if hasattr(each, "to_xarray") else each
+            found[DRAWINGS.get(str(data.attrs.get("kind", ""))) or _by_content(data)] = data
+    return found
+
+
+@pytest.mark.filterwarnings("ignore")  # of Matplotlib, where values are meant that it cannot show
+def test_every_argument_of_what_draws_answers_every_kind_of_value(results):
+    """As the public functions do: a result, or a sentence that names the argument."""
+    functions, wrong = drawn(results), []
+    named = {getattr(plots, name) for name in plots.__all__ if hasattr(getattr(plots, name), "answers")}
+    assert named - set(functions) <= {saltus.plot}
+    for draw, data in functions.items():
+        first = next(iter(inspect.signature(draw).parameters))
+        for (parameter, hint), value in itertools.product(asked_of(draw), VALUES):
+            try:
+                refusal = answer(draw, {first: data, parameter: value})
+            except Exception as error:
+                wrong.append((draw.__name__, parameter, value, repr(error)))
+                continue
+            if refusal is None and not fits(value, hint):
+                wrong.append((draw.__name__, parameter, value, "is taken"))
+            if refusal is not None and not names_it(refusal.parameter or "", draw.__name__, draw, parameter, value, hint):
+                wrong.append((draw.__name__, parameter, value, f"names {refusal.parameter}: {refusal}"))
+            if len(str(refusal)) >= 400:
+                wrong.append((draw.__name__, parameter, value, f"is long: {refusal}"))
+        with pytest.raises(ParameterError, match="did you mean") as misspelt:
+            draw(data, **{[*inspect.signature(draw).parameters][-1] + "_": 1})
+        assert misspelt.value.parameter.endswith("_")
+    assert not wrong, "\n".join(f"{name}({parameter}={value!r:.30}) {what:.200}" for name, parameter, value, what in wrong)

@@ -11,7 +11,7 @@ import sweep_toys
 import xarray as xr
 
 from saltus.errors import ParameterError, SweepError
-from saltus.sweep import Plan, Variable, open_store, run
+from saltus.sweep import Plan, Variable, open_store, run, status
 from saltus.sweep import store_files as files
 from saltus.sweep.store import opened
 
@@ -95,6 +95,21 @@ def test_a_chunk_is_done_when_all_its_variables_are_there(waves_plan, tmp_path):
         assert sheets.missing() == [(2, 1)]
     run(plan, store)
     assert kept.stat().st_mtime_ns == stamp  # once there, not written again
+
+
+def test_of_many_chunks_the_folders_tell_the_same_as_the_files(waves_plan, tmp_path, monkeypatch):
+    run(waves_plan(), tmp_path / "s")
+    files.chunk_file(tmp_path / "s", "count", (2, 1), 1).unlink()
+    files.chunk_file(tmp_path / "s", "height", (3, 0), 0).unlink()
+    asked = status(tmp_path / "s")
+    assert not asked.estimated
+    monkeypatch.setattr(files, "ASKED", 2)
+    told = status(tmp_path / "s")
+    assert told.estimated
+    assert (told.done, told.total) == (asked.done, asked.total) == (6, 8)
+    assert told.bytes == pytest.approx(asked.bytes, rel=0.2)  # chunks at the ends are smaller
+    with opened(waves_plan(), tmp_path / "s") as store:
+        assert store.missing() == [(2, 1), (3, 0)]
 
 
 def test_chunks_of_nothing_but_fill_values_are_done(waves_plan, tmp_path):

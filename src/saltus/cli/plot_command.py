@@ -18,22 +18,14 @@ def plot_store(path: Path, output: Path | None) -> None:
     ParameterError
         There is no result of saltus at `path`, a sweep is not complete, a folder cannot be written to.
     """
-    from saltus.config import kind_of, open_result
+    from saltus.config import open_result
     from saltus.files import UNCHECKED, check_writable, has_checksum
 
     folder = path.parent if output is None else output
     check_writable(folder)
     data = open_result(path)
     _check_sizes(path, data)
-    try:
-        files = draw_file(path, folder / path.stem, data)
-    except (SaltusError, OSError):
-        raise
-    except Exception as error:  # what another program wrote may lack anything, and may hold anything in its place
-        said = " ".join(f"{type(error).__name__}: {error}".split())
-        raise ParameterError(
-            f"{path} says that it is of the kind {kind_of(data)!r}, but it cannot be drawn ({said:.120})"
-        ) from None
+    files = draw_file(path, folder / path.stem, data)
     names = ", ".join(file.name for file in files)
     if path.is_file() and not has_checksum(path.read_bytes()):
         Console(highlight=False, stderr=True).print(f"{path} {UNCHECKED}.", markup=False, soft_wrap=True)
@@ -58,7 +50,7 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     Raises
     ------
     ParameterError
-        It is of no kind that has a picture.
+        It is of no kind that has a picture, or cannot be drawn as it.
     """
     from saltus.config import kind_of
     from saltus.files import write_figure
@@ -68,5 +60,12 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     if kind not in DRAWINGS:
         what = f"its kind is {kind!r}" if kind else "it does not say of what kind it is"
         raise ParameterError(f"{path} is no result that `saltus plot` draws: {what:.60}; it draws {', '.join(DRAWINGS)}")
-    with style():
-        return write_figure(stem, figure_of(DRAWINGS[kind](data)))
+    try:
+        with style():
+            return write_figure(stem, figure_of(DRAWINGS[kind](data)))
+    except OSError:
+        raise
+    except Exception as error:  # what another program wrote may lack anything, and may hold anything in its place
+        said = "" if isinstance(error, SaltusError) else f"{type(error).__name__}: "
+        said += " ".join(str(error).split())
+        raise ParameterError(f"{path} says that it is of the kind {kind!r}, but it cannot be drawn ({said:.150})") from None

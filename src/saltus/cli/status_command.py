@@ -97,7 +97,7 @@ def rows(found: StoreStatus) -> Iterator[tuple[str, str]]:
     if found.kind != SEARCH:
         yield "chunks", f"{found.done} of {found.total} done ({100 * found.done // found.total} %)"
         yield "grid", ", ".join(f"{size} along {name}" for name, size in found.sizes.items())
-    yield "size", size(found.bytes)
+    yield "size", "about " * found.estimated + size(found.bytes)
     yield "begun", moment(found.started)
     yield "last written", moment(found.updated) if found.updated else "nothing yet"
     if found.failures:

@@ -14,7 +14,6 @@ from saltus.orbits.contact_problem import ContactProblem
 from saltus.orbits.grazing import other_side
 from saltus.orbits.images import asymmetry, falls_onto_image, halves_of, nearest, passes_image, repetition
 from saltus.orbits.orbit_curve import OrbitPoint
-from saltus.orbits.signature import Signature
 from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
 from saltus.orbits.switching_contacts import contact_change
 from saltus.orbits.tolerances import TOLERANCES
@@ -183,22 +182,20 @@ def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
 
     There the family's own equations are singular; those of the parent, over half of the period, are not.
     """
-    signature = a.orbit.signature
+    signature, problem = a.orbit.signature, a.curve.problem.halved
     before, after = asymmetry(a), asymmetry(b)
     assert before is not None
     assert after is not None
     length = float(np.linalg.norm(before))
     share = length / (length + float(np.linalg.norm(after)))
     place = a.place + share * (b.place - a.place)
-    odd = bool(signature.period % 2)
-    sides = signature.sides[: len(signature.sides) // 2]
-    short = Signature(sides, signature.period if odd else signature.period // 2, odd)
-    curve = a.curve.with_problem(a.curve.problem.with_signature(short))
-    guess = np.append(halves_of(place[:-1], signature).mean(axis=0).ravel(), place[-1])
+    curve = a.curve.with_problem(problem)
+    between = halves_of(place[:-1], signature).mean(axis=0).ravel() if signature.sides else place[:-1]
+    guess = np.append(between, place[-1])
     middle = curve.solve_at(guess, np.append(np.zeros(curve.problem.size), 1.0))
     if middle is None:
         return None
-    test = FLIP[odd]
+    test = FLIP[problem.signature.symmetric]
     for reach in SETTINGS.reaches:
         ends = [middle.beside(sign * reach) for sign in (-1.0, 1.0)]
         if ends[0] is not None and ends[1] is not None and test.value(ends[0]) * test.value(ends[1]) < 0.0:

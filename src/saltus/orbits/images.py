@@ -19,8 +19,10 @@ def asymmetry(point: OrbitPoint) -> np.ndarray | None:
     even one. None where it could not be its own image, or is by construction.
     """
     signature, n = point.orbit.signature, len(point.orbit.signature.sides)
-    if signature.symmetric or n == 0 or n % 2:
+    if signature.symmetric or n % 2:
         return None
+    if n == 0:
+        return point.half_way
     first, second = signature.sides[: n // 2], signature.sides[n // 2 :]
     expected = tuple(-s for s in first) if signature.period % 2 else first
     if second != expected or (signature.period % 2 and not point.curve.symmetric):

@@ -35,6 +35,17 @@ class OrbitPoint(Point):
         """The orbit."""
         return PeriodicOrbit(self.curve.problem, self.solution)
 
+    @cached_property
+    def half_way(self) -> np.ndarray | None:
+        """Of an orbit without impacts: its image half a period later less itself; None where it cannot have its own image."""
+        problem, odd = self.curve.problem, self.orbit.signature.period % 2
+        sides = problem.system.model.sides and not problem.passes_contact
+        if type(problem) is not Problem or (odd and (sides or not self.curve.symmetric)):
+            return None
+        n = problem.size
+        equations = problem.halved.evaluate(self.place[:n], self.place[n:])
+        return None if equations is None else equations.residual
+
     @property
     def residual(self) -> float:
         """The largest residual of the orbit's equations."""

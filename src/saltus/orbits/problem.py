@@ -15,7 +15,7 @@ its mirror image.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -178,6 +178,13 @@ class Problem:
     def with_signature(self, signature: Signature) -> Problem:
         """The problem of another signature."""
         return type(self)(self.system, signature, self.paths, self.tol)
+
+    @cached_property
+    def halved(self) -> Problem:
+        """The problem of the orbits that are their own images: closed after half a period, by the mirror image if it is odd."""
+        own, odd = self.signature, bool(self.signature.period % 2)
+        period = own.period if odd else own.period // 2
+        return self.with_signature(replace(own, sides=own.sides[: len(own.sides) // 2], period=period, symmetric=odd))
 
     def impacts(self, unknowns: np.ndarray, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
         """The phases of the impacts, and the speeds at which the gap closes before them."""

@@ -26,7 +26,6 @@ from saltus.plots.plane import draw_plane
 from saltus.plots.sensitivities import draw_sensitivities
 from saltus.plots.sweep import draw_sweep
 from saltus.plots.verdict import draw_verdict
-from saltus.public_functions import bound_arguments
 
 DRAWINGS: dict[str, Callable[..., Any]] = {
     "attractors": draw_attractors,
@@ -94,7 +93,6 @@ def plot(result: Any, **options: Any) -> Any:
     draw = DRAWINGS.get(str(data.attrs.get("kind", ""))) or _by_content(data)
     if draw is None:
         raise ParameterError(f"nothing draws a result of the kind {shown(data.attrs.get('kind', ''))}", "result")
-    bound_arguments(draw, (data,), options)  # what it does not take is refused with what it does
     axes = draw(data, **options)
     if not options.keys() & {"ax", "figure"}:
         show_below_cell(figure_of(axes))

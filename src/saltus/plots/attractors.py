@@ -10,7 +10,8 @@ from matplotlib.patheffects import Normal, Stroke
 
 from saltus.plots.attractor_marks import UNDECIDED_COLOUR, attractor_colours, attractor_legend, draw_points, name_plane, steady
 from saltus.plots.axis_names import unit_in_brackets
-from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new, styled
+from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new
+from saltus.plots.drawing import drawing
 
 START_MARK: dict[str, Any] = {
     "linestyle": "none",
@@ -23,7 +24,7 @@ START_MARK: dict[str, Any] = {
 HALO = [Stroke(linewidth=2.2, foreground="white"), Normal()]  # so that an attractor stands out among the starts
 
 
-@styled
+@drawing
 def draw_attractors(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
     """Draw the dataset of attractors that were searched: a dot for each start, a mark for each point at phase 0; returns `ax`."""
     x, y = (str(name) for name in dataset.attrs["plane"])

@@ -8,10 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from saltus.plots.conventions import INK, LIMIT_LINE, SINGLE_COLUMN, STABLE, STABLE_LINE, axes_or_new, styled
+from saltus.plots.conventions import INK, LIMIT_LINE, SINGLE_COLUMN, STABLE, STABLE_LINE, axes_or_new
+from saltus.plots.drawing import drawing
 
 
-@styled
+@drawing
 def draw_uncertainty(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw the share of uncertain states over the distance, on logarithmic axes, with the power law that was fitted."""
     ax = axes_or_new(ax, width, 0.75 * width)
@@ -33,7 +34,7 @@ def draw_uncertainty(dataset: Any, *, ax: Axes | None = None, width: float = SIN
     return ax
 
 
-@styled
+@drawing
 def draw_wada(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw which share of the boundary cells has all basins within a radius, and the shares from which a verdict follows."""
     ax = axes_or_new(ax, width, 0.75 * width)

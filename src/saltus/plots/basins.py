@@ -20,14 +20,15 @@ from saltus.plots.attractor_marks import (
     steady,
 )
 from saltus.plots.axis_names import unit_in_brackets
-from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new, styled
+from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new
+from saltus.plots.drawing import drawing
 from saltus.plots.marks import cell_edges
 
 BOUNDARY: dict[str, Any] = {"color": INK, "linewidth": 0.7, "zorder": 4}
 HALO = [Stroke(linewidth=1.7, foreground="white", alpha=0.8), Normal()]  # so that the line shows on dark colours, too
 
 
-@styled
+@drawing
 def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw a dataset of basins, such as `saltus.attractors.basins_of_attraction` gives.
 

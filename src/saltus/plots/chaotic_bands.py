@@ -10,15 +10,16 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from saltus.plots.axis_names import parameter_name, symbol, unit_in_brackets
-from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure, outside_legend, styled
+from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure, outside_legend
 from saltus.plots.diagram import draw_stroboscopic_states
+from saltus.plots.drawing import drawing
 from saltus.plots.exponents import NAME, ZERO
 from saltus.plots.response import BAND_NAMES, BANDS, draw_bands
 
 VERDICTS = {"undecided": "x", "chaotic": "o", "transient": "^", "regular": "s"}
 
 
-@styled
+@drawing
 def draw_chaotic_bands(tree: Any, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
     """Draw the tree of `chaotic_bands`: states at phase 0 above, exponents of what has not settled below; returns both axes.
 

@@ -15,7 +15,8 @@ from matplotlib.patheffects import Normal, Stroke
 
 from saltus.branch_lines import border_curves
 from saltus.plots.axis_names import parameter_name, peak, unit_in_brackets
-from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, axes_or_new, legend_of, outside_legend, styled
+from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, axes_or_new, legend_of, outside_legend
+from saltus.plots.drawing import drawing
 from saltus.plots.marks import cell_edges
 
 COLOURS = "viridis_r"  # large amplitudes dark, beside the white of rest small ones light
@@ -43,7 +44,7 @@ CROSS: dict[str, Any] = {"linestyle": "none", "marker": "x", "color": UNSTABLE}
 CLOSED_FORM: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "white", "mec": INK}
 
 
-@styled
+@drawing
 def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
     """Draw a chart as it is stored, or a tree of one with its borders, with its scale and what its marks mean; returns `ax`."""
     chart = data["chart"].to_dataset() if data_is_tree(data) else data

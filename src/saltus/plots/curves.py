@@ -10,11 +10,12 @@ from matplotlib.axes import Axes
 from saltus.branch_lines import smooth_lines
 from saltus.plots.attractor_marks import attractor_colours
 from saltus.plots.axis_names import parameter_name, quantity_name, unit_in_brackets
-from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new, marks_of, outside_legend, styled
+from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new, marks_of, outside_legend
+from saltus.plots.drawing import drawing
 from saltus.plots.response import MARK_NAMES, MARKS, line_handles, line_style
 
 
-@styled
+@drawing
 def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw the dataset of a branch: stable motions solid, unstable ones dashed, and its special points; returns `ax`."""
     own, ax = ax is None, axes_or_new(ax, width, 0.75 * width)
@@ -37,7 +38,7 @@ def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = 
     return ax
 
 
-@styled
+@drawing
 def draw_special_curve(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw a curve of special points in the plane of its two parameters, as `SpecialCurve.to_xarray` gives it; returns `ax`."""
     ax = axes_or_new(ax, width, 0.75 * width)
@@ -51,7 +52,7 @@ def draw_special_curve(dataset: Any, *, ax: Axes | None = None, width: float = S
     return ax
 
 
-@styled
+@drawing
 def draw_attractors_along(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
     """Draw the amplitudes of `attractors_along`, each attractor in a colour of its own; returns `ax`."""
     ax = axes_or_new(ax, width, 0.62 * width)

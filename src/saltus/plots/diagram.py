@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from saltus.plots.axis_names import parameter_name, peak, symbol, unit_in_brackets
-from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure, styled
+from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure
+from saltus.plots.drawing import drawing
 from saltus.plots.response import draw_bands, draw_limits, draw_response, note_missed, response_legend
 
 POINTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
@@ -28,7 +29,7 @@ class StateSettings:
 DRAWN_STATES = StateSettings()
 
 
-@styled
+@drawing
 def draw_diagram(tree: Any, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
     """Draw the DataTree of `response_spectrum` or `bifurcation_diagram`; returns its axes, (1 or 2,).
 

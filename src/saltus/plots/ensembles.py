@@ -8,13 +8,14 @@ from matplotlib.axes import Axes
 
 from saltus.errors import ParameterError
 from saltus.plots.axis_names import symbol, unit_in_brackets, varied
-from saltus.plots.conventions import SINGLE_COLUMN, STABLE, axes_or_new, styled
+from saltus.plots.conventions import SINGLE_COLUMN, STABLE, axes_or_new
+from saltus.plots.drawing import drawing
 from saltus.plots.marks import cell_edges
 
 OWN = ("period", "state", "column")  # dimensions of what is kept of each motion
 
 
-@styled
+@drawing
 def draw_ensemble(dataset: Any, quantity: str | None = None, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw a variable of `simulate_many`, by default the first coordinate at the end, over one dimension or two; returns `ax`.
 

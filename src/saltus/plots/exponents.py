@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 
 from saltus.errors import ParameterError
 from saltus.plots.axis_names import varied
-from saltus.plots.conventions import FAINT, INK, SINGLE_COLUMN, STABLE, STABLE_LINE, UNSTABLE_LINE, axes_or_new, legend_of, styled
+from saltus.plots.conventions import FAINT, INK, SINGLE_COLUMN, STABLE, STABLE_LINE, UNSTABLE_LINE, axes_or_new, legend_of
+from saltus.plots.drawing import drawing
 from saltus.plots.marks import cell_edges
 
 NAME = r"exponent $\lambda$ (per unit of $\tau$)"
@@ -18,7 +19,7 @@ UNRESOLVED: dict[str, Any] = {"color": "#e6e6e6", "linewidth": 0.0, "zorder": 0}
 HALVES = (("at_half", "<", "first half of the run"), ("later_half", ">", "second half of the run"))
 
 
-@styled
+@drawing
 def draw_exponents(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw the exponents of one motion, with 95 % intervals, those of both halves of the run, and of the other method.
 
@@ -52,7 +53,7 @@ def draw_exponents(dataset: Any, *, ax: Axes | None = None, width: float = SINGL
     return ax
 
 
-@styled
+@drawing
 def draw_exponents_along(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
     """Draw the dataset of `lyapunov_many`: over one dimension all exponents with their errors, over two the largest one.
 

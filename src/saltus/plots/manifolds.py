@@ -16,13 +16,13 @@ from saltus.plots.conventions import (
     UNSTABLE_LINE,
     axes_or_new,
     marks_of,
-    styled,
 )
+from saltus.plots.drawing import drawing
 
 SADDLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.5, "markerfacecolor": "white", "zorder": 5}
 
 
-@styled
+@drawing
 def draw_manifold(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw the manifold of a saddle orbit at phase 0 of the load, the stable one solid, the unstable one dashed; returns `ax`."""
     ax = axes_or_new(ax, width, 0.85 * width)
@@ -38,7 +38,7 @@ def draw_manifold(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE
     return ax
 
 
-@styled
+@drawing
 def draw_separatrix(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw a separatrix in the phase plane and its saddle, an open mark; returns `ax`."""
     ax = axes_or_new(ax, width, 0.85 * width)

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from saltus.plots.axis_names import symbol, unit_in_brackets
-from saltus.plots.conventions import DOUBLE_COLUMN, FAINT, INK, LIMIT, SEPARATRIX, STABLE, UNSTABLE, new_figure, styled
+from saltus.plots.conventions import DOUBLE_COLUMN, FAINT, INK, LIMIT, SEPARATRIX, STABLE, UNSTABLE, new_figure
+from saltus.plots.drawing import drawing
 from saltus.plots.marks import limit_lines
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ LINES: tuple[dict[str, Any], ...] = ({"color": STABLE, "ls": "-"}, {"color": UNS
 PAIRS = (STABLE, UNSTABLE, LIMIT, "#E69F00", INK, SEPARATRIX)  # of more than two coordinates, two of each colour
 
 
-@styled
+@drawing
 def draw_motion(dataset: xarray.Dataset, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
     """The coordinates over time, and velocities over coordinates, of a motion as `Motion.to_xarray` gives it; returns both axes.
 

@@ -20,15 +20,15 @@ from saltus.plots.conventions import (
     UNSTABLE,
     axes_or_new,
     new_figure,
-    styled,
 )
+from saltus.plots.drawing import drawing
 
 FEIGENBAUM = 4.669201609102990  # the limit of the ratios of a cascade
 SETTLED: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": "+", "markersize": 5.0, "markeredgewidth": 0.6}
 FACES = {True: ("stable orbit", STABLE, STABLE, "o"), False: ("unstable orbit", "white", UNSTABLE, "s")}
 
 
-@styled
+@drawing
 def draw_search(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
     """Draw the amplitudes of the orbits of `search_orbits`, stable ones filled, unstable ones open; returns `ax`.
 
@@ -55,7 +55,7 @@ def draw_search(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SI
     return ax
 
 
-@styled
+@drawing
 def draw_cascade(dataset: Any, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
     """Draw a cascade of period doublings: the parameters at which they are, their ratios and the limit; returns both axes.
 

@@ -9,14 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from saltus.plots.axis_names import symbol, unit_in_brackets
-from saltus.plots.conventions import FAINT, SEPARATRIX_LINE, SINGLE_COLUMN, STABLE, UNSTABLE, axes_or_new, legend_of, styled
+from saltus.plots.conventions import FAINT, SEPARATRIX_LINE, SINGLE_COLUMN, STABLE, UNSTABLE, axes_or_new, legend_of
+from saltus.plots.drawing import drawing
 from saltus.plots.marks import fixed_points
 from saltus.plots.phase_lines import draw_arrows, lines_apart
 
 ARROWS = 0.6  # window widths between arrows along a motion
 
 
-@styled
+@drawing
 def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * SINGLE_COLUMN) -> Axes:
     """Draw a dataset of `saltus.phase_portrait`; returns the axes.
 

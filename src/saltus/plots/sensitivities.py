@@ -9,13 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
 
 from saltus.plots.axis_names import parameter_symbol, state_symbol
-from saltus.plots.conventions import INK, axes_or_new, styled
+from saltus.plots.conventions import INK, axes_or_new
+from saltus.plots.drawing import drawing
 
 ENTRY_WIDTH = 18.0  # mm, of one derivative
 DARKEST = 6.0  # times the largest derivative would be black: numbers are read on what is lighter
 
 
-@styled
+@drawing
 def draw_sensitivities(dataset: Any, *, ax: Axes | None = None, width: float | None = None) -> Axes:
     """Draw the derivatives as a table of numbers, a row for each state variable at the end, darker if larger; returns `ax`."""
     derivative = np.asarray(dataset["derivative"].values, dtype=float)

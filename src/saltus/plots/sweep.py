@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from saltus.plots.axis_names import parameter_name, symbol, unit_in_brackets
-from saltus.plots.conventions import SINGLE_COLUMN, STABLE, UNSTABLE, axes_or_new, styled
+from saltus.plots.conventions import SINGLE_COLUMN, STABLE, UNSTABLE, axes_or_new
+from saltus.plots.drawing import drawing
 from saltus.plots.marks import cell_edges
 
 WAYS: dict[str, dict[str, Any]] = {
@@ -25,7 +26,7 @@ WAYS: dict[str, dict[str, Any]] = {
 BAND = "#ececec"  # where up and down differ
 
 
-@styled
+@drawing
 def draw_sweep(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
     """Draw the dataset of `frequency_sweep`: amplitudes up and down, jumps as arrows, hysteresis in grey; returns the axes."""
     ax = axes_or_new(ax, width, 0.62 * width)

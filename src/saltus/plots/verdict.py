@@ -8,12 +8,13 @@ from typing import Any
 from matplotlib.axes import Axes
 
 from saltus.plots.axis_names import plane_of, state_label
-from saltus.plots.conventions import INK, SINGLE_COLUMN, STABLE_LINE, axes_or_new, styled
+from saltus.plots.conventions import INK, SINGLE_COLUMN, STABLE_LINE, axes_or_new
+from saltus.plots.drawing import drawing
 
 LINE_LENGTH = 62  # characters of the sentence above a picture of one column
 
 
-@styled
+@drawing
 def draw_verdict(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
     """Draw the states at phase 0 on which a motion ends, its orbit if there is one, and the verdict's sentence; returns `ax`."""
     own, ax = ax is None, axes_or_new(ax, width, 0.85 * width)

@@ -67,7 +67,8 @@ class Store:
                 file.unlink()
             except OSError as error:
                 raise SweepError(f"{file} is damaged and cannot be removed ({reason(error)})") from error
-        return [i for i in self.plan.chunks.indices() if not all(self._has(name, i) for name in self.plan.variables)]
+        found = [files.chunks_of(self.path, name, self.plan.chunks.grid, count).there for name, count in extra.items()]
+        return [tuple(map(int, index)) for index in np.argwhere(~np.logical_and.reduce(found))]
 
     def write(self, index: Index, values: Arrays) -> None:
         """Keep a chunk: the files that are not there yet, if an earlier run was killed among them.

@@ -10,8 +10,11 @@ import secrets
 import shutil
 import stat
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from saltus.files import PART, STALE, lock, write_durably
 from saltus.sweep.chunk_grid import Index
@@ -19,6 +22,7 @@ from saltus.sweep.chunk_grid import Index
 METADATA = "zarr.json"
 FAILURES = ".failures.json"
 CHECKSUMS = ".checksums.json"  # of the files that are written once, when the store is made: all but the chunks
+ASKED = 100_000  # chunks of a variable of which the system is asked one by one
 LOCK_PATIENCE = 1.0  # s to wait for a lock: a process that only looks whether there is one holds it for a moment
 
 
@@ -72,19 +76,72 @@ def chunk_file(root: Path, variable: str, index: Index, extra: int) -> Path:
     return root / chunk_name(variable, index, extra)
 
 
-def all_files(root: Path) -> dict[str, os.stat_result]:
-    """The files below `root`, by their names from there: devices and pipes, which may have no end, are none.
+@dataclass
+class Found:
+    """Files of a store: how many, their size in bytes, when the last one was written (0.0: none), and which chunks are there."""
 
-    To look through the folders takes a hundredth of the time of asking for each of a million chunks.
+    there: np.ndarray  # (chunks along each axis), bool
+    count: int = 0
+    bytes: float = 0.0
+    updated: float = 0.0
+
+    def add(self, path: str) -> bool:
+        """Take in a file, of which the system is asked; devices and pipes, which may have no end, are none."""
+        try:
+            found = os.stat(path)
+        except OSError:  # written beside its place, and moved there meanwhile
+            return False
+        if not stat.S_ISREG(found.st_mode):
+            return False
+        self.count += 1
+        self.bytes += found.st_size
+        self.updated = max(self.updated, found.st_mtime)
+        return True
+
+
+def chunks_of(root: Path, variable: str, grid: tuple[int, ...], extra: int) -> Found:
+    """The chunks of a variable with `extra` dimensions beside the grid's axes that have a file in the store at `root`.
+
+    Of more than `ASKED` chunks only their folders are read, in a sixth of the time: the size is then that of the first ones times
+    their number, and a folder tells when its last file was written.
     """
-    found = {}
-    for folder, _, names in os.walk(root):
-        inner = Path(folder).relative_to(root).as_posix()
-        for name in names:
-            with contextlib.suppress(OSError):  # written beside its place, and moved there meanwhile
-                entry = os.stat(os.path.join(folder, name))
-                if stat.S_ISREG(entry.st_mode):
-                    found[name if inner == "." else f"{inner}/{name}"] = entry
+    found, inner, further = Found(np.zeros(grid, dtype=bool)), "/0" * extra, 0
+    names = [{str(i): i for i in range(n)} for n in grid]
+
+    def look(folder: str, there: np.ndarray) -> None:
+        nonlocal further
+        places, before = names[-there.ndim], further
+        with contextlib.suppress(OSError), os.scandir(folder) as entries:
+            for entry in entries:
+                place = places.get(entry.name)
+                if place is None:
+                    continue
+                if there.ndim > 1:
+                    look(entry.path, there[place])
+                elif inner or found.count < ASKED:
+                    there[place] = found.add(entry.path + inner)
+                elif entry.is_file():
+                    there[place] = True
+                    further += 1
+            if further > before and there.ndim == 1:
+                found.updated = max(found.updated, os.stat(folder).st_mtime)
+
+    look(str(root / variable / "c"), found.there)
+    found.bytes *= 1.0 + further / max(found.count, 1)
+    return found
+
+
+def other_files(root: Path, variables: Iterable[str]) -> Found:
+    """The files below `root` that are no chunks of its variables: metadata, coordinates, parts."""
+    found, chunks = Found(np.empty(0)), {str(root / variable / "c") for variable in variables}
+    folders = [str(root)]
+    while folders:
+        with contextlib.suppress(OSError), os.scandir(folders.pop()) as entries:
+            for entry in entries:
+                if not entry.is_dir(follow_symlinks=False):
+                    found.add(entry.path)
+                elif entry.path not in chunks:
+                    folders.append(entry.path)
     return found
 
 

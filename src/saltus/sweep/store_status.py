@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from saltus.errors import ParameterError
 from saltus.public_functions import answered
 from saltus.sweep import store_files as files
@@ -25,7 +27,8 @@ class StoreStatus:
     """How far a sweep is.
 
     `done` and `failed` count chunks, of `total`; a failed chunk is one that raised when it was last tried. `bytes` is the size of
-    the store's files. `started` is when the store was made, `updated` when the last chunk was written (None: none yet).
+    the store's files, of more than 100 000 chunks estimated from as many (`estimated`). `started` is when the store was made,
+    `updated` when the last chunk was written (None: none yet).
     `running` is whether a run on this machine is writing to it, None where the file system has no locks. `damaged` are the files
     that are not what was written, if that was looked at; a chunk with such a file is not done.
 
@@ -82,6 +85,11 @@ class StoreStatus:
         return len(self.failures)
 
     @property
+    def estimated(self) -> bool:
+        """Whether `bytes` is an estimate, as not every file was asked for its size."""
+        return self.total > files.ASKED
+
+    @property
     def complete(self) -> bool:
         """Whether every chunk is there."""
         return self.done == self.total
@@ -116,26 +124,30 @@ def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
     variables = {name: len(variable["extra"]) for name, variable in plan["variables"].items()}
     damaged = list(files.damaged_files(path)) if verify else []
     broken = _broken_chunks(path, chunks, variables) if verify and not damaged else {}
-    written, missing, updated = files.all_files(path), set(broken.values()), 0.0
-    for index in chunks.indices():
-        there = [written.get(files.chunk_name(name, index, extra)) for name, extra in variables.items()]
-        if None in there:
-            missing.add(index)
-        updated = max((updated, *(file.st_mtime for file in there if file is not None)))
+    found = [files.chunks_of(path, name, chunks.grid, extra) for name, extra in variables.items()]
+    done = np.logical_and.reduce([each.there for each in found])
+    for index in broken.values():
+        done[index] = False
+    updated = max(each.updated for each in found)
     return StoreStatus(
         path=path,
         kind=str(plan["attrs"].get("kind") or plan["attrs"].get("title") or "sweep"),
         function=plan["function"],
         sizes=dict(chunks.sizes),
-        done=chunks.total - len(missing),
+        done=int(done.sum()),
         total=chunks.total,
-        failures=tuple(failure for failure in _failures(path) if failure.index in missing),
-        bytes=sum(file.st_size for file in written.values()),
+        failures=tuple(failure for failure in _failures(path) if _is_missing(done, failure.index)),
+        bytes=round(sum(each.bytes for each in (*found, files.other_files(path, variables)))),
         started=_moment(os.path.getmtime(path / files.METADATA)),
         updated=_moment(updated) if updated else None,
         running=files.in_use(path),
         damaged=tuple(damaged or broken),
     )
+
+
+def _is_missing(done: np.ndarray, index: Index) -> bool:
+    """Whether there is such a chunk, and it is not done; a list of failures may have been damaged."""
+    return len(index) == done.ndim and all(0 <= i < n for i, n in zip(index, done.shape, strict=True)) and not done[index]
 
 
 def damage(found: StoreStatus) -> str:

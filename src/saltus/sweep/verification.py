@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from saltus.checks import LIMITS, free_memory
 from saltus.sweep import store_files as files
@@ -29,16 +30,14 @@ def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, 
     extra
         The number of dimensions of each variable beside the grid's axes.
     """
-    written = files.all_files(path)
     for name, count in extra.items():
-        array = arrays[name]
-        for _, indices in itertools.groupby(chunks.indices(), lambda index: index[0]):
-            row = list(indices)
-            there = [index for index in row if files.chunk_name(name, index, count) in written]
+        array, found = arrays[name], files.chunks_of(path, name, chunks.grid, count).there
+        for i, row in enumerate(found):
+            there: list[Index] = [(i, *map(int, index)) for index in np.argwhere(row)]
             if not there:
                 continue
-            rows, whole = chunks.slices(there[0])[0], len(there) == len(row)
-            if whole and _row_size(array, rows) < BYTES_AT_ONCE and _can_be_read(array, (rows,)):
+            rows = chunks.slices(there[0])[0]
+            if row.all() and _row_size(array, rows) < BYTES_AT_ONCE and _can_be_read(array, (rows,)):
                 continue
             yield from ((name, index) for index in there if not _can_be_read(array, chunks.slices(index)))
 

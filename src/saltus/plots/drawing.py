@@ -1,0 +1,43 @@
+"""How a function that draws a dataset answers what it cannot draw: by the argument's name, in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from inspect import signature
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+from saltus.checks import check_number
+from saltus.errors import ParameterError, SaltusError, shown
+from saltus.plots.conventions import styled
+from saltus.public_functions import answered
+
+P = ParamSpec("P")
+R = TypeVar("R")
+NARROWEST, WIDEST = 10.0, 2000.0  # mm, of a picture: from a stamp to the widest poster
+
+
+def drawing(draw: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
+    """A decorator of what draws a dataset, in the conventions: arguments of a wrong kind are refused by their names.
+
+    Datasets are open to their users: of one that lacks something, or whose arrays do not fit one another, what NumPy and
+    Matplotlib say becomes a sentence.
+    """
+    name, drawn = next(iter(signature(draw).parameters)), styled(draw)
+
+    @answered
+    @wraps(draw)
+    def inside(dataset: Any, /, *given: P.args, **named: P.kwargs) -> R:
+        if not hasattr(dataset, "attrs") or not hasattr(dataset, "data_vars"):
+            raise ParameterError(f"{name} must be a Dataset or a DataTree, got {shown(dataset)}", name)
+        if named.get("width") is not None:
+            check_number("width", named["width"], at_least=NARROWEST, at_most=WIDEST, unit="mm")
+        try:
+            return drawn(dataset, *given, **named)
+        except (SaltusError, OSError, MemoryError):
+            raise
+        except Exception as error:
+            said = " ".join(f"{type(error).__name__}: {error}".split())
+            raise ParameterError(f"{name} cannot be drawn by {draw.__name__} ({said:.150})", name) from error
+
+    return inside
