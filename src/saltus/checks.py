@@ -39,6 +39,11 @@ class Limits:
         600  # Loops over Taylor coefficients in a model's equations: a minute of compiling; saltus's own have 92 at most.
     )
     nodes: int = 100_000  # Operations of any kind in them, which take a minute too.
+    lanes: float = 3.0  # So many times as long vector lanes of them are compiled; 2.7 were measured.
+    derivatives: float = (
+        0.25  # With its derivatives a system of as many operations, theirs included, takes this share of the time.
+    )
+    compiling: float = 5.0  # Minutes for lanes or derivatives: those of four cells need some of them.
     memory: float = 0.8  # The share of the free memory that one request may take: the rest keeps the machine usable.
 
 

@@ -1,28 +1,33 @@
 """Files that are complete or not there, and that notice when they are damaged.
 
 Every output is made in memory, written beside its place, brought to the disk and moved there. A netCDF file ends with a checksum
-of all its bytes, behind what HDF5 reads, so that it is checked before HDF5 opens it. A file without one, which another program
-wrote, is first read by a process of its own, as damage can stop HDF5 or keep it for ever.
+of all its bytes, behind what HDF5 reads, so that it is checked before HDF5 opens it. HDF5 reads in a process of its own: whoever
+makes a file can make its checksum too, and what is wrong in it can stop HDF5 or keep it for ever.
 """
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import hashlib
 import io
+import json
 import os
+import pickle
 import secrets
+import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import traceback
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, cast
 
 from saltus.checks import check_memory
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 
 PART = ".part"
 STALE = 60.0  # s; where there are no locks, what has not been touched for so long was left by a killed run
@@ -125,6 +130,29 @@ def lock(file: IO[bytes], shared: bool = False, wait: bool = False) -> bool | No
     return True
 
 
+# --- JSON ------------------------------------------------------------------------------------------------------------------
+
+
+def parsed_json(text: str | bytes) -> Any:
+    """What a JSON text says, without keys that are given twice, of which the last would hold in silence.
+
+    Raises
+    ------
+    ValueError
+        It is no JSON, or has such a key.
+    """
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for name, value in pairs:
+            if name in found:
+                raise ValueError(f"the key {shown(name)} is given twice")
+            found[name] = value
+        return found
+
+    return json.loads(text, object_pairs_hook=once)
+
+
 # --- reading ---------------------------------------------------------------------------------------------------------------
 
 
@@ -140,9 +168,7 @@ def read_dataset(path: Path | str) -> Any:
     """
     path = Path(path)
     content = checked_content(path)
-    if len(content) == path.stat().st_size and HDF5 in content:
-        _try_elsewhere(path, len(content))
-    return _in_memory(path, content)
+    return _read_elsewhere(path, content) if HDF5 in content else _in_memory(path, content)
 
 
 def _in_memory(path: Path, content: bytes) -> Any:
@@ -163,6 +189,8 @@ def _in_memory(path: Path, content: bytes) -> Any:
             traceback.clear_frames(error.__traceback__)
         said = next(iter(str(error).splitlines()), "") or type(error).__name__
         raise ParameterError(f"{path} is no netCDF file that can be read ({said:.80})") from error
+    for node in tree.subtree:
+        node.set_close(None)  # it is closed, and what it came from need not travel with it
     return tree if tree.children else tree.to_dataset()
 
 
@@ -188,16 +216,71 @@ def _check_links(path: Path, content: bytes) -> None:
                     attributes += len(found.attrs)
 
 
-def _try_elsewhere(path: Path, size: int) -> None:
-    """Refuse a file that stops the process which reads it, or keeps it for ever."""
-    script = "import sys; from saltus import files; path = files.Path(sys.argv[1]); files._in_memory(path, path.read_bytes())"
-    command = [sys.executable, "-c", script, str(path)]
-    try:
-        code = subprocess.run(command, capture_output=True, timeout=LONGEST_OPEN + size / SLOWEST_READ).returncode
-    except subprocess.TimeoutExpired:
-        raise ParameterError(f"{path} is damaged: HDF5 does not come to the end of it; compute it again") from None
-    if code not in (0, 1):  # 1: an error in words, which this process will meet too
-        raise ParameterError(f"{path} is damaged: it stops the process that reads it; compute it again")
+def _read_elsewhere(path: Path, content: bytes) -> Any:
+    """What `_in_memory` gives, read by a process of its own: bytes made to stop HDF5, or to keep it for ever, stop only that one.
+
+    It serves all files that this process reads, as it takes most of a second to begin.
+    """
+    with _reading:
+        reader = _readers.get(os.getpid())
+        if reader is None or reader.poll() is not None:
+            reader = _readers[os.getpid()] = _begun_reader()
+        late = threading.Timer(LONGEST_OPEN + len(content) / SLOWEST_READ, reader.kill)
+        late.daemon = True
+        late.start()
+        try:
+            pickle.dump((path, content), cast(IO[bytes], reader.stdin))
+            cast(IO[bytes], reader.stdin).flush()
+            answer = pickle.load(cast(IO[bytes], reader.stdout))
+        except (OSError, EOFError, pickle.UnpicklingError):
+            timed_out = late.finished.is_set()
+            what = "HDF5 does not come to the end of it" if timed_out else "it stops the process that reads it"
+            raise ParameterError(f"{path} is damaged: {what}; compute it again") from None
+        except BaseException:  # interrupted: its answer is no longer asked for
+            reader.kill()
+            raise
+        finally:
+            late.cancel()
+    if isinstance(answer, ParameterError):
+        raise answer
+    return answer
+
+
+_readers: dict[int, subprocess.Popen[bytes]] = {}  # by the process that reads: one that was forked has its own
+_reading = threading.Lock()
+
+
+def _begun_reader() -> subprocess.Popen[bytes]:
+    """A process that runs `serve_files` with what this one can import, and ends with it."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
+    command = [sys.executable, "-P", "-c", "from saltus.files import serve_files; serve_files()"]
+    pipe = subprocess.PIPE
+    reader = subprocess.Popen(command, env=environment, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL)
+    atexit.register(_end_reader, reader)
+    return reader
+
+
+def _end_reader(reader: subprocess.Popen[bytes]) -> None:
+    reader.kill()
+    reader.communicate()
+
+
+def serve_files() -> None:
+    """Read what comes in at the standard input, file after file, until it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process of a terminal; this one ends with the other
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a library prints is no answer
+    while True:
+        try:
+            path, content = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        try:
+            answer = _in_memory(path, content)
+        except ParameterError as error:
+            answer = ParameterError(str(error), error.parameter)
+        pickle.dump(answer, answers)
+        answers.flush()
 
 
 @contextlib.contextmanager

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError
+from saltus.files import parsed_json
 
 if TYPE_CHECKING:
     from saltus.systems import System
@@ -62,7 +63,7 @@ def _differences(attributes: Mapping[str, Any], system: System) -> Iterator[str]
         yield f"it is by {by}, whose results are of version {version if version is not None else 1}, and here of {RESULT_VERSION}"
         return
     try:
-        there = dict(json.loads(attributes["equations"]))
+        there = dict(parsed_json(attributes["equations"]))
     except (KeyError, TypeError, ValueError):
         yield f"it does not say of which equations of {name} it is"
         return

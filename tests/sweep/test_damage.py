@@ -138,6 +138,15 @@ def test_a_forged_plan_is_refused(store, change):
         status(store)
 
 
+def test_a_key_that_is_given_twice_is_no_plan(waves_plan, tmp_path):
+    """Of two plans the last would hold, and a reader that takes the first one sees another."""
+    run(waves_plan(), tmp_path / "s")
+    metadata = tmp_path / "s" / "zarr.json"
+    metadata.write_text(metadata.read_text().replace('"zarr_format": 3,', '"zarr_format": 3,\n"zarr_format": 3,', 1))
+    with pytest.raises(ParameterError, match=r"zarr.json cannot be read \(the key 'zarr_format' is given twice\)"):
+        status(tmp_path / "s")
+
+
 @pytest.mark.parametrize("text", ["5", "{", "[5]", '[{"index": "a"}]', "[" * 100_000, '[{"index": [1], "place": "[bold"}]'])
 def test_a_damaged_list_of_failures_loses_nothing(store, text):
     (store / files.FAILURES).write_text(text)

@@ -103,7 +103,7 @@ def test_of_many_chunks_the_folders_tell_the_same_as_the_files(waves_plan, tmp_p
     files.chunk_file(tmp_path / "s", "height", (3, 0), 0).unlink()
     asked = status(tmp_path / "s")
     assert not asked.estimated
-    monkeypatch.setattr(files, "ASKED", 2)
+    monkeypatch.setattr(files, "ASKED_ONE_BY_ONE", 2)
     told = status(tmp_path / "s")
     assert told.estimated
     assert (told.done, told.total) == (asked.done, asked.total) == (6, 8)

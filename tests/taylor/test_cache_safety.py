@@ -4,9 +4,11 @@ import hashlib
 import os
 import pickle
 import random
+import stat
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -63,6 +65,35 @@ def test_a_new_folder_is_the_user_s_alone(home, umask):
     finally:
         os.umask(before)
         del sys.modules[cache.module_name("safety", SOURCE)]
+
+
+GROUPS = {100: ("users", []), 1000: ("me", []), 1001: ("me", ["me", "you"]), 0: ("root", [])}
+
+
+@pytest.mark.parametrize(
+    ("owner", "group", "mode", "others_can"),
+    [
+        *((owner, 100, 0o755, False) for owner in (0, 1000, cache.NOBODY)),
+        (1001, 1001, 0o700, True),  # another user's
+        (1000, 1000, 0o775, False),  # as where each user has a group of his own
+        (0, 0, 0o775, False),
+        (1000, 100, 0o775, True),
+        (1000, 1001, 0o775, True),
+        (1000, 77, 0o775, True),  # a group without a name
+        (0, 0, 0o777, True),
+        (0, 0, 0o1777, False),  # a temporary directory
+    ],
+)
+def test_a_folder_above_in_which_others_can_rename_is_known(monkeypatch, owner, group, mode, others_can):
+    import grp
+    import pwd
+
+    groups = {number: SimpleNamespace(gr_name=name, gr_mem=members) for number, (name, members) in GROUPS.items()}
+    monkeypatch.setattr(os, "getuid", lambda: 1000)
+    monkeypatch.setattr(pwd, "getpwuid", {1000: SimpleNamespace(pw_name="me")}.__getitem__)
+    monkeypatch.setattr(grp, "getgrgid", groups.__getitem__)
+    found = SimpleNamespace(st_uid=owner, st_gid=group, st_mode=stat.S_IFDIR | mode)
+    assert cache._replaceable(found) is others_can
 
 
 def link(path):

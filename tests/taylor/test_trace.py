@@ -1,17 +1,18 @@
 """Tracing a model: what is folded and shared, what is refused and how, and that numbers are never part of a structure."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
+from saltus.checks import LIMITS
 from saltus.errors import ParameterError, TraceError
 from saltus.systems import Harmonic, Load, Metainterface, Model, Record, System, VelocityReduction, WallOscillator
 from saltus.taylor import structure_key
 from saltus.taylor.graph import FRICTION, Expr, combine, differentiate, number, ordered, power, substitute
-from saltus.taylor.tracing import trace
+from saltus.taylor.tracing import check_size, trace
 
 X, V, T, SIDE = Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("time"), Expr("side")
 ALLOWED = (
@@ -19,7 +20,7 @@ ALLOWED = (
 )
 
 
-def traced(formula, load=None, **more):
+def traced(formula, load=None, sensitivities=None, **more):
     """Trace x'' = formula(t, x, v, side, load) in a model with the given attributes."""
 
     def acceleration(self, t, x, velocity, side, load):
@@ -27,7 +28,7 @@ def traced(formula, load=None, **more):
 
     attributes = {"coordinates": ("x",), "channels": ("force",), "sides": (), "acceleration": acceleration, **more}
     model = type("Small", (Model,), attributes)()
-    return trace(System(model=model, load=load or Load(force=1.0)))
+    return trace(System(model=model, load=load or Load(force=1.0)), sensitivities=sensitivities)
 
 
 # --- the graph -----------------------------------------------------------------------------------------------------------
@@ -252,6 +253,23 @@ def test_equations_that_would_be_compiled_for_minutes_are_refused_with_the_estim
     with pytest.raises(TraceError, match=sentence):
         traced(formula)
     traced(nested(600))
+
+
+def test_derivatives_that_would_be_compiled_for_minutes_are_refused_with_the_estimate(monkeypatch):
+    """The columns of sin(sin(... x)) share one chain of products of cosines: three loops for each sine, and one more."""
+    monkeypatch.setattr("saltus.taylor.tracing.LIMITS", replace(LIMITS, compiling=2.0))
+    sentence = "Small with 2 columns of derivatives .* 1801 of them .* about 2.3 minutes to compile; what takes more than 2 is"
+    with pytest.raises(TraceError, match=sentence):
+        traced(nested(600), sensitivities=())
+    traced(nested(500), sensitivities=())
+
+
+def test_lanes_take_three_times_as_long_to_compile(monkeypatch):
+    monkeypatch.setattr("saltus.taylor.tracing.LIMITS", replace(LIMITS, compiling=2.0))
+    small, large = traced(nested(400)), traced(nested(600))
+    check_size(small, lanes=True)
+    with pytest.raises(TraceError, match="about 3 minutes to compile for an ensemble; what takes more than 2 is refused"):
+        check_size(large, lanes=True)
 
 
 def test_misspelt_channel_is_refused_with_the_near_ones():

@@ -3,6 +3,28 @@
 Only typer and rich are imported before a command runs, so that help is immediate.
 """
 
-from saltus.cli.app import main
+import os
+import signal
+from typing import Any
+
+from saltus.cli.interrupt import INTERRUPTED, INTERRUPTION
 
 __all__ = ["main"]
+
+
+def main() -> None:
+    """The entry point of the command `saltus`.
+
+    An interruption that falls outside a command, as while modules are loaded or options are read, ends the process at once, with
+    the sentence and the status of one within: there is nothing to clean up, and typer would say nothing.
+    """
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _end)
+    from saltus.cli.app import begin
+
+    begin()
+
+
+def _end(*_: Any) -> None:
+    os.write(2, f"saltus: {INTERRUPTION}\n".encode())
+    os._exit(INTERRUPTED)

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from saltus.cli.guard import INTERRUPTED, INTERRUPTION, guarded
+from saltus.cli.guard import guarded
 
 app = typer.Typer(
     rich_markup_mode="rich",
@@ -245,15 +245,11 @@ def report(
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def main() -> None:
-    """The entry point of the command `saltus`; what a terminal's encoding lacks is written as an escape."""
+def begin() -> None:
+    """Run the command that stands in `sys.argv`; what a terminal's encoding lacks is written as an escape."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
-    try:
-        app()
-    except KeyboardInterrupt:  # outside any command, such as while importing one
-        print(f"saltus: {INTERRUPTION}", file=sys.stderr)
-        sys.exit(INTERRUPTED)
+    app()

@@ -5,28 +5,36 @@ from __future__ import annotations
 import math
 import os
 import platform
+import tempfile
 from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from saltus.cli.fact_blocks import Block, Row, block_table
 from saltus.cli.guard import BAD_INPUT, stop
+from saltus.errors import ParameterError
+
+if TYPE_CHECKING:
+    import numpy as np
 
 PERIODS = 10  # of the trial motion: fifteen impacts, which would show a wrong root or a wrong impact law
 LARGEST_ERROR = 1e-12  # of the trial motion at tol = 1e-14; rounding alone gives some 1e-15 for each impact
 MEBIBYTE = 2.0**20
+DOCUMENTED = (0.22733602, 0.31675834, 0.79736546)  # of default_rng(12345).random(3) in NumPy's documentation of its generators
 
 
 def print_doctor() -> None:
-    """Print the machine, the cache and the versions, then try a motion with a closed form, alone and in lanes.
+    """Print the machine, the cache and the versions, try what saltus takes for granted of other packages, then a motion with a
+    closed form, alone and in lanes.
 
     What is wrong ends the command with one sentence, after all of it is printed.
     """
     console = Console(highlight=False)
     wrong: list[str] = []
-    for block in (_machine(), _cache(wrong), _versions(wrong), _trial(console, wrong)):
+    for block in (_machine(), _cache(wrong), _versions(wrong), _leaned_on(wrong), _trial(console, wrong)):
         console.print(f"\n{block.title}", style="bold", markup=False)
         console.print(block_table(block))
     if wrong:
@@ -101,6 +109,74 @@ def _requirements(wrong: list[str]) -> Iterator[tuple[str, str, str, str]]:
             wrong.append(f"{need.name} {there or 'is missing:'} {'is not allowed:' if there else ''} saltus needs {need}")
         remark = "for clusters: pip install saltus[cluster]" if extra and not there else "" if fits else "not allowed"
         yield need.name, there or "no", str(need.specifier), remark
+
+
+def _leaned_on(wrong: list[str]) -> Block:
+    """What other packages do for saltus whose loss would be seen nowhere else, as no error comes of it."""
+    trials = {
+        "public functions (lazy_loader)": (_answers, "arguments of a wrong kind are not refused"),
+        "netCDF files (xarray, h5netcdf, h5py)": (_comes_back, "a dataset does not come back from its file as it was"),
+        "stores (Zarr, numcodecs)": (_notices, "a flipped bit in a chunk is not noticed"),
+        "random numbers (NumPy)": (_repeats, "a seed gives other random numbers than in NumPy's documentation"),
+    }
+    rows: list[Row] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for what, (sound, loss) in trials.items():
+            holds = sound(Path(folder))
+            rows.append((what, "as saltus needs them" if holds else loss))
+            wrong += [] if holds else [f"{what}: {loss}"]
+    return Block("Other packages", rows)
+
+
+def _answers(_: Path) -> bool:
+    import saltus
+
+    try:
+        saltus.theory.final_time(period="5", e=0.9)  # type: ignore[arg-type]
+    except ParameterError as error:
+        return error.parameter == "period"
+    except Exception:
+        return False
+    return False
+
+
+def _comes_back(folder: Path) -> bool:
+    import xarray
+
+    from saltus.files import read_dataset, write_dataset
+
+    values = {"number": ("x", [1.5, math.nan]), "text": ("x", ["a", "beta"]), "whole": ("x", [1, -1])}
+    data = xarray.Dataset(values, coords={"x": [0.0, 1.0]}, attrs={"kind": "trial", "list": [1, 2]})
+    tree = xarray.DataTree.from_dict({"/": xarray.Dataset(attrs={"kind": "tree"}), "/part": data})
+    first = write_dataset(folder / "first.nc", tree).read_bytes()
+    again = write_dataset(folder / "again.nc", tree).read_bytes()
+    return first == again and bool(read_dataset(folder / "first.nc").identical(tree))
+
+
+def _notices(folder: Path) -> bool:
+    import numpy as np
+
+    from saltus.sweep import Plan, Variable, run, status
+
+    store, axes = folder / "trial.zarr", {"x": np.arange(4.0)}
+    run(Plan(function=f"{__name__}:trial_chunk", axes=axes, chunk={"x": 2}, variables={"y": Variable()}), store)
+    sound = not status(store, verify=True).damaged
+    chunk = store / "y" / "c" / "1"
+    content = bytearray(chunk.read_bytes())
+    content[len(content) // 2] ^= 1
+    chunk.write_bytes(content)
+    return sound and bool(status(store, verify=True).damaged)
+
+
+def trial_chunk(_: Any, block: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """What the trial of a store computes."""
+    return {"y": block["x"] ** 2}
+
+
+def _repeats(_: Path) -> bool:
+    import numpy as np
+
+    return bool(np.allclose(np.random.default_rng(12345).random(3), DOCUMENTED, rtol=0.0, atol=1e-8))
 
 
 def _trial(console: Console, wrong: list[str]) -> Block:

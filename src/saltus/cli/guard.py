@@ -9,13 +9,11 @@ from typing import NoReturn
 
 import typer
 
-from saltus.cli.interrupt import interruptible
+from saltus.cli.interrupt import INTERRUPTED, INTERRUPTION, interruptible
 from saltus.errors import SaltusError
 
 BAD_INPUT = 2
 LONGEST = 380  # characters of a sentence
-INTERRUPTED = 130  # 128 + SIGINT, as shells have it
-INTERRUPTION = "interrupted; no file was left half-written"
 
 
 @contextmanager

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
+INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+INTERRUPTION = "interrupted; no file was left half-written"
 REMINDER_AFTER = 1.0  # s; ample for the clean-up after an interrupt, and then the next one is due
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import saltus
-from saltus.files import write_text
+from saltus.files import parsed_json, write_text
 from saltus.paper.claims.claim import Claim
 from saltus.paper.claims.claim_tables import claim_tables
 from saltus.paper.figures.figure import PaperFigure
@@ -112,7 +112,7 @@ def intact(figure: PaperFigure, folder: Path) -> bool:
 def read(figure: PaperFigure, folder: Path) -> dict[str, Any] | None:
     """The record that `write` left, or None where there is none that can be read."""
     try:
-        record = json.loads((folder / FOLDER / f"{figure.name}.json").read_text(encoding="utf-8"))
+        record = parsed_json((folder / FOLDER / f"{figure.name}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return record if isinstance(record, dict) else None

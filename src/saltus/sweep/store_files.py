@@ -16,13 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
-from saltus.files import PART, STALE, lock, write_durably
+from saltus.files import PART, STALE, lock, parsed_json, write_durably
 from saltus.sweep.chunk_grid import Index
 
 METADATA = "zarr.json"
 FAILURES = ".failures.json"
 CHECKSUMS = ".checksums.json"  # of the files that are written once, when the store is made: all but the chunks
-ASKED = 100_000  # chunks of a variable of which the system is asked one by one
+ASKED_ONE_BY_ONE = 100_000  # chunks of a variable of which the system is asked one by one
 LOCK_PATIENCE = 1.0  # s to wait for a lock: a process that only looks whether there is one holds it for a moment
 
 
@@ -53,7 +53,7 @@ def checksums(root: Path) -> dict[str, str]:
     """
     if not (root / CHECKSUMS).is_file():  # a pipe may have no end
         raise FileNotFoundError
-    known = json.loads((root / CHECKSUMS).read_bytes())
+    known = parsed_json((root / CHECKSUMS).read_bytes())
     if not isinstance(known, dict) or METADATA not in known or not all(isinstance(text, str) for text in known.values()):
         raise ValueError
     return known
@@ -102,8 +102,8 @@ class Found:
 def chunks_of(root: Path, variable: str, grid: tuple[int, ...], extra: int) -> Found:
     """The chunks of a variable with `extra` dimensions beside the grid's axes that have a file in the store at `root`.
 
-    Of more than `ASKED` chunks only their folders are read, in a sixth of the time: the size is then that of the first ones times
-    their number, and a folder tells when its last file was written.
+    Of more than `ASKED_ONE_BY_ONE` chunks only their folders are read, in a sixth of the time: the size is then that of the
+    first ones times their number, and a folder tells when its last file was written.
     """
     found, inner, further = Found(np.zeros(grid, dtype=bool)), "/0" * extra, 0
     names = [{str(i): i for i in range(n)} for n in grid]
@@ -118,7 +118,7 @@ def chunks_of(root: Path, variable: str, grid: tuple[int, ...], extra: int) -> F
                     continue
                 if there.ndim > 1:
                     look(entry.path, there[place])
-                elif inner or found.count < ASKED:
+                elif inner or found.count < ASKED_ONE_BY_ONE:
                     there[place] = found.add(entry.path + inner)
                 elif entry.is_file():
                     there[place] = True

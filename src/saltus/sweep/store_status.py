@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
+from saltus.files import parsed_json
 from saltus.public_functions import answered
 from saltus.sweep import store_files as files
 from saltus.sweep.chunk_grid import MOST_CHUNKS, NAME, ChunkGrid, Index
@@ -87,7 +87,7 @@ class StoreStatus:
     @property
     def estimated(self) -> bool:
         """Whether `bytes` is an estimate, as not every file was asked for its size."""
-        return self.total > files.ASKED
+        return self.total > files.ASKED_ONE_BY_ONE
 
     @property
     def complete(self) -> bool:
@@ -187,11 +187,11 @@ def read_plan(path: Path) -> dict[str, Any]:
         raise ParameterError(f"{path} is not a store: it has no {files.METADATA}", "path")
     damaged = [name for name in (files.METADATA, files.CHECKSUMS) if name in files.damaged_files(path)]
     try:
-        group = json.loads(metadata.read_bytes())
+        group = parsed_json(metadata.read_bytes())
     except (OSError, RecursionError, ValueError) as error:
         raise ParameterError(f"{metadata} cannot be read ({error!s:.80})", "path") from error
     try:
-        plan = json.loads(group["attributes"]["plan"])
+        plan = parsed_json(group["attributes"]["plan"])
         plan = {key: plan[key] for key in ("function", "arguments", "order", "axes", "chunk", "variables", "attrs")}
         chunks = grid_of(plan)
     except (RecursionError, KeyError, TypeError, ValueError, AttributeError):
@@ -231,7 +231,7 @@ def _failures(path: Path) -> tuple[Failure, ...]:
     if not (path / files.FAILURES).is_file():  # a pipe may have no end
         return ()
     try:
-        entries = json.loads((path / files.FAILURES).read_text(encoding="utf-8"))
+        entries = parsed_json((path / files.FAILURES).read_text(encoding="utf-8"))
         failures = [Failure(tuple(map(int, e["index"])), str(e["place"]), str(e["error"]), int(e["attempts"])) for e in entries]
     except (OSError, RecursionError, KeyError, TypeError, ValueError):  # a damaged list loses no result
         return ()

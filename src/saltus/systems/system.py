@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from saltus.errors import ParameterError, near, shown
+from saltus.files import parsed_json
 from saltus.notebook import html_table
 from saltus.public_functions import answering
 from saltus.systems.contact import check_contacts
@@ -184,7 +185,7 @@ class System:
         ParameterError
             Text that is no JSON, or no system.
         """
-        return cls.from_dict(_parsed(text, _json, "JSON"))
+        return cls.from_dict(_parsed(text, parsed_json, "JSON"))
 
     def to_toml(self) -> str:
         """The system as TOML."""
@@ -244,20 +245,6 @@ def _of(model: Model, values: list[Any]) -> Any:
 
 def _each(value: Any) -> list[Any]:
     return list(value) if isinstance(value, (tuple, list)) else [value]
-
-
-def _json(text: str) -> Any:
-    """What a JSON text says, without keys that are given twice, of which the last would hold in silence."""
-
-    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found: dict[str, Any] = {}
-        for name, value in pairs:
-            if name in found:
-                raise ValueError(f"the key {shown(name)} is given twice")
-            found[name] = value
-        return found
-
-    return json.loads(text, object_pairs_hook=once)
 
 
 def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:

@@ -37,7 +37,7 @@ from .rules import FUNCTIONS
 from .series import Rows
 from .system_structure import structure_key
 from .tapes import shared_constants, tape
-from .tracing import Trace, trace
+from .tracing import Trace, check_size, trace
 from .vectors import CACHE_LINE, WIDTH
 
 __all__ = [
@@ -59,6 +59,7 @@ __all__ = [
     "anchor",
     "bits",
     "cache_directory",
+    "check_size",
     "compiled_part",
     "constant",
     "constant_value",

@@ -29,6 +29,7 @@ from types import ModuleType
 from saltus.files import lock
 from saltus.taylor import private_numba
 
+NOBODY = 65534  # to whom a container gives what belongs to the superuser outside of it
 MARKER = "# --- compiled from here on"
 log = logging.getLogger("saltus.cache")
 _loading = threading.RLock()  # A module is in `sys.modules` while it is still being executed: other threads wait for it.
@@ -68,7 +69,7 @@ def _problem(folder: Path) -> str | None:
     """Why a folder is not one to keep code in, or None; it is made as needed."""
     try:
         folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if any(_open_to_all(above.stat()) for above in folder.resolve().parents):
+        if any(_replaceable(above.stat()) for above in folder.resolve().parents):
             return "other users may put another folder in its place"
         for part in (folder, folder / "__pycache__"):  # the second is numba's, which would let the user's group write to it
             with contextlib.suppress(FileExistsError):
@@ -81,9 +82,26 @@ def _problem(folder: Path) -> str | None:
     return None if os.access(folder, os.W_OK) else "it cannot be written to"
 
 
-def _open_to_all(found: os.stat_result) -> bool:
-    """Whether everybody may rename what is in a folder, as they may not in a temporary directory."""
-    return hasattr(os, "getuid") and bool(found.st_mode & stat.S_IWOTH) and not found.st_mode & stat.S_ISVTX
+def _replaceable(found: os.stat_result) -> bool:
+    """Whether others may rename what is in a folder: who owns it, and who may write to it unless it is a temporary directory."""
+    if not hasattr(os, "getuid"):
+        return False
+    if found.st_uid not in (0, os.getuid(), NOBODY):
+        return True
+    by_group = found.st_mode & stat.S_IWGRP and not _is_own_group(found.st_gid)
+    return bool(found.st_mode & stat.S_IWOTH or by_group) and not found.st_mode & stat.S_ISVTX
+
+
+def _is_own_group(number: int) -> bool:
+    """Whether a group is of nobody but the user, of whose name it is, or of the superuser."""
+    import grp
+    import pwd
+
+    try:
+        group, name = grp.getgrgid(number), pwd.getpwuid(os.getuid()).pw_name
+    except KeyError:  # it has no name, nor is it known who is in it
+        return False
+    return (number == 0 or group.gr_name == name) and set(group.gr_mem) <= {name}
 
 
 def _shared(found: os.stat_result) -> str | None:

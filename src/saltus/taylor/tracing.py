@@ -93,6 +93,7 @@ class Trace:
     With `columns` of a tangent (`derivatives.py`) `acceleration` goes on after the model's own `dof` with those of the columns.
     """
 
+    model: str = ""  # its name
     parameters: list[str] = field(default_factory=list)
     dof: int = 1  # of the model
     columns: int = 0
@@ -134,7 +135,7 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
         A margin that the model does not have; a path to no number.
     """
     paths = None if sensitivities is None else tangent.check_paths(system, sensitivities)
-    result = Trace(sides=len(system.model.sides), dof=len(system.model.coordinates))
+    result = Trace(model=type(system.model).__name__, sides=len(system.model.sides), dof=len(system.model.coordinates))
     twin = substitute_numbers(system, result.symbol)
     _name_records(twin.load)
     object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
@@ -153,9 +154,10 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
     if model.sides:
         _trace_contact(result, twin, t, coordinates, velocities, side)
     _trace_margins(result, twin, t, q, v, side, stop_at)
-    _check(result, type(system.model).__name__)
+    _check(result)
     if paths is not None:
         tangent.extend(result, paths)
+        check_size(result)
     return result
 
 
@@ -252,31 +254,41 @@ def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: 
         result.margins[name] = combine("add", margins[name], 0.0)
 
 
-def _check(result: Trace, model: str) -> None:
+def _check(result: Trace) -> None:
     """Refuse comparisons in what is expanded in series, and a gap that depends on more than the coordinate."""
     expanded = [*result.acceleration, *result.reactions, *result.margins.values()]
     if result.gap is not None:
         expanded += [result.gap]
-    _check_size(expanded, model)
+    check_size(result)
     for node in ordered(expanded):
         if node.op in POINTWISE:
-            where = f"{model} uses {node.op} in an acceleration, a gap or a margin"
+            where = f"{result.model} uses {node.op} in an acceleration, a gap or a margin"
             raise TraceError(f"{where}; {FRICTION if uses_velocity(*node.args) else 'only an impact law may compare'}")
     if result.gap is not None:
         for node in ordered([result.gap]):
             if node.op in ("time", "record", "velocity"):
-                raise TraceError(f"{model}.gap may depend on the coordinate, the side and the parameters only")
+                raise TraceError(f"{result.model}.gap may depend on the coordinate, the side and the parameters only")
     _check_abs(result, expanded)
 
 
-def _check_size(expanded: list[Expr], model: str) -> None:
-    """Refuse equations that would be compiled for minutes or hours: the time grows as the square of the number of loops."""
+def check_size(traced: Trace, lanes: bool = False) -> None:
+    """Refuse equations that would be compiled for minutes or hours: the time grows as the square of the number of loops.
+
+    Raises
+    ------
+    TraceError
+        With the estimate for one motion, for its derivatives if they are traced, or for vector `lanes`.
+    """
+    expanded = [*traced.acceleration, *traced.reactions, *traced.margins.values(), *([] if traced.gap is None else [traced.gap])]
     loops, nodes = loop_count(expanded), len(ordered(expanded))
-    if loops > LIMITS.operations or nodes > LIMITS.nodes:
-        minutes = max(loops / LIMITS.operations, nodes / LIMITS.nodes) ** 2
+    minutes = max(loops / LIMITS.operations, nodes / LIMITS.nodes) ** 2
+    minutes *= (LIMITS.derivatives if traced.columns else 1.0) * (LIMITS.lanes if lanes else 1.0)
+    most = LIMITS.compiling if traced.columns or lanes else 1.0
+    if minutes > most:
+        what = f"{traced.model} with {traced.columns} columns of derivatives" if traced.columns else traced.model
         raise TraceError(
-            f"the equations of {model} have {nodes} operations, {loops} of them functions, products and quotients, which would "
-            f"take about {minutes:.2g} minutes to compile; {LIMITS.nodes} and {LIMITS.operations} are the most"
+            f"the equations of {what} have {nodes} operations, {loops} of them functions, products and quotients, which would "
+            f"take about {minutes:.2g} minutes to compile{' for an ensemble' * lanes}; what takes more than {most:g} is refused"
         )
 
 

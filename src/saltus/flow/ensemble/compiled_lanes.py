@@ -36,6 +36,7 @@ from saltus.flow.ensemble import (
 from saltus.flow.ensemble.lane_functions import Slots, lane_functions_text, slots_of
 from saltus.taylor import (
     Trace,
+    check_size,
     compiled_part,
     digest,
     entry_point,
@@ -116,7 +117,14 @@ def load_helpers(several: bool = False) -> tuple[Any, ...]:
 
 
 def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
-    """A structure's memory and its functions for lanes."""
+    """A structure's memory and its functions for lanes.
+
+    Raises
+    ------
+    TraceError
+        They would be compiled for minutes.
+    """
+    check_size(trace, lanes=True)
     module = load_module("lane", generated_header(_SIGNATURES) + lane_functions_text(trace))
     names = ("series", "impact", "field", "one_free")[: 4 if trace.signs else 3]
     return slots_of(trace), tuple(pointer(getattr(module, f"lane_{name}")) for name in names)
