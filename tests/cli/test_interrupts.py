@@ -3,6 +3,8 @@
 import ctypes
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 
@@ -71,3 +73,18 @@ def test_a_process_that_ignores_interrupts_goes_on():
     with interruptible():
         os.kill(os.getpid(), signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+
+
+def test_an_interrupt_outside_any_command_says_the_same():
+    """As while modules are loaded, where an interrupt may become another error, or in typer, which ends without a word."""
+    script = (
+        "import os, signal, sys, saltus.cli\n"
+        "import saltus.cli.app as app\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "app.begin = lambda: os.kill(os.getpid(), signal.SIGINT)\n"
+        "saltus.cli.main()\n"
+        "print('went on')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr == "saltus: interrupted; no file was left half-written\n"

@@ -1,5 +1,6 @@
 """The promise: whatever kills a run, and whenever, the same command again ends with the same bytes in every file."""
 
+import contextlib
 import math
 import os
 import random
@@ -60,6 +61,7 @@ STUDIES = {
     'paths = ["load.force.amplitude", "load.frequency"]\nstarts = 2\nperiods = 60\nrows = 1\n',
     "own basins": "[basins]\nx = { from = -1, to = 1, count = 16 }\nvelocity = { from = -1, to = 1, count = 16 }\nrows = 2\n",
 }
+INTERRUPTS = 8  # of each kind of study
 NO_LOAD = SYSTEM.replace("frequency = 1.0\nhorizontal = { amplitude = 0.5 }\n", "")  # a phase portrait is of a constant load
 
 
@@ -106,6 +108,30 @@ def test_killed_at_random_moments_a_study_ends_with_the_same_bytes(kind, tmp_pat
             process.send_signal(signal.SIGKILL)
             struck += process.wait() == -signal.SIGKILL
         assert finished(folder, kind)[1] == whole
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("kind", ["motion", "spectrum", "chart", "basins"])
+def test_interrupted_at_random_moments_a_study_says_so_and_ends_with_the_same_bytes(kind, tmp_path):
+    """Ctrl-C reaches every process of a terminal: one sentence, status 130, no half file; or it came too late."""
+    rng, struck = random.Random(kind), 0
+    for name in ("first", "whole"):
+        (tmp_path / name).mkdir()
+        seconds, whole = finished(tmp_path / name, kind)
+    for case in range(INTERRUPTS):
+        folder = tmp_path / f"{case}"
+        folder.mkdir()
+        process = subprocess.Popen(command(folder, kind), stderr=subprocess.PIPE, text=True, start_new_session=True)
+        time.sleep(0.15 + rng.uniform(0.0, 1.0) * seconds)  # before, Python itself may not have begun
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGINT)
+        said = process.communicate(timeout=60)[1]
+        assert process.returncode in (0, 130, -signal.SIGINT), said  # the last while Python itself ends, when all is written
+        assert "Traceback" not in said
+        assert process.returncode != 130 or len([line for line in said.splitlines() if line.startswith("saltus: ")]) == 1, said
+        struck += process.returncode == 130
+        assert finished(folder, kind)[1] == whole
+    assert struck
 
 
 @pytest.mark.thorough
