@@ -32,6 +32,9 @@ class Result:
         """A table of the dataset, see `table_of`."""
         return table_of(self.to_xarray())
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={value}' for name, value in self._facts().items())})"
+
     def _repr_html_(self) -> str:
         return html_table(type(self).__name__, self._facts())
 

@@ -253,3 +253,11 @@ def test_every_argument_of_what_draws_answers_every_kind_of_value(results):
             draw(data, **{[*inspect.signature(draw).parameters][-1] + "_": 1})
         assert misspelt.value.parameter.endswith("_")
     assert not wrong, "\n".join(f"{name}({parameter}={value!r:.30}) {what:.200}" for name, parameter, value, what in wrong)
+
+
+def test_a_diagram_made_in_python_says_of_what_kind_it_is_and_a_curve_shows_no_raw_arrays(results):
+    assert results("saltus.response_spectrum").attrs["kind"] == "response_spectrum"
+    assert results("saltus.bifurcation_diagram").attrs["kind"] == "bifurcation_diagram"
+    first = results("saltus.separatrices")[0]
+    assert "array(" not in repr(first)
+    assert f"saddle={first.saddle}" in repr(first)

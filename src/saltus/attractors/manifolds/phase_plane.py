@@ -44,7 +44,7 @@ class SeparatrixEnd(StrEnum):
     SPAN = "span"  # the time asked for is over
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Separatrix(Result):
     """A branch of the stable manifold of a saddle, followed back in time from it; nan where an impact makes the velocity jump.
 

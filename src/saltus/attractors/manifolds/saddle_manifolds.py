@@ -57,7 +57,7 @@ class ManifoldBranch:
     end: GrowthEnd  # why it does not go on
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Manifold(Result):
     """The stable or unstable manifold of a saddle orbit.
 

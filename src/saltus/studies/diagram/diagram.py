@@ -149,7 +149,7 @@ def bifurcation_diagram(
         branches = BranchSet(work, (low, high), max_period, step, switch, tried.branches)
         search = DiagramSearch(work, (low, high), grid, area, seed, tried, branches)
         _search(search, repelling, bands, values is None, progress)
-        tree = diagram_tree(search, effort=str(read_effort(effort)), max_period=max_period)
+        tree = diagram_tree(search, kind="bifurcation_diagram", effort=str(read_effort(effort)), max_period=max_period)
     progress(1.0, "done")
     return tree
 
@@ -208,7 +208,7 @@ def response_spectrum(
     >>> first.special_parameter.values[first.kind.values == "LP"].round(6)
     array([0.908811, 0.848485])
     """
-    return bifurcation_diagram(
+    tree = bifurcation_diagram(
         system,
         path,
         bounds,
@@ -227,6 +227,8 @@ def response_spectrum(
         scheduler=scheduler,
         progress=progress,
     )
+    tree.attrs["kind"] = "response_spectrum"
+    return tree
 
 
 def _values(bounds: tuple[float, float], values: Iterable[float] | None, count: int) -> np.ndarray:
