@@ -238,7 +238,7 @@ class Record(Signal):
             base = PPoly(spline.c, spline.x)
         else:
             slope = np.diff(self.value) / np.diff(self.time)
-            base = PPoly(np.vstack([slope, self.value[:-1]]), self.time)
+            base = PPoly(np.vstack([slope, self.value[:-1]]), self.time.copy())  # older SciPy needs times that can be written
         if self.quantity == "acceleration":
             return base.antiderivative(2), base.antiderivative(1), base
         if self.quantity == "velocity":
