@@ -158,6 +158,16 @@ def test_bad_calls(nothing_is_computed, tmp_path, monkeypatch, count, piece):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_name_that_no_file_can_have_is_refused(tmp_path):
+    """One case in some 2500 calls, of which a run that is not thorough met none."""
+    long = "é" * 300
+    for read in (saltus.load, saltus.load_study, saltus.sweep.status, saltus.sweep.open_store):
+        assert answer(0, read, long) is not None
+    assert answer(0, saltus.sweep.remove_store, long) is None  # there is none
+    system = System.from_dict({name: bad_inputs.STUDY[name] for name in ("model", "load")})
+    assert answer(0, saltus.stability_chart, system, store=tmp_path / long) is not None
+
+
 def test_a_long_sentence_is_shortened():
     from saltus.cli.guard import shortened
 

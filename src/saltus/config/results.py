@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,7 +49,7 @@ def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
     True
     """
     path = Path(path)
-    if not path.exists():
+    if not os.path.exists(path):  # which a name that is too long is not, either
         raise ParameterError(f"there is no file or folder {path}; give a .nc, .zarr, .toml or .json that saltus can read", "path")
     if path.is_dir() or path.suffix not in (".toml", ".json"):
         try:
@@ -77,7 +78,7 @@ def open_result(path: Path) -> Any:
     """
     from saltus.files import read_dataset
 
-    if not path.exists():
+    if not os.path.exists(path):  # which a name that is too long is not, either
         raise ParameterError(f"there is no file or folder {path}; give the .nc or .zarr that `saltus run` has written", "path")
     return _open_store(path) if path.is_dir() else read_dataset(path)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
+import os
 import shutil
 import tempfile
 import warnings
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, SweepError
+from saltus.errors import ParameterError, SweepError, shown
 from saltus.files import write_durably
 from saltus.public_functions import answered
 from saltus.sweep import store_files as files
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     import xarray
 
 
+LONGEST_NAME_OF_A_FILE = 200  # bytes: file systems take 255, and what is half-written has a longer name
 BEGIN_ANEW = "name another store, or remove this one to begin anew (`saltus run --fresh`)"
 
 log = logging.getLogger("saltus.sweep")
@@ -145,8 +147,8 @@ def check_store(plan: Plan, path: Path) -> None:
     ParameterError
         With what is there, or what is damaged so that it cannot be told whose store it is.
     """
-    if not path.name:
-        raise ParameterError(f"store must name a folder, such as 'chart.zarr', got {str(path)!r}", "store")
+    if not 0 < len(os.fsencode(path.name)) <= LONGEST_NAME_OF_A_FILE:
+        raise ParameterError(f"store must name a folder, such as 'chart.zarr', got {shown(str(path))}", "store")
     if (path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file():
         if files.damaged_files(path):
             _restorable(plan, path)
@@ -184,7 +186,7 @@ def remove_store(path: Path | str) -> None:
     >>> saltus.sweep.remove_store("nowhere.zarr")
     """
     path = Path(path)
-    if not path.exists():
+    if not os.path.exists(path):  # which a name that is too long is not, either
         return
     if not ((path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file()):
         raise ParameterError(f"{path} is no store, so it is not removed; name another place", "path")

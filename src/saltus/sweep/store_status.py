@@ -178,7 +178,7 @@ def read_plan(path: Path) -> dict[str, Any]:
         There is nothing at `path`, or no store, or one that is not of a sweep, or whose metadata are damaged
         or are not those of its plan.
     """
-    if not path.exists():
+    if not os.path.exists(path):  # which a name that is too long is not, either
         raise ParameterError(f"there is no store at {path}", "path")
     if not path.is_dir():
         raise ParameterError(f"{path} is a file; the store of a sweep is a folder", "path")
