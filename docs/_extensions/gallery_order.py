@@ -13,6 +13,7 @@ ORDER = (
         "bilinear",
         "duffing",
         "two_stops",
+        "belt",
     ),
     *(
         "wall_orbits",

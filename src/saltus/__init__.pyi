@@ -39,10 +39,12 @@ from .plots import plot
 from .progress import show_progress
 from .studies import bifurcation_diagram, chaotic_bands, frequency_sweep, phase_portrait, response_spectrum, stability_chart
 from .systems import (
+    BeltOscillator,
     Chirp,
     Contact,
     EnergyRestitution,
     FourCells,
+    Friction,
     HalfSine,
     Harmonic,
     ImpactPair,
@@ -72,6 +74,7 @@ from .systems import (
 )
 
 __all__ = [
+    "BeltOscillator",
     "Branch",
     "Chirp",
     "Contact",
@@ -80,6 +83,7 @@ __all__ = [
     "Exponents",
     "FourCells",
     "FreeOrbit",
+    "Friction",
     "HalfSine",
     "Harmonic",
     "ImpactPair",

@@ -103,11 +103,12 @@ def solved_orbit(system: System, state: np.ndarray, period: int, admissible: boo
 
 
 def stays_at_rest(system: System, state: np.ndarray) -> bool:
-    """Whether several contacts hold a state (d,) over a whole forcing period, and so, as the load repeats, for good."""
-    if not system.model.contacts:
+    """Whether contacts or frictions hold a state (d,) over a whole forcing period, and so, as the load repeats, for good."""
+    if not system.model.held:
         return False
     motion = simulate(system, **start_at(system, state), periods=1, dense=False)
-    return motion.stop is Stop.REST and not any(event.kind in (EventKind.IMPACT, EventKind.RELEASE) for event in motion.events)
+    lets_go = (EventKind.IMPACT, EventKind.RELEASE, EventKind.SLIP)
+    return motion.stop is Stop.REST and not any(event.kind in lets_go for event in motion.events)
 
 
 def start_at(system: System, state: np.ndarray) -> dict[str, Any]:

@@ -92,7 +92,7 @@ class Registry:
 
     def _rest_state(self, last: np.ndarray) -> np.ndarray:
         """Where a motion rests whose last state is this: at the contact, or, with several, just there."""
-        return last if self.system.model.contacts else rest_state(self.system)
+        return last if self.system.model.held else rest_state(self.system)
 
     def add_rest(self, state: np.ndarray) -> int:
         """The label of rest in a state (d,)."""

@@ -22,7 +22,7 @@ def area_contraction(system: System) -> float | None:
     complex pair never leaves the unit circle: there is no Neimark-Sacker bifurcation (errata 22). The bounds are of interval
     arithmetic: sufficient, not necessary.
     """
-    if len(system.model.coordinates) > 1 or system.model.contacts:
+    if len(system.model.coordinates) > 1 or system.model.held:
         return None
     traced = trace(system)
     leaves = leaves_over_a_period(system)

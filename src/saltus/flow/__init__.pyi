@@ -13,6 +13,7 @@ from .ensemble.wanted import Wanted
 from .kernel_layout import STRUCTURE_SIZES, Where
 from .load_release import Release, contact_pull, load_releases, peak_near
 from .memory_layout import EventCode
+from .modes import modes_of
 from .motion import Event, EventKind, Impacts, Motion
 from .motion_dataset import rate_name, state_names
 from .recurrence import (
@@ -28,7 +29,7 @@ from .recurrence import (
     return_period,
 )
 from .regularity import ContactRegularity, contact_regularity
-from .sensitivity import Sensitivities, sensitivities
+from .sensitivity import Sensitivities, sensitivities, state_rates
 from .simulation import simulate
 from .stops import Stop
 from .structures import limits_of, program, taylor_order
@@ -76,6 +77,7 @@ __all__ = [
     "load_helpers",
     "load_releases",
     "load_segments",
+    "modes_of",
     "motions_from",
     "nearest_return",
     "peak_near",
@@ -88,6 +90,7 @@ __all__ = [
     "simulate",
     "simulate_many",
     "state_names",
+    "state_rates",
     "stop_names",
     "stroboscopic",
     "taylor_order",

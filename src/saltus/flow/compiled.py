@@ -26,11 +26,13 @@ from saltus.flow import (
 )
 from saltus.flow.contacts import (
     complementarity,
+    contact_decisions,
     contact_impacts,
     contact_layout,
     contact_segments,
     contact_tangent,
     contacts_kernel,
+    frictions,
 )
 from saltus.flow.contacts.one_free import OneFree, equations_of_one_free
 from saltus.flow.memory_layout import State
@@ -76,14 +78,17 @@ class Structure:
     # What the kernel calls: series, contact_series, reset, contact_damping, tangent; with several contacts series, matrices,
     # matrix_slopes, tangent.
     functions: tuple[Any, ...]
-    signs: tuple[int, ...] = ()  # of the contacts, of a model with several
+    several: bool = False  # whether it has contacts or frictions that hold single coordinates
+    signs: tuple[int, ...] = ()  # of these contacts
+    frictions: int = 0
 
     def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """The arguments `env` and `model` of the kernel for given numbers (see `kernel.py`)."""
         constants, geometry = np.zeros(self.module.CONSTANT_COUNT), np.zeros(3)
         self.module.constants(parameters, constants)
-        if self.signs:
-            env = (np.append(parameters, np.ones(self.module.OWN)), constants, *records)
+        if self.several:
+            modes = np.append(np.zeros(self.frictions), np.ones(self.module.OWN))
+            env = (np.append(parameters, modes), constants, *records)
             return env, (*self.functions[:2], np.array(self.signs, dtype=float), *self.functions[2:])
         env = (parameters, constants, *records)
         self.module.geometry(env, geometry)
@@ -114,7 +119,7 @@ def load_contacts_kernel() -> Callable[..., int]:
 
 def contacts_module() -> ModuleType:
     """The module of the scalar kernel for models with several contacts."""
-    parts = (contact_layout, complementarity, contact_impacts, contact_tangent, contacts_kernel)
+    parts = (contact_layout, complementarity, contact_impacts, contact_tangent, frictions, contact_decisions, contacts_kernel)
     return load_module("contacts", _text(kernel_layout, roots, steps, *parts))
 
 
@@ -141,8 +146,10 @@ def load_structure(trace: Trace) -> Structure:
     """The functions of a trace's structure."""
     module = load_module("structure", generated_header(_SIGNATURES) + structure_text(trace))
     several = ("series", "matrices", "matrix_slopes", "tangent")
-    names = several if trace.signs else ("series", "contact_series", "reset", "contact_damping", "tangent")
-    return Structure(module, tuple(pointer(getattr(module, name)) for name in names), trace.signs)
+    names = several if trace.several else ("series", "contact_series", "reset", "contact_damping", "tangent")
+    return Structure(
+        module, tuple(pointer(getattr(module, name)) for name in names), trace.several, trace.signs, len(trace.rubbed)
+    )
 
 
 # --- the functions of a structure ------------------------------------------------------------------------------------------
@@ -165,7 +172,7 @@ def structure_text(trace: Trace) -> str:
     damping = [number(0.0) if trace.contact_damping is None else trace.contact_damping]
     instant = ("side", "env", "piece")
     functions = [_series(trace, known), _table("constants", Places(("parameters", "constants"), ENV), list(known), {})]
-    if trace.signs:
+    if trace.several:
         return _source(sizes, [*functions, _matrices(trace, known), _matrix_slopes(trace, known), _tangent(trace, known)])
     functions += [
         _contact_series(trace, known),
@@ -183,7 +190,7 @@ def _source(sizes: dict[str, int], functions: list[str]) -> str:
 
 def constants(trace: Trace) -> dict[Expr, int]:
     """Where the table of constants has the parts of a structure's expressions that depend on parameters alone."""
-    roots = [*trace.acceleration, *motion_roots(trace), *_geometry(trace), *trace.mass, *trace.restitution, *trace.positions]
+    roots = [*trace.acceleration, *motion_roots(trace), *_geometry(trace), *trace.contact_numbers]
     roots += [
         x for x in (trace.contact_acceleration, trace.next_side, trace.velocity_after, trace.contact_damping) if x is not None
     ]
@@ -234,8 +241,9 @@ def _series(trace: Trace, known: dict[Expr, int]) -> str:
 
 
 def _free(trace: Trace) -> dict[str, tuple[str, int]]:
-    """Where it stands which coordinates no contact holds."""
-    return {"free": ("parameters", len(trace.parameters))}
+    """Where it stands which way frictions slide, and which coordinates are free."""
+    first = len(trace.parameters)
+    return {"slide": ("parameters", first), "free": ("parameters", first + len(trace.rubbed))}
 
 
 def _contact_series(trace: Trace, known: dict[Expr, int]) -> str:
@@ -248,8 +256,8 @@ def _contact_series(trace: Trace, known: dict[Expr, int]) -> str:
 
 
 def _matrices(trace: Trace, known: dict[Expr, int]) -> str:
-    """The mass matrix, E and the positions of the contacts at a state, one after the other."""
-    roots = [*trace.mass, *trace.restitution, *trace.positions]
+    """The mass matrix, E, the positions of the contacts and the speeds of the grounds at a state, one after the other."""
+    roots = trace.contact_numbers
     places = Places(("env", "piece", "state", "out"), ENV | HERE)
     return function_text("matrices", places, "SCALAR", [Case(tape(roots, known), [("out", i) for i in range(len(roots))])])
 

@@ -168,9 +168,8 @@ def time_left(trace: Trace) -> Expr:
 
 
 def number_slopes(trace: Trace) -> list[Expr]:
-    """The derivatives of the numbers of a model's contacts (mass matrix, E, positions) along each column, one after the other."""
-    numbers = [*trace.mass, *trace.restitution, *trace.positions]
-    return [derivative_along(trace, x, j) for j in range(trace.columns) for x in numbers]
+    """The derivatives of the numbers that events at contacts need along each column, one after the other."""
+    return [derivative_along(trace, x, j) for j in range(trace.columns) for x in trace.contact_numbers]
 
 
 def reaction_slopes(trace: Trace, reaction: Expr) -> list[Expr]:

@@ -88,7 +88,7 @@ def _mode_and_side(request: MotionRequest, run: Program) -> tuple[int, int]:
     if model.sides:
         check_contact(request.system)
     position, speed = float(request.position[0]), float(request.speeds[0])
-    if model.contacts:
+    if model.held:
         return Mode.CONTACT, 0
     mode, side = side_of_state.py_func(len(model.sides), position, speed, run.model[ModelPart.GEOMETRY])
     if mode == Mode.BEYOND:

@@ -18,7 +18,10 @@ class EventCode(IntEnum):
     CHATTERING = 4
     LIMIT = 5
     HELD = 6
-    RESET_SLOPES = 7  # no event: the derivatives of the reset alone, at a fixed instant of impact
+    STICK = 7
+    SLIP = 8
+    REVERSAL = 9
+    RESET_SLOPES = 10  # no event: the derivatives of the reset alone, at a fixed instant of impact
 
 
 class RestDetail(IntEnum):

@@ -13,6 +13,7 @@ import numpy as np
 from saltus.checks import check_count, instants
 from saltus.errors import ParameterError
 from saltus.flow.dense_output import DenseOutput
+from saltus.flow.modes import modes_of
 from saltus.flow.stops import Stop
 from saltus.flow.validity import Validity, ValidityCheck
 from saltus.notebook import html_table
@@ -41,6 +42,9 @@ class EventKind(StrEnum):
     CHATTER = "chatter"  #: impacts without loss became too small to follow; the phase is lost from here on
     LIMIT = "limit"  #: a margin reached zero
     HELD = "held"  #: of several contacts, some come to rest as the limit of impacts
+    STICK = "stick"  #: what slid with dry friction sticks
+    SLIP = "slip"  #: what stuck begins to slide
+    REVERSAL = "reversal"  #: it slides the other way without having stuck
 
 
 EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
@@ -185,7 +189,8 @@ class Motion(Result):
     velocity
         Its rate at the end, of the same kind.
     side
-        The side at the end: +1 or -1, and 0 at rest; of a model with contacts 1 and the sum of 2^i over the closed ones.
+        The side at the end: +1 or -1, and 0 at rest; of a model with contacts or frictions 1 and what `closed` and
+        `sliding` read from it.
     stop
         Why it ended.
     limit
@@ -246,6 +251,13 @@ class Motion(Result):
         """The contacts that are closed at the end, of a model with several."""
         return tuple(contact.name for i, contact in enumerate(self.system.model.contacts) if (self.side - 1) >> i & 1)
 
+    @property
+    def sliding(self) -> dict[str, int]:
+        """The direction in which each friction slides at the end, 0 where it sticks, of a model with frictions."""
+        model = self.system.model
+        _, slides = modes_of(model, np.array(self.side))
+        return {friction.name: int(s) for friction, s in zip(model.frictions, slides, strict=True)}
+
     def closed_at(self, time: float) -> int:
         """The contacts that are closed just after a time, of a model with several: the sum of 2^i over them.
 
@@ -256,7 +268,7 @@ class Motion(Result):
         """
         if not self.start <= time <= self.time:
             raise ParameterError(f"time must lie in [{self.start:g}, {self.time:g}], the span of the motion", "time")
-        return int(self._states(np.array([time]))[2][0]) - 1
+        return int(modes_of(self.system.model, self._states(np.array([time]))[2])[0][0])
 
     @property
     def rest_time(self) -> float | None:

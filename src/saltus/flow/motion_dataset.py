@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import instants
+from saltus.flow.modes import modes_of
 from saltus.provenance import provenance
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
         unit = motion.system.model.unit_of(name)
         dataset[name] = ("time", position[i], {"units": unit})
         dataset[rate_name(name, names)] = ("time", velocity[i], {"units": unit, "long_name": f"d {name} / d tau"})
-    if motion.system.model.contacts:
+    if motion.system.model.held:
         _add_contacts(motion, dataset, side)
     else:
         dataset["side"] = ("time", side.astype(np.int8), {"units": "1", "long_name": "side, 0 at rest"})
@@ -54,12 +55,18 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
 
 
 def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> None:
-    """Which contacts are closed, and the impacts: times, contacts, positions, velocities and impulses."""
+    """Which contacts are closed and what slides, and the impacts: times, contacts, positions, velocities and impulses."""
     model, impacts = motion.system.model, motion.impacts
     names, contacts = model.coordinates, [contact.name for contact in model.contacts]
     masks = np.array([1 << i for i in range(len(contacts))], dtype=np.int16)
     flags = {"units": "1", "flag_masks": masks, "flag_meanings": " ".join(contacts)}
-    dataset["closed_contacts"] = ("time", (side - 1).astype(np.int16), flags | {"long_name": "contacts that are closed"})
+    closed, slides = modes_of(model, side)
+    for friction, direction in zip(model.frictions, slides, strict=True):
+        text = f"direction in which {friction.name} slides, 0 where it sticks"
+        dataset[f"sliding_{friction.name}"] = ("time", direction.astype(np.int8), {"units": "1", "long_name": text})
+    if not contacts:
+        return
+    dataset["closed_contacts"] = ("time", closed.astype(np.int16), flags | {"long_name": "contacts that are closed"})
     dataset["impact_time"] = ("impact", impacts.time, {"units": "1"})
     dataset["impact_contacts"] = ("impact", impacts.side, flags | {"long_name": "contacts that were hit"})
     position = np.full((len(names), len(impacts)), np.nan)

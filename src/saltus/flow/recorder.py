@@ -41,8 +41,11 @@ class Recorder:
         kept = request.dense or request.sample_times is not None
         dof, size = len(request.system.model.coordinates), MOST.buffer if kept else 8
         self.steps = (np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
-        self._contacts = [contact.name for contact in request.system.model.contacts]
-        self._width = 1 + 2 * dof + len(self._contacts) if self._contacts else 3  # the numbers of an event before its shifts
+        model = request.system.model
+        self._contacts = [contact.name for contact in model.contacts]
+        self._frictions = [friction.name for friction in model.frictions]
+        self._several = model.held
+        self._width = 1 + 2 * dof + len(self._contacts) if self._several else 3  # the numbers of an event before its shifts
         self.events = (np.empty((MOST.buffer, 4), dtype=np.int64), np.empty((MOST.buffer, self._width + columns)))
         self.total = 0  # events so far
         self._kept = 0  # steps so far
@@ -92,7 +95,9 @@ class Recorder:
         """Everything that happened."""
         labels, values = (np.concatenate([chunk[i] for chunk in self._events]) for i in (0, 1))
         times, values = labels[:, 0] * self._length + values[:, 0], values[:, : self._width]
-        return ContactEvents(times, labels, values, self._contacts) if self._contacts else MotionEvents(times, labels, values)
+        if self._several:
+            return ContactEvents(times, labels, values, self._contacts, self._frictions)
+        return MotionEvents(times, labels, values)
 
     def event_shifts(self) -> np.ndarray:
         """How the time of each event moves with each column of the tangent, (events, columns); nan where that is not known."""

@@ -266,6 +266,7 @@ def _rest_lasts(system: System) -> bool:
     """Whether the load never pulls where everything is at rest; of several contacts each must hold one coordinate."""
     contacts, names = system.model.contacts, system.model.coordinates
     known = not contacts or sorted(contact.coordinate for contact in contacts) == sorted(names)
+    known &= not system.model.frictions
     return known and not load_releases(system)
 
 

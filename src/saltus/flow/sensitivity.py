@@ -171,7 +171,7 @@ def sensitivities(
     )
     followed = follow(request, progress)
     motion, n = followed.motion, len(system.model.coordinates)
-    columns = followed.columns + np.outer(_rates(motion), _end_shift(followed, paths, periods))
+    columns = followed.columns + np.outer(state_rates(motion), _end_shift(followed, paths, periods))
     return Sensitivities(
         motion=motion,
         state=columns[:, : 2 * n],
@@ -201,17 +201,19 @@ def _end_shift(followed: Followed, paths: tuple[str, ...], periods: float | None
     return shift
 
 
-def _rates(motion: Motion) -> np.ndarray:
-    """The time derivative of the state at the end."""
+def state_rates(motion: Motion) -> np.ndarray:
+    """The time derivative of the state at the end of a motion, (2 degrees of freedom,)."""
     system, side = motion.system, motion.side
     velocity = np.atleast_1d(motion.velocity)
     if side == 0:
         return np.zeros(2 * velocity.size)
     acceleration: Any
-    if system.model.contacts:
+    if system.model.held:
         held = {contact.coordinate for contact in system.model.contacts if contact.name in motion.closed}
-        free = [float(name not in held) for name in system.model.coordinates]
-        acceleration = constrained_acceleration(system.model, motion.time, motion.position, motion.velocity, system.load, free)
+        slides = list(motion.sliding.values())
+        held |= {friction.coordinate for friction, s in zip(system.model.frictions, slides, strict=True) if s == 0}
+        free, q = [float(name not in held) for name in system.model.coordinates], motion.position
+        acceleration = constrained_acceleration(system.model, motion.time, q, motion.velocity, system.load, free, slides)
     else:
         acceleration = system.model.acceleration(motion.time, motion.position, motion.velocity, float(side), system.load)
     return np.concatenate([velocity, np.atleast_1d(np.asarray(acceleration, dtype=float))])

@@ -45,7 +45,9 @@ _structures: dict[Any, tuple[Trace, Structure]] = {}
 
 def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
     """The margins that end a motion: the model's own stops and those asked for."""
-    return tuple(dict.fromkeys((*system.model.stops, *check_names("stop_at", stop_at, "margins, such as ['kinematic_limit']"))))
+    lifted = [friction.limit for friction in system.model.frictions]
+    asked = check_names("stop_at", stop_at, "margins, such as ['kinematic_limit']")
+    return tuple(dict.fromkeys((*system.model.stops, *lifted, *asked)))
 
 
 def taylor_order(tol: float) -> int:

@@ -108,14 +108,16 @@ def transmissibility(of: Followed, channel: str, response: Response | None = Non
 
 @answered
 def mean_dissipated_power(of: Followed, *, periods: int | None = None) -> float:
-    """The energy that damping and impacts take, divided by the time:
+    """The energy that damping, friction and impacts take, divided by the time:
 
-        P = (1/D) { sum over impacts [v- M- v- - v+ M+ v+] / 2 - int v f_d dt },    f_d = [f(t, q, v) - f(t, q, -v)] / 2,
+        P = (1/D) { sum over impacts [v- M- v- - v+ M+ v+] / 2 - int v f_d dt + sum over frictions int mu_k N abs(v - w) dt },
+
+        f_d = [f(t, q, v) - f(t, q, -v)] / 2,
 
     over one period of an orbit or the last forcing periods of a motion, of duration D. M is the mass (of the mass matrix, or
     twice the kinetic energy over v^2), f = M q'' the generalised force and f_d its part that is odd in the velocity, such as -c
-    v; velocities are those beside the ground. On a periodic orbit it is the mean power of the load. For load (i) the unit is that
-    of K2 over the unit of time.
+    v; velocities are those beside the ground. On a periodic orbit it is the mean power of the load, and of moving
+    grounds. For load (i) the unit is that of K2 over the unit of time.
 
     Parameters
     ----------
@@ -141,7 +143,7 @@ def mean_dissipated_power(of: Followed, *, periods: int | None = None) -> float:
     1.0
     """
     course = _course(of, periods)
-    return course.mean(-_damping_power(course)) + _impact_losses(course) / course.length
+    return course.mean(_friction_power(course) - _damping_power(course)) + _impact_losses(course) / course.length
 
 
 def _deviation(course: _Course, values: Any) -> float:
@@ -197,6 +199,19 @@ def _damping_power(course: _Course) -> Any:
     q, v, side = course.position[0], course.velocity[0], np.where(course.side == 0, 1.0, course.side)
     odd = (model.acceleration(course.time, q, v, side, load) - model.acceleration(course.time, q, -v, side, load)) / 2
     return v * odd * _mass(course, course.time, q, side)
+
+
+def _friction_power(course: _Course) -> Any:
+    """What frictions take at every time, (n,)."""
+    model, taken = course.system.model, np.zeros_like(course.time)
+    if not model.frictions:
+        return taken
+    q, v = (tuple(x) if len(x) > 1 else x[0] for x in (course.position, course.velocity))
+    forces = model.normal_forces(course.time, q, v, course.system.load)
+    for friction, normal in zip(model.frictions, forces, strict=True):
+        sliding = course.velocity[model.coordinates.index(friction.coordinate)] - friction.ground_speed
+        taken = taken + friction.kinetic * normal * np.abs(sliding)
+    return taken
 
 
 def _rows(forces: Any, times: np.ndarray) -> list[np.ndarray]:

@@ -100,14 +100,19 @@ def _unknowns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
         row[: orbit.problem.size] = orbit.solution.unknowns
         side[: len(orbit.signature.sides)] = orbit.signature.sides
     data = {"unknowns": (("point", "unknown"), unknowns), "sides": (("point", "impact"), sides)}
-    if not orbits[0].problem.system.model.contacts:
+    if not orbits[0].problem.system.model.held:
         return data
     events = np.full((len(orbits), max(1, max(len(orbit.signature.events) for orbit in orbits)), 3), -1)
     for table, orbit in zip(events, orbits, strict=True):
         for row, event in zip(table, orbit.signature.events, strict=False):
             row[:] = event.is_impact, event.contact, event.closed
     closed = np.array([orbit.signature.closed for orbit in orbits])
-    return data | {"events": (("point", "event", "mark"), events), "closed_contacts": ("point", closed)}
+    sections = np.array([np.nan if orbit.signature.section is None else orbit.signature.section for orbit in orbits])
+    return data | {
+        "section": ("point", sections),
+        "events": (("point", "event", "mark"), events),
+        "closed_contacts": ("point", closed),
+    }
 
 
 def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from saltus.flow import ContactColumn, EventCode, SegmentEnd, SegmentLook, SegmentPlan, load_contact_segments
 from saltus.flow import segments as at
+from saltus.orbits.followed_problem import FollowedProblem
 from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
 from saltus.orbits.signature import ModeChange, Signature
 from saltus.systems import System
@@ -239,5 +240,6 @@ def no_event(closed: int) -> np.ndarray:
 
 
 def problem_of(system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> Problem:
-    """The problem of a signature of a system, with one contact or with several."""
-    return (ContactProblem if system.model.contacts else Problem)(system, signature, paths, tol)
+    """The problem of a signature of a system: with one contact or several, or of what is followed as a whole motion."""
+    kind: type[Problem] = ContactProblem if system.model.held else Problem
+    return (kind if signature.section is None else FollowedProblem)(system, signature, paths, tol)

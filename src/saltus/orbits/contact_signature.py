@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow import EventKind, Motion, simulate
-from saltus.orbits.contact_problem import ContactProblem
+from saltus.flow import EventKind, Motion, modes_of, simulate
+from saltus.orbits.contact_problem import ContactProblem, problem_of
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.problem import Problem
 from saltus.orbits.signature import ModeChange, Signature
 
 
@@ -26,7 +27,7 @@ class ReadingSettings:
 SETTINGS = ReadingSettings()
 
 
-def solved_from(base: ContactProblem, state: dict[str, Any], periods: int, iterations: int) -> PeriodicOrbit | None:
+def solved_from(base: Problem, state: dict[str, Any], periods: int, iterations: int) -> PeriodicOrbit | None:
     """The orbit with the signature of a motion over `periods` forcing periods from a state, by Newton's method.
 
     Raises
@@ -37,13 +38,35 @@ def solved_from(base: ContactProblem, state: dict[str, Any], periods: int, itera
     motion = simulate(base.system, **state, periods=2 * periods, tol=SETTINGS.tol)
     if motion.limit is not None:
         return None
-    problem, unknowns = read_signature(base, motion, periods)
+    problem, unknowns = _as_a_whole(base, motion, periods) if _is_whole(base, motion) else read_signature(base, motion, periods)
     if not problem.size:
         raise MotionError("the motion comes to rest with all coordinates held at contacts for good, which is no orbit to follow")
     return PeriodicOrbit.near(problem, unknowns, problem.values, iterations=iterations)
 
 
-def read_signature(base: ContactProblem, motion: Motion, periods: int) -> tuple[ContactProblem, np.ndarray]:
+def _is_whole(base: Problem, motion: Motion) -> bool:
+    """Whether there are no equations from event to event: with frictions, or where impacts die away."""
+    return bool(base.system.model.frictions) or len(motion.events.of(EventKind.HELD)) > 0
+
+
+def _as_a_whole(base: Problem, motion: Motion, periods: int) -> tuple[Problem, np.ndarray]:
+    """The equations x = Phi(x) at the phase farthest from all events at which the fewest contacts are closed, and the state."""
+    period, model = base.system.load.period, base.system.model
+    assert period is not None
+    end = motion.start + periods * period
+    times = [event.time for event in motion.events if motion.start < event.time < end]
+    bounds = np.unique([motion.start, *times, end])
+    spans, middles = np.diff(bounds), 0.5 * (bounds[1:] + bounds[:-1])
+    if not times and motion.system.model.frictions and 0 in motion.sliding.values():
+        raise MotionError("the motion sticks for good, as it may anywhere near, which is no orbit to follow")
+    closed = modes_of(model, motion._states(middles)[2])[0].tolist()
+    chosen = max(range(len(spans)), key=lambda i: (-int(closed[i]).bit_count(), spans[i]))
+    state = np.concatenate([np.atleast_1d(x) for x in motion.at(float(middles[chosen]))])
+    phase = float(middles[chosen]) * base.frequency(base.values) % (2.0 * np.pi)
+    return problem_of(base.system, Signature((), periods, section=phase), base.paths, base.tol), state
+
+
+def read_signature(base: Problem, motion: Motion, periods: int) -> tuple[ContactProblem, np.ndarray]:
     """The problem with the signature of a motion that was followed for twice its `periods`, and its unknowns along the motion.
 
     The events are those of a stretch of `periods` that begins in the middle between two events.
@@ -68,7 +91,7 @@ def read_signature(base: ContactProblem, motion: Motion, periods: int) -> tuple[
     return problem, problem.joined(after, phases)
 
 
-def _mode_changes(base: ContactProblem, motion: Motion, together: float) -> list[tuple[float, ModeChange]]:
+def _mode_changes(base: Problem, motion: Motion, together: float) -> list[tuple[float, ModeChange]]:
     """The events at which the contacts change, each with its time and the contacts that are closed after it.
 
     What happens at one instant to contacts of different groups, such as cells of a chain that move alike, are events in a row:
@@ -91,17 +114,12 @@ def _mode_changes(base: ContactProblem, motion: Motion, together: float) -> list
     return changes
 
 
-def _instants(base: ContactProblem, motion: Motion, together: float) -> list[tuple[float, dict[int, bool]]]:
+def _instants(base: Problem, motion: Motion, together: float) -> list[tuple[float, dict[int, bool]]]:
     """The instants at which contacts change: which of them, and whether each is hit, or let go."""
     contacts = base.system.model.contacts
     names, instants = [contact.name for contact in contacts], list[tuple[float, dict[int, bool]]]()
     events: Sequence[Any] = motion.events
     for event in events:
-        if event.kind is EventKind.HELD:
-            raise MotionError(
-                f"impacts on {event.contact} die away at time {event.time:.6g}: orbits of several contacts in which they do are "
-                "not solved for yet; simulate and sensitivities follow them"
-            )
         if event.kind not in (EventKind.IMPACT, EventKind.RELEASE):
             continue
         if not instants or event.time - instants[-1][0] >= together:

@@ -204,7 +204,7 @@ def _polish(base: Problem, state: dict[str, Any], periods: int, passed: int | No
 def orbit_from(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
     """The orbit near a motion over `periods` forcing periods from a state at phase 0, one that rests for a part of them too."""
     orbit = orbit_near(base, state, periods)
-    if (orbit is not None and orbit.admissible) or base.system.model.contacts:
+    if (orbit is not None and orbit.admissible) or base.system.model.held:
         return orbit
     return resting_near(base, simulate(base.system, **state, periods=periods, dense=False), periods) or orbit
 

@@ -76,8 +76,11 @@ def _signatures(dataset: xarray.Dataset) -> list[Signature]:
     if "events" not in dataset:
         return signatures
     changes = [tuple(ModeChange(bool(k), int(i), int(c)) for k, i, c in table if k >= 0) for table in dataset["events"].values]
-    more = zip(signatures, changes, dataset["closed_contacts"].values, strict=True)
-    return [replace(signature, events=events, closed=int(closed)) for signature, events, closed in more]
+    more = zip(signatures, changes, dataset["closed_contacts"].values, dataset["section"].values, strict=True)
+    return [
+        replace(signature, events=events, closed=int(closed), section=None if np.isnan(section) else float(section))
+        for signature, events, closed, section in more
+    ]
 
 
 def _signature(sides: np.ndarray, periods: Any, symmetric: Any, side: Any) -> Signature:

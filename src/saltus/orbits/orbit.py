@@ -14,6 +14,7 @@ from saltus.flow import Motion, Validity, simulate
 from saltus.flow import segments as at
 from saltus.notebook import html_table
 from saltus.orbits.contact_problem import ContactProblem
+from saltus.orbits.followed_problem import FollowedProblem
 from saltus.orbits.newton import NEWTON_ITERATIONS, Solution, solve
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
@@ -236,7 +237,7 @@ class PeriodicOrbit(Result):
 
         With several contacts it starts between two events.
         """
-        if isinstance(self.problem, ContactProblem):
+        if isinstance(self.problem, (ContactProblem, FollowedProblem)):
             state, time = self.problem.within(self.solution.unknowns, self.solution.equations, self.solution.values)
             return {**self._named(state), "time": time}
         if not self.signature.sides:
@@ -296,7 +297,8 @@ class PeriodicOrbit(Result):
     @cached_property
     def state(self) -> tuple[Any, Any]:
         """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
-        if not (self.signature.sides or self.signature.events or self.signature.closed):
+        signature = self.signature
+        if not (signature.sides or signature.events or signature.closed or signature.section):
             n = self.problem.own
             return (float(self.solution.unknowns[0]), float(self.solution.unknowns[1])) if n == 1 else (
                 self.solution.unknowns[:n], self.solution.unknowns[n:])  # fmt: skip

@@ -42,6 +42,8 @@ class Signature:
         What opens and closes, in order, of an orbit with several contacts, in place of `sides`.
     closed
         The contacts that such an orbit has closed if it has no events, as bits.
+    section
+        The phase at which the state is given of an orbit that is followed as a whole motion; None for all others.
 
     Examples
     --------
@@ -55,10 +57,11 @@ class Signature:
     side: int = 1
     events: tuple[ModeChange, ...] = ()
     closed: int = 0
+    section: float | None = None
 
     @property
     def impact_count(self) -> int:
-        """Impacts in one period of the orbit."""
+        """Impacts in one period of the orbit; 0 of one with a section, whose impacts may be countless."""
         return len(self.sides) * (2 if self.symmetric else 1) + sum(event.is_impact for event in self.events)
 
     @property

@@ -63,7 +63,7 @@ def _harmonics(signal: Signal) -> dict[int, complex] | None:
 
 def keeps_symmetry(system: System, path: str) -> bool:
     """Whether a system is symmetric and stays so as the parameter at `path` changes."""
-    if system.model.contacts or not is_symmetric(system):
+    if system.model.held or not is_symmetric(system):
         return False
     value = float(system.get(path))
     return any(is_symmetric(system.with_({path: value * (1 + s) + s})) for s in (1e-3, -1e-3))

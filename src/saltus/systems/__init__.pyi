@@ -1,7 +1,9 @@
+from .belt_oscillator import BeltOscillator
 from .cell_chain import CellChain, FourCells, ThreeCells, TwoCells
 from .cell_layout import CellLayout
-from .constrained import constrained_acceleration, mass_and_force, reactions
+from .constrained import apart, constrained_acceleration, mass_and_force, normal_forces, reactions, stick_margins
 from .contact import Contact
+from .friction import Friction
 from .impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
 from .impact_pair import ImpactPair
 from .load import Channel, Load
@@ -27,6 +29,7 @@ from .wall_oscillator import WallOscillator
 __all__ = [
     "IMPACTS",
     "MODELS",
+    "BeltOscillator",
     "CellChain",
     "CellLayout",
     "Channel",
@@ -35,6 +38,7 @@ __all__ = [
     "Contact",
     "EnergyRestitution",
     "FourCells",
+    "Friction",
     "HalfSine",
     "Harmonic",
     "ImpactLaw",
@@ -68,6 +72,7 @@ __all__ = [
     "UnitCell",
     "VelocityReduction",
     "WallOscillator",
+    "apart",
     "broadcast_arrays",
     "check_parameters",
     "check_system",
@@ -79,6 +84,7 @@ __all__ = [
     "is_number",
     "mass_and_force",
     "name_impact",
+    "normal_forces",
     "numbers",
     "other_impulse",
     "parameter_table",
@@ -86,6 +92,7 @@ __all__ = [
     "register",
     "reversed_system",
     "signal_class",
+    "stick_margins",
     "substitute",
     "table_1",
 ]

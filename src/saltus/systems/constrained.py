@@ -8,17 +8,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from saltus.errors import ParameterError
+
 if TYPE_CHECKING:
     from saltus.systems.model import Model
 
 
-def constrained_acceleration(model: Model, t: Any, q: Any, v: Any, load: Any, free: Sequence[Any]) -> list[Any]:
+def constrained_acceleration(
+    model: Model, t: Any, q: Any, v: Any, load: Any, free: Sequence[Any], slides: Sequence[Any] = ()
+) -> list[Any]:
     """The accelerations a of (D M D + 1 - D) a = D r, with D = diag(free): 1 where a coordinate is free, 0 where it is held.
+
+    r has the force of each friction that slides, -mu_k N s with its direction s in `slides`, 0 where it sticks.
 
     q and v are scalars where there is one coordinate, else tuples. The matrix is eliminated from its first row on, without
     pivots: those of a positive definite matrix are positive.
     """
     mass, force = mass_and_force(model, t, q, v, load)
+    for friction, normal, s in zip(model.frictions, normal_forces(model, t, q, v, load), slides, strict=True):
+        place = model.coordinates.index(friction.coordinate)
+        force[place] = force[place] - s * friction.kinetic * normal
     size = len(force)
     matrix = [[_held(mass[i][j], i, j, free) for j in range(size)] for i in range(size)]
     right = [free[i] * force[i] for i in range(size)]
@@ -42,9 +51,46 @@ def constrained_acceleration(model: Model, t: Any, q: Any, v: Any, load: Any, fr
 
 def reactions(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
     """The force of each contact along its sign, sign (M a - r)_i; 0 where its coordinate is free."""
-    mass, force = mass_and_force(model, t, q, v, load)
-    lacking = [sum(m * x for m, x in zip(row, a, strict=True) if not _is_zero(m)) - r for row, r in zip(mass, force, strict=True)]
+    lacking = _lacking(model, t, q, v, a, load)
     return [contact.sign * lacking[model.coordinates.index(contact.coordinate)] for contact in model.contacts]
+
+
+def stick_margins(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
+    """mu_s N - l and mu_s N + l of each friction, one after the other, with the force l = (M a - r)_i that holds it."""
+    lacking, margins = _lacking(model, t, q, v, a, load), []
+    for friction, normal in zip(model.frictions, normal_forces(model, t, q, v, load), strict=True):
+        force, most = lacking[model.coordinates.index(friction.coordinate)], friction.most * normal
+        margins += [most - force, most + force]
+    return margins
+
+
+def normal_forces(model: Model, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, ...]:
+    """N of each friction.
+
+    Raises
+    ------
+    ParameterError
+        Not as many as there are frictions.
+    """
+    given = model.normal_forces(t, q, v, load) if model.frictions else ()
+    if len(given) != len(model.frictions):
+        kind, count = type(model).__name__, len(model.frictions)
+        raise ParameterError(f"{kind}.normal_forces must return {count} value(s), one for each friction, got {given!r}", "model")
+    return tuple(given)
+
+
+def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
+    """M a - r: what is to act on each coordinate for these accelerations."""
+    mass, force = mass_and_force(model, t, q, v, load)
+    return [sum(m * x for m, x in zip(row, a, strict=True) if not _is_zero(m)) - r for row, r in zip(mass, force, strict=True)]
+
+
+def apart(model: Model, mass: Sequence[Sequence[Any]]) -> bool:
+    """Whether the mass matrix connects no coordinate with a contact to one with a friction, whatever the state."""
+    names, near = model.coordinates, {contact.coordinate for contact in model.contacts}
+    for _ in names:
+        near |= {b for a in near for b in names if not _is_zero(mass[names.index(a)][names.index(b)])}
+    return not any(friction.coordinate in near for friction in model.frictions)
 
 
 def mass_and_force(model: Model, t: Any, q: Any, v: Any, load: Any) -> tuple[list[list[Any]], list[Any]]:

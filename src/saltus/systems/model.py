@@ -10,6 +10,7 @@ from saltus.errors import ParameterError, near, shown
 from saltus.public_functions import answering
 from saltus.systems.constrained import constrained_acceleration
 from saltus.systems.contact import Contact
+from saltus.systems.friction import Friction
 
 
 class MarginKind(StrEnum):
@@ -43,6 +44,7 @@ class Model:
        a model with several contacts, or with contacts that hold single coordinates, gives instead of 2 to 5 its `contacts`, a
        tuple of `Contact`, the `force` r(t, q, v) of M(q) q'' = r, `mass_matrix`, M(q), where that is not the identity, and
        maybe a `singularity`, a name for where M(q) has no inverse: a motion that gets there ends with this name as `limit`;
+       a model with dry friction gives its `frictions`, a tuple of `Friction`, likewise, and their `normal_forces`;
     6. optionally `mirror` (the symmetry that maps motions to motions), `kinetic_energy` (for impact laws that need
        it), `margins` (what must stay positive), `margin_kinds` (what it means to pass them; an assumption that fails where
        a margin has none), `stops` (the margins that end a motion unasked), `check_load`, and `damping`, the coefficient of
@@ -108,7 +110,7 @@ class Model:
         return 0.0
 
     def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
-        """The acceleration on the given side; of a model that gives its `force`, while no contact acts.
+        """The acceleration on the given side; of a model that gives its `force`, while no contact and no friction acts.
 
         Parameters
         ----------
@@ -126,13 +128,40 @@ class Model:
         if type(self).force is Model.force:
             raise NotImplementedError(f"{type(self).__name__} must define acceleration(t, theta, velocity, side, load)")
         size = len(self.coordinates)
-        solved = constrained_acceleration(self, t, theta, velocity, load, [1.0] * size)
+        still = [0.0] * len(self.frictions)
+        solved = constrained_acceleration(self, t, theta, velocity, load, [1.0] * size, still)
         return solved[0] if size == 1 else tuple(solved)
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """The contacts of a model that gives its `force`."""
         return ()
+
+    @property
+    def frictions(self) -> tuple[Friction, ...]:
+        """The dry frictions of a model that gives its `force`."""
+        return ()
+
+    @property
+    def held(self) -> bool:
+        """Whether there are contacts or frictions that may hold its coordinates, one by one."""
+        return bool(self.contacts or self.frictions)
+
+    def normal_forces(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[Any, ...]:
+        """N of each friction, which must stay positive: the motion ends where one does not.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        theta
+            The coordinate q; a tuple where there are several.
+        velocity
+            Its rate, of the same kind.
+        load
+            The load, whose channels are called with the time.
+        """
+        return (1.0,) * len(self.frictions)
 
     def mass_matrix(self, theta: Any) -> Any:
         """M(q): a number, or rows of numbers, symmetric and positive definite.
@@ -146,7 +175,7 @@ class Model:
         return 1.0 if size == 1 else [[float(i == j) for j in range(size)] for i in range(size)]
 
     def force(self, t: Any, theta: Any, velocity: Any, load: Any) -> Any:
-        """r(t, q, v) of M(q) q'' = r, while no contact acts.
+        """r(t, q, v) of M(q) q'' = r, while no contact and no friction acts.
 
         Parameters
         ----------

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, TypeVar
 
 from saltus.errors import ParameterError, near, shown
+from saltus.systems.belt_oscillator import BeltOscillator
 from saltus.systems.cell_chain import FourCells, ThreeCells, TwoCells
 from saltus.systems.impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
 from saltus.systems.impact_pair import ImpactPair
@@ -24,6 +25,7 @@ MODELS: dict[str, type[Model]] = {
     "WallOscillator": WallOscillator,
     "TwoStops": TwoStops,
     "ImpactPair": ImpactPair,
+    "BeltOscillator": BeltOscillator,
     "TwoCells": TwoCells,
     "ThreeCells": ThreeCells,
     "FourCells": FourCells,

@@ -13,6 +13,7 @@ from saltus.files import parsed_json
 from saltus.notebook import html_table
 from saltus.public_functions import answering
 from saltus.systems.contact import check_contacts
+from saltus.systems.friction import check_frictions
 from saltus.systems.impact import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
 from saltus.systems.model import Model, check_sides
@@ -63,6 +64,8 @@ class System:
                     f"{type(self.model).__name__} does not read load.{channel}; {near(channel, known)}", f"load.{channel}"
                 )
         self.model.check_load(self.load)
+        if self.model.frictions:
+            check_frictions(self.model)
         if self.model.contacts:
             check_contacts(self.model)
             self.impact.restitution_matrix(self.model)
@@ -270,10 +273,10 @@ def check_system(system: Any, asking: str, *, coordinates: int | None = None, se
     if coordinates is not None and len(names) != coordinates:
         wanted = "one coordinate" if coordinates == 1 else f"{coordinates} coordinates"
         raise ParameterError(f"{asking} is for models with {wanted}, and this one has {', '.join(names)}", "system")
-    if system.model.contacts and not several_contacts:
-        contacts = ", ".join(contact.name for contact in system.model.contacts)
+    if system.model.held and not several_contacts:
+        names = (*(contact.name for contact in system.model.contacts), *(friction.name for friction in system.model.frictions))
+        parts = ", ".join(names)
         raise ParameterError(
-            f"{asking} is for models with one contact so far, and {type(system.model).__name__} gives the contacts {contacts}; "
-            "use simulate",
+            f"{asking} is for models with one contact so far, and {type(system.model).__name__} has {parts}; use simulate",
             "system",
         )

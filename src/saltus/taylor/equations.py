@@ -45,10 +45,10 @@ def _traced_parts(system: System) -> dict[str, str]:
         "gap": [traced.gap],
         "contact": [traced.contact],
         "reset": [traced.next_side, traced.velocity_after],
-        "contacts": [*traced.mass, *traced.reactions, *traced.restitution, *traced.positions],
+        "contacts": [*traced.reactions, *traced.contact_numbers],
     }
     texts = {name: _text(traced, [root for root in parts if root is not None]) for name, parts in roots.items()}
-    texts |= {"margins": _margins(system), "signs": repr((traced.signs, traced.held))}
+    texts |= {"margins": _margins(system), "signs": repr((traced.signs, traced.held, traced.rubbed))}
     return {name: digest(text) for name, text in texts.items()}
 
 

@@ -15,7 +15,7 @@ from saltus.taylor.rules import FUNCTIONS
 
 # What a reset, evaluated at one instant, may use besides the operations that have a Taylor recurrence.
 POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
-LEAVES = ("number", "parameter", "time", "origin", "side", "free", "coordinate", "velocity", "acceleration", "record")
+LEAVES = ("number", "parameter", "time", "origin", "side", "free", "slide", "coordinate", "velocity", "acceleration", "record")
 RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
 
 ALLOWED = (
@@ -23,8 +23,8 @@ ALLOWED = (
     "coordinate (the sign of the coordinate is `side`)"
 )
 FRICTION = (
-    "a force that jumps with the sign of a velocity (dry friction, stick-slip) is out of scope, as only the coordinate has a "
-    "contact; a smooth one, such as -tanh(velocity / w), can be traced"
+    "a force that jumps with the sign of a velocity (dry friction, stick-slip) cannot be traced: give the model a Friction; a "
+    "smooth one, such as -tanh(velocity / w), can be"
 )
 ARITHMETIC = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow"}  # NumPy's names, and ours
 _AS_THEY_ARE = ("tan", "square", "absolute", "negative", "positive", *POINTWISE)

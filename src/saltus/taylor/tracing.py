@@ -7,7 +7,17 @@ from typing import Any
 
 from saltus.checks import LIMITS
 from saltus.errors import ParameterError, SaltusError, TraceError, near
-from saltus.systems import Pulse, Record, System, constrained_acceleration, mass_and_force, reactions
+from saltus.systems import (
+    Pulse,
+    Record,
+    System,
+    apart,
+    constrained_acceleration,
+    mass_and_force,
+    normal_forces,
+    reactions,
+    stick_margins,
+)
 from saltus.systems import substitute as substitute_numbers
 from saltus.taylor import derivatives as tangent
 from saltus.taylor.exact_algebra import constant_value, normal_form, provably_equal
@@ -89,6 +99,8 @@ class Trace:
 
     Of a model with contacts: `reactions`, one for each; `mass`, the rows of the mass matrix one after the other; `restitution`, E
     likewise; `positions` of the contacts. Leaves are then also `free`, 1 for each coordinate that no contact holds, else 0.
+    Of a model with frictions: behind the reactions of the contacts the two margins of each friction (`stick_margins`), and
+    `ground_speeds`. Leaves are then also `slide`, the direction in which each slides, 0 where it sticks.
 
     With `columns` of a tangent (`derivatives.py`) `acceleration` goes on after the model's own `dof` with those of the columns.
     """
@@ -115,6 +127,18 @@ class Trace:
     positions: list[Expr] = field(default_factory=list)
     signs: tuple[int, ...] = ()  # of the contacts
     held: tuple[int, ...] = ()  # the coordinate that each contact holds
+    ground_speeds: list[Expr] = field(default_factory=list)
+    rubbed: tuple[int, ...] = ()  # the coordinate of each friction
+
+    @property
+    def several(self) -> bool:
+        """Whether there are contacts or frictions that may hold its coordinates, one by one."""
+        return bool(self.signs or self.rubbed)
+
+    @property
+    def contact_numbers(self) -> list[Expr]:
+        """The mass matrix, E, the positions of the contacts and the speeds of the grounds: what events need."""
+        return [*self.mass, *self.restitution, *self.positions, *self.ground_speeds]
 
     def symbol(self, path: str, value: float) -> Expr:
         """The symbol of the number at a dotted path."""
@@ -145,7 +169,7 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
     velocities = tuple(Expr("velocity", (), i) for i in range(dof))
     side = Expr("side") if model.sides else number(1.0)
     q, v = (coordinates[0], velocities[0]) if dof == 1 else (coordinates, velocities)
-    several = bool(model.contacts)
+    several = model.held
     accelerations = _trace_contacts(result, twin, t, q, v) if several else ask(model, "acceleration", t, q, v, side, load)
     if dof > 1 and len(accelerations if isinstance(accelerations, (tuple, list)) else [accelerations]) != dof:
         raise TraceError(f"{type(system.model).__name__}.acceleration must return {dof} values, got {accelerations!r}")
@@ -229,15 +253,24 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     """The accelerations of a model with contacts, any of which may be closed."""
     model, load, count = twin.model, twin.load, len(twin.model.coordinates)
     free = [Expr("free", (), i) for i in range(count)]
+    slides = [Expr("slide", (), k) for k in range(len(model.frictions))]
     mass, _ = mass_and_force(model, t, q, v, load)
+    if model.frictions and not apart(model, mass):
+        raise TraceError(
+            f"the mass matrix of {type(model).__name__} connects a coordinate with a contact to one with a friction: impacts "
+            "would act on what sticks, which is not followed; choose coordinates in which it does not"
+        )
     accelerations = [Expr("acceleration", (), i) for i in range(count)]
-    result.reactions = [combine("add", r, 0.0) for r in reactions(model, t, q, v, accelerations, load)]
+    holding = [*reactions(model, t, q, v, accelerations, load), *stick_margins(model, t, q, v, accelerations, load)]
+    result.reactions = [combine("add", r, 0.0) for r in holding]
+    result.ground_speeds = [combine("add", friction.ground_speed, 0.0) for friction in model.frictions]
+    result.rubbed = tuple(model.coordinates.index(friction.coordinate) for friction in model.frictions)
     result.mass = [combine("add", entry, 0.0) for row in mass for entry in row]
     result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
     result.positions = [combine("add", contact.position, 0.0) for contact in model.contacts]
     result.signs = tuple(contact.sign for contact in model.contacts)
     result.held = tuple(model.coordinates.index(contact.coordinate) for contact in model.contacts)
-    return constrained_acceleration(model, t, q, v, load, free)
+    return constrained_acceleration(model, t, q, v, load, free, slides)
 
 
 def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]) -> None:
@@ -245,7 +278,9 @@ def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: 
         return
     dof = len(twin.model.coordinates)
     a = tuple(Expr("acceleration", (), i) for i in range(dof))
-    margins = ask(twin.model, "margins", t, q, v, a[0] if dof == 1 else a, side, twin.load)
+    margins = dict(ask(twin.model, "margins", t, q, v, a[0] if dof == 1 else a, side, twin.load))
+    forces = normal_forces(twin.model, t, q, v, twin.load)
+    margins |= {friction.limit: force for friction, force in zip(twin.model.frictions, forces, strict=True)}
     for name in stop_at:
         if name not in margins:
             raise ParameterError(

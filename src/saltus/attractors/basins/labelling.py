@@ -80,7 +80,7 @@ class Labelling:
     def _rests(self, target: Target, ends: Recurrence) -> np.ndarray:
         """Which motions are at rest for good in the state of an attractor; one contact leaves no choice, (n,)."""
         here = target.distance(ends.last) < SAME_STATE * max(1.0, float(np.abs(target.states).max()))
-        return np.asarray(here & (ends.rest | (ends.period == 1)) if self.system.model.contacts else ends.rest)
+        return np.asarray(here & (ends.rest | (ends.period == 1)) if self.system.model.held else ends.rest)
 
     def _times(self, label: np.ndarray, ends: Recurrence) -> np.ndarray:
         """Forcing periods after which each motion stays near its attractor, up to its end; nan where undecided.

@@ -34,7 +34,7 @@ class Contraction:
             self._slopes = {s: differentiate(substitute(after, {Expr("side"): float(s)}), VELOCITY) for s in sides}
         known = not any(reads(d, "time", "coordinate", "velocity", "record") for d in damping.values())
         known &= not any(reads(slope, "record") for slope in self._slopes.values())
-        single = len(system.model.coordinates) == 1 and not system.model.contacts
+        single = len(system.model.coordinates) == 1 and not system.model.held
         self.known = known and single  # whether da/dv is constant on each side
         linear = {s: d for s, d in self._slopes.items() if not reads(d, "time", "velocity", "record")}
         self._factors = {s: _middle(enclose([d], self._leaves)[0]) for s, d in linear.items()}

@@ -233,7 +233,7 @@ class _Run:
         frame, upper = np.linalg.qr(found.state @ frame)
         with np.errstate(divide="ignore"):
             lengths = np.abs(np.diag(upper))
-            if self.system.model.contacts:  # what closed contacts take away is 0 but for rounding
+            if self.system.model.held:  # what closed contacts take away is 0 but for rounding
                 lengths[lengths < DERIVATIVE_ROUNDING * lengths.max()] = 0.0
             self.stretch[p] += np.log(lengths)
         self.areas[p] += contraction.along(found.motion)

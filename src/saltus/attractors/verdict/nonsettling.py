@@ -104,7 +104,7 @@ def _runs(case: VerdictRequest, state: np.ndarray) -> list[Exponents]:
     runs: list[Exponents] = []
     for span, part in ((third, (0.1, 0.1 + 0.8 / 3)), (2 * third, (0.1 + 0.8 / 3, 0.9))):
         progress = part_of(case.progress, *part)
-        second = not runs and not case.system.model.contacts
+        second = not runs and not case.system.model.held
         options: dict[str, Any] = {"periods": span, "transient": 0, "tol": case.tol, "two_trajectories": second}
         runs.append(lyapunov_spectrum(case.system, **at, **options, progress=progress))
         at = runs[-1].state

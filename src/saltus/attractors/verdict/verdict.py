@@ -148,8 +148,8 @@ class VerdictRequest:
 def settled(case: VerdictRequest, ends: Recurrence, start: np.ndarray) -> Verdict | None:
     """The verdict on a motion from a state (2,) that has come to rest, ended or repeats itself; None where it goes on."""
     if ends.rest[0] or (ends.period[0] == 1 and stays_at_rest(case.clock, ends.last[0])):
-        contacts, numbers = case.system.model.contacts, {"periods": round(float(ends.periods[0]))}
-        point = ends.last[0] if contacts else np.array([float(case.system.model.contact), 0.0])
+        held, numbers = case.system.model.held, {"periods": round(float(ends.periods[0]))}
+        point = ends.last[0] if held else np.array([float(case.system.model.contact), 0.0])
         return case.verdict(AttractorKind.REST, Reason.CAPTURED, ends, numbers, state=start_at(case.system, point))
     if ends.ended[0]:
         return _ended(case, ends, start)

@@ -13,25 +13,27 @@ from saltus.flow.motion import EVENT_KINDS, EventKind, Impacts, MotionEvents
 
 @dataclass(frozen=True, slots=True)
 class ContactEvent:
-    """One event at contacts: its time, which contacts, the velocities of all coordinates before and after, all impulses."""
+    """One event: its time, at which contacts or frictions, the velocities of all coordinates before and after, all impulses."""
 
     time: float
     kind: EventKind
-    contact: str  # the name of the contact, or several with "+" between them; "both" for two of two
+    contact: str  # the name of the contact or friction, or several with "+" between them; "both" for two of two contacts
     velocity_before: tuple[float, ...]
     velocity_after: tuple[float, ...]
     impulse: tuple[float, ...]  # of each contact, along its sign
 
 
 class ContactEvents(MotionEvents):
-    """The events of a motion with several contacts, in order of time."""
+    """The events of a motion with several contacts or frictions, in order of time."""
 
-    def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray, names: Sequence[str]) -> None:
+    def __init__(
+        self, times: np.ndarray, labels: np.ndarray, values: np.ndarray, contacts: Sequence[str], frictions: Sequence[str]
+    ) -> None:
         super().__init__(times, labels, values)
-        self._names, self._own = tuple(names), (values.shape[1] - 1 - len(names)) // 2
+        self._contacts, self._frictions, self._own = contacts, frictions, (values.shape[1] - 1 - len(contacts)) // 2
 
     def _only(self, chosen: Any) -> ContactEvents:
-        return ContactEvents(self._times[chosen], self._labels[chosen], self._values[chosen], self._names)
+        return ContactEvents(self._times[chosen], self._labels[chosen], self._values[chosen], self._contacts, self._frictions)
 
     def _event(self, index: int) -> ContactEvent:
         kind, bits = (int(x) for x in self._labels[index, 1:3])
@@ -42,8 +44,8 @@ class ContactEvents(MotionEvents):
         return np.split(self._values[index, 1:], [self._own, 2 * self._own], axis=-1)
 
     def _called(self, bits: int) -> str:
-        chosen = [name for i, name in enumerate(self._names) if bits >> i & 1]
-        return "both" if len(chosen) == len(self._names) == 2 else "+".join(chosen)
+        chosen = [name for i, name in enumerate((*self._contacts, *self._frictions)) if bits >> i & 1]
+        return "both" if chosen == list(self._contacts) and len(chosen) == 2 else "+".join(chosen)
 
     def impacts(self) -> Impacts:
         """The impacts, as arrays; `side` has the bits of the contacts that were hit, velocities are (n, coordinates)."""

@@ -20,18 +20,18 @@ from saltus.taylor import jit, lean_jit
 
 
 @jit
-def solver_arrays(own, count, columns):
+def solver_arrays(own, count, columns, frictions):
     """The arrays of `Solver`, for so many columns of a tangent."""
-    most = max(2 * own, count + 1)
+    most, numbers = max(2 * own, count + 1), own * own + count * count + count + frictions
     return (
-        np.zeros(own * own + count * count + count),
+        np.zeros(numbers),
         np.zeros((own, own)),
         np.zeros((count, count)),
         np.zeros((max(own, count), most)),
         np.zeros((count, count)),
         *(np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)),
         *(np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)),
-        *(np.zeros(columns * (own * own + count * count + count)), np.zeros(own)),
+        *(np.zeros(columns * numbers), np.zeros(own)),
         *(np.zeros(columns), np.zeros((columns, count))),
     )
 

@@ -15,6 +15,16 @@ class ContactColumn(IntEnum):
     WAITS = 4  # how many of its impacts are left until it is asked again whether an accumulation ends soon
 
 
+class FrictionColumn(IntEnum):
+    """Columns of the rows behind them, one for each friction."""
+
+    COORDINATE = 0  # along which it acts
+    SLIDES = 1  # in which direction of it, 0 where it sticks
+    SKIP = 2  # of its guard, how many of the first Taylor coefficients are known to be 0 at the start of a step
+    MARGIN = 3  # of which of the two margins of one that sticks
+    REACHED = 4  # 1 or 2: which margin has just reached 0; 3: the sliding speed has
+
+
 class ContactPart(IntEnum):
     """Places in the tuple `model`: what the kernel calls for a structure, and the signs of the contacts."""
 

@@ -313,7 +313,7 @@ def follow_contact_segments(where, settings, env, model, contacts, plan, times, 
     parameters. `looks` is filled, in the places of `SegmentLook`, if it has rows.
     """
     own, dof = where[Where.OWN], where[Where.DOF]
-    work, solver = work_arrays(where), solver_arrays(own, contacts.shape[0], where[Where.COLUMNS])
+    work, solver = work_arrays(where), solver_arrays(own, contacts.shape[0], where[Where.COLUMNS], 0)
     roots, nothing, least = np.zeros(where[Where.ORDER] + 2), np.zeros(1), np.zeros(2)
     state = np.zeros(State.COORDINATES + 2 * dof + where[Where.COLUMNS])
     opened = -1

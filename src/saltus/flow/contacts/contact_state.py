@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow.compiled import load_contacts_kernel
-from saltus.flow.contacts.contact_layout import ContactColumn
+from saltus.flow.contacts.contact_layout import ContactColumn, FrictionColumn
 from saltus.flow.kernel_layout import Where
 from saltus.flow.kernel_state import KernelState
 from saltus.flow.memory_layout import State
@@ -19,7 +19,7 @@ from saltus.flow.structures import Program
 
 @dataclass(frozen=True, eq=False)
 class ContactState(KernelState):
-    """The arrays that the kernel changes; `contacts` in the columns of `ContactColumn`."""
+    """The arrays that the kernel changes; `contacts` in the columns of `ContactColumn`, then of `FrictionColumn`."""
 
     contacts: np.ndarray = field(default_factory=lambda: np.zeros((0, len(ContactColumn)), dtype=np.int64))
 
@@ -34,9 +34,10 @@ class ContactState(KernelState):
         """
         start = super().at_start(request, run)
         names, position, speeds = request.system.model.coordinates, request.position, request.speeds
-        contacts = np.zeros((len(run.trace.held), len(ContactColumn)), dtype=np.int64)
-        contacts[:, ContactColumn.COORDINATE] = run.trace.held
-        for row, contact in zip(contacts, request.system.model.contacts, strict=True):
+        held, rubbed = run.trace.held, run.trace.rubbed
+        contacts = np.zeros((len(held) + len(rubbed), len(ContactColumn)), dtype=np.int64)
+        contacts[:, ContactColumn.COORDINATE] = held + rubbed
+        for row, contact in zip(contacts[: len(held)], request.system.model.contacts, strict=True):
             place = names.index(contact.coordinate)
             gap, rate = contact.gap(float(position[place])), contact.sign * float(speeds[place])
             if gap < 0.0 or (gap == 0.0 and rate < 0.0):
@@ -47,6 +48,9 @@ class ContactState(KernelState):
             row[ContactColumn.SKIP] = int(gap == 0.0)
             if gap == 0.0:
                 start.state[State.COORDINATES + place] = float(contact.position)
+        for row, friction in zip(contacts[len(held) :], request.system.model.frictions, strict=True):
+            rate = float(speeds[names.index(friction.coordinate)]) - float(friction.ground_speed)
+            row[FrictionColumn.SLIDES] = int(np.sign(rate))
         start.where[Where.LEAVE_BY] = 1  # no release is recorded at the start
         return cls(start.where, start.state, start.settings, contacts)
 
@@ -56,5 +60,5 @@ class ContactState(KernelState):
 
     @property
     def side(self) -> int:
-        """1 and the bits of the contacts that are closed."""
-        return 1 + sum(int(row[ContactColumn.CLOSED]) << i for i, row in enumerate(self.contacts))
+        """1 and what `modes_of` reads: the contacts that are closed, and what the frictions do."""
+        return int(self.where[Where.SIDE])

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, invert
-from saltus.flow.contacts.contact_impacts import closed_bits, frozen_accumulation, hold_coordinates, restitution
+from saltus.flow.contacts.contact_impacts import frozen_accumulation, restitution
 from saltus.flow.contacts.contact_layout import APART, RELATIVE_STEP, ContactColumn, ContactPart, ImpactDetail, Solver
 from saltus.flow.kernel_layout import Where, Work
 from saltus.flow.memory_layout import EventCode, State
@@ -54,7 +54,7 @@ def fill_slopes(where, state, env, model, solver):
 @lean_jit
 def slope(solver, own, count, j, place):
     """The derivative of one of the numbers of the contacts along column j."""
-    return solver[Solver.SLOPES][j * (own * own + count * count + count) + place]
+    return solver[Solver.SLOPES][j * solver[Solver.NUMBERS].size + place]
 
 
 @lean_jit
@@ -320,19 +320,3 @@ def start_columns(where, state, env, model, contacts, work, solver, t, origin, c
             continue
         fall_back(where, state, env, model, contacts, work, solver, t, origin, closed, j)
     hold_columns(where, state, contacts, solver, closed)
-
-
-@lean_jit
-def decide_columns(where, state, env, model, contacts, work, solver, t, origin):
-    """Take the columns on from an event, or from the start, now that it is known which contacts are closed."""
-    if where[Where.COLUMNS] == 0:
-        return
-    if where[Where.LEAVE_BY] == 1:
-        first = env[0].size - where[Where.OWN]
-        for i in range(first, env[0].size):
-            env[0][i] = 1.0
-        start_columns(where, state, env, model, contacts, work, solver, t, origin, closed_bits(contacts))
-        hold_coordinates(where, env, contacts)
-    expand(where, state, env, model, work, t, origin, 1.0, 0)
-    move_columns(where, state, work, -1.0)
-    clear_shifts(where, state)

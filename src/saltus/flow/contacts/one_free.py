@@ -34,7 +34,7 @@ def equations_of_one_free(trace: Trace, margins: list[Expr]) -> OneFree | None:
     for a tangent, as the derivatives to all coordinates go on.
     """
     own = trace.dof
-    if len(trace.signs) < 2 or sorted(trace.held) != list(range(own)) or trace.columns:
+    if len(trace.signs) < 2 or trace.rubbed or sorted(trace.held) != list(range(own)) or trace.columns:
         return None
     common = CommonForm([Expr("free", (), j) for j in range(own)])
     accelerations, curved, changing, constant = [], [], [], []

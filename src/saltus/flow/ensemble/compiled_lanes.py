@@ -126,7 +126,7 @@ def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
     """
     check_size(trace, lanes=True)
     module = load_module("lane", generated_header(_SIGNATURES) + lane_functions_text(trace))
-    names = ("series", "impact", "field", "one_free")[: 4 if trace.signs else 3]
+    names = ("series", "impact", "field", "one_free")[: 4 if trace.several else 3]
     return slots_of(trace), tuple(pointer(getattr(module, f"lane_{name}")) for name in names)
 
 

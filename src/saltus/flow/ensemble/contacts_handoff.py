@@ -50,7 +50,8 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
 
     Returns (PAUSED, 0), or why the motion ends and which margin reached zero.
     """
-    (advance, model), contacts = scalar, lanes[LaneArray.CONTACTS][lane]
+    (advance, model), rows = scalar, lanes[LaneArray.CONTACTS][lane]
+    contacts = rows[: sizes[Size.CONTACTS]]
     where, state, limits = scalar_state(lane, sizes, at, m, flags, settings, lanes)
     if not flags[Flag.SCALAR] >> lane & 1:
         contacts_of(lane, sizes, at, m, contacts)
@@ -67,7 +68,7 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
         np.empty((BUFFER_LENGTH, 1 + 2 * own + contacts.shape[0] + sizes[Size.COLUMNS])),
     )
     while True:
-        status = advance(where, state, limits, env, model, contacts, steps, events)
+        status = advance(where, state, limits, env, model, rows, steps, events)
         detail = record_impacts(lane, where, m, contacts, events)
         record_extrema(lane, where, m, steps, poly)
         if (status != Status.FULL and status != Status.PAUSED) or control[0] != 0:
@@ -75,7 +76,7 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
     put_state(lane, at, m, flags, lanes, where, state)
     put(m, Slot.SIDE, lane, 1.0 + tell_closed(lane, at, m, contacts))
     lanes[LaneArray.LABELS][lane, LaneLabel.LEAVE_BY] = where[Where.LEAVE_BY]
-    if not is_smooth(where, contacts):
+    if sizes[Size.FRICTIONS] > 0 or not is_smooth(where, contacts):
         flags[Flag.SCALAR] |= 1 << lane
     if status in (Status.DONE, Status.SMOOTH, Status.FULL, Status.PAUSED):
         captured = where[Where.MODE] == Mode.REST and get(m, Slot.CAPTURE_SPEED, lane) > 0.0

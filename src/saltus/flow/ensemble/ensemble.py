@@ -120,7 +120,7 @@ def _run(
     progress: Progress,
 ) -> xarray.Dataset:
     """Compile what is not there yet, run the trajectories, and write their dataset."""
-    driver = compile_driver_aside(bool(system.model.contacts))
+    driver = compile_driver_aside(system.model.held)
     run = program(system, wanted.limits, wanted.paths)
     if system.model.sides:
         check_contact(system)
@@ -134,7 +134,7 @@ def _run(
     check_memory("last", 16.0 * len(wanted.sample) * kept * inputs.size, f"samples of {kept} periods of {inputs.size} motions")
     lanes = compiled_lanes(system, run, wanted, kept)
     if driver is not None:
-        compile_beside(driver, bool(system.model.contacts))
+        compile_beside(driver, system.model.held)
     ends = lanes.run(jobs, threads, progress, total=float(np.sum(spans + 1)))
     return to_dataset(system, inputs, wanted, jobs, ends)
 
@@ -151,9 +151,12 @@ def _capture(system: System, columns: dict[str, np.ndarray], limits: tuple[str, 
     """
     from saltus.bounds import keeps_rest, proved_speeds
 
-    asked = [name for name in limits if name not in system.model.stops]
+    lifted = [friction.limit for friction in system.model.frictions]
+    asked = [name for name in limits if name not in (*system.model.stops, *lifted)]
     if asked:
         raise ParameterError(f'until="rest" proves nothing about {asked[0]}; leave out either it or stop_at', "until")
+    if system.model.frictions:
+        return 0.0  # nothing is proved of what sticks
     if system.model.contacts:
         return np.where(keeps_rest(system, columns), math.inf, 0.0)
     if not system.model.sides:
@@ -191,7 +194,7 @@ def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> L
         program=run,
         slots=slots,
         functions=functions,
-        parameters=run.env[0] if run.trace.signs else np.array([value for _, value in numbers(system)] or [0.0]),
+        parameters=run.env[0] if run.trace.several else np.array([value for _, value in numbers(system)] or [0.0]),
         tol=wanted.tol,
         kept=kept if wanted.sample else 1,
         sampled=[column for kind in Sample if kind in wanted.sample for column in kind.columns(own)],

@@ -19,6 +19,7 @@ class Slots:
     own: int  # the model's
     parameters: int
     contacts: int  # of a model with several
+    frictions: int
     constants: int
     records: int
     stops: int
@@ -28,8 +29,8 @@ class Slots:
     @cached_property
     def places(self) -> dict[LanePart, int]:
         """The first slot of each part."""
-        several, contacts = self.own if self.contacts else 0, self.contacts
-        sizes = [self.rows] * 8 + [self.parameters, several, contacts, several**2, contacts**2]
+        several, contacts = self.own if self.contacts or self.frictions else 0, self.contacts
+        sizes = [self.rows] * 8 + [self.parameters + self.frictions, several, contacts, several**2, contacts**2]
         sizes += [several * (several + 2) + contacts, self.constant_guards, self.constants, self.records * RECORD_WIDTH]
         sizes += [rows * SERIES_LENGTH for rows in (self.rows, self.rows, self.own, self.stops)]
         return {part: FIRST_PART + sum(sizes[:part]) for part in LanePart}
@@ -46,8 +47,9 @@ def slots_of(trace: Trace) -> Slots:
     return Slots(
         rows=len(trace.acceleration),
         own=trace.dof,
-        parameters=max(0 if trace.signs else 1, len(trace.parameters)),
+        parameters=max(0 if trace.several else 1, len(trace.parameters)),
         contacts=len(trace.signs),
+        frictions=len(trace.rubbed),
         constants=max(1, len(constants(trace))),
         records=len(trace.records),
         stops=len(trace.reactions) + len(trace.margins),
@@ -60,7 +62,7 @@ def lane_functions_text(trace: Trace) -> str:
     """The source of `lane_series`, `lane_impact` and `lane_field`, and of a model with several contacts `lane_one_free`."""
     slots, known = slots_of(trace), constants(trace)
     functions = [_series(trace, slots, known), _impact(trace, slots, known), _field(trace, slots, known)]
-    return "".join([*functions, _one_free(trace, slots, known)] if trace.signs else functions)
+    return "".join([*functions, _one_free(trace, slots, known)] if trace.several else functions)
 
 
 def _leaves(slots: Slots, time: LaneSlot, position: LanePart, velocity: LanePart) -> dict[str, tuple[str, int]]:
@@ -69,6 +71,7 @@ def _leaves(slots: Slots, time: LaneSlot, position: LanePart, velocity: LanePart
     parts |= {"constant": LanePart.CONSTANTS, "record": LanePart.RECORDS}
     numbers = {"time": time, "record_time": LaneSlot.NOW, "origin": LaneSlot.ORIGIN, "side": LaneSlot.SIDE}
     first = {op: slots.places[part] for op, part in parts.items()}
+    first["slide"] = first["parameter"] + slots.parameters
     return {op: ("m", int(slot)) for op, slot in (first | numbers).items()}
 
 
@@ -115,7 +118,7 @@ def _impact(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
 
     Of a model with several contacts the mass matrix and E there.
     """
-    if trace.signs:
+    if trace.several:
         entries = {LanePart.MASS: trace.mass, LanePart.RESTITUTION: trace.restitution}
         filled = {("m", slots.places[part] + i): root for part, roots in entries.items() for i, root in enumerate(roots)}
         return _at_new_state("lane_impact", slots, filled, known)

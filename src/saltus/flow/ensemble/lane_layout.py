@@ -71,7 +71,8 @@ class Size(IntEnum):
     ONE_FREE = 14  # whether there is a series for lanes in which one coordinate is free (see `one_free.py`)
     GUARDS = 15  # of that series
     CONSTANT_GUARDS = 16
-    CONTACTS = 17  # of a model with several; their coordinates stand behind, then their signs
+    FRICTIONS = 17  # their coordinates stand behind those of the contacts and their signs
+    CONTACTS = 18  # of a model with several; their coordinates stand behind, then their signs
 
 
 class LaneSetting(IntEnum):

@@ -3,7 +3,7 @@
 Its compiled part goes into one module with that of `driver.py`, in the place of `one_contact.py`, and with those of
 `contact_steps.py` and `lane_impacts.py`. A lane goes on by itself while the contacts that are closed certainly push and one gap
 at most closes. Releases, contacts that close together, slow impacts and rest are left to the scalar kernel, and so is every
-event of a motion with a tangent.
+event of a motion with a tangent. All of a motion with frictions is.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.contacts.contact_impacts import solver_arrays
-from saltus.flow.contacts.contact_layout import ContactColumn
+from saltus.flow.contacts.contact_layout import ContactColumn, FrictionColumn
 from saltus.flow.ensemble.contact_steps import free_step, of_free, one_free_step, one_is_free, pass_ends_of_free
 from saltus.flow.ensemble.contacts_of_lane import tell_closed
 from saltus.flow.ensemble.lane_impacts import resolve_impacts
@@ -45,29 +45,29 @@ COST_OF_SEVERAL = 3  # How much longer a step takes with the series of all coord
 @jit
 def lane_arrays(sizes, at):
     """Arrays with a row for each lane, in the places of `LaneArray`."""
-    own, count = sizes[Size.OWN], sizes[Size.CONTACTS]
+    own, count, frictions = sizes[Size.OWN], sizes[Size.CONTACTS], sizes[Size.FRICTIONS]
     return (
         np.zeros((WIDTH, 8), dtype=np.int64),
         np.zeros((WIDTH, 2)),
         np.zeros((WIDTH, at[LanePart.RECORDS] - at[LanePart.CONSTANTS])),
-        np.zeros((WIDTH, own * own + count * count + count)),
+        np.zeros((WIDTH, own * own + count * count + count + frictions)),
         np.zeros((WIDTH, 2 * LONGEST_RECURRENCE, 2 * own)),
         np.zeros((WIDTH, LONGEST_RECURRENCE + 1), dtype=np.int64),
-        np.zeros((WIDTH, count, ContactColumn.WAITS + 1), dtype=np.int64),
+        np.zeros((WIDTH, count + frictions, ContactColumn.WAITS + 1), dtype=np.int64),
     )
 
 
 @jit
 def lane_space(sizes, at):
     """Room for two polynomials of one lane, and for an impact: the scalar kernel's `where`, `state`, `contacts` and `solver`."""
-    own, count = sizes[Size.OWN], sizes[Size.CONTACTS]
+    own, count, frictions = sizes[Size.OWN], sizes[Size.CONTACTS], sizes[Size.FRICTIONS]
     return (
         np.zeros(SERIES_LENGTH + 2),
         np.zeros(SERIES_LENGTH + 2),
         np.zeros(WHERE_LENGTH, dtype=np.int64),
         np.zeros(State.COORDINATES + 2 * own),
         np.zeros((count, ContactColumn.WAITS + 1), dtype=np.int64),
-        solver_arrays(own, count, 0),
+        solver_arrays(own, count, 0, frictions),
     )
 
 
@@ -91,8 +91,15 @@ def begin_contact(lane, code, sizes, at, m, lanes, env, state, piece):
             mode = Mode.BEYOND
         elif gap == 0.0 and mode == Mode.ARC:
             mode = Mode.CONTACT
+    for k in range(sizes[Size.FRICTIONS]):
+        coordinate, row = sizes[Size.CONTACTS + 1 + 2 * count + k], contacts[count + k]
+        rate = state[state.size // 2 + coordinate] - solved[own * own + count * count + count + k]
+        row[FrictionColumn.COORDINATE], row[FrictionColumn.SKIP] = coordinate, 0
+        row[FrictionColumn.SLIDES] = 1 if rate > 0.0 else -1 if rate < 0.0 else 0
+        row[FrictionColumn.MARGIN] = row[FrictionColumn.REACHED] = 0
+        mode = Mode.CONTACT if mode == Mode.ARC else mode
     lanes[LaneArray.LABELS][lane, LaneLabel.LEAVE_BY] = 1 if mode == Mode.CONTACT else 0  # derivatives are then one-sided
-    return mode, 1 + tell_closed(lane, at, m, contacts)
+    return mode, 1 + tell_closed(lane, at, m, contacts[:count])
 
 
 @inline_jit

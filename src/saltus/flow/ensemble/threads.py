@@ -134,8 +134,8 @@ class Lanes:
 
     @property
     def several(self) -> bool:
-        """Whether the model has several contacts."""
-        return bool(self.program.structure.signs)
+        """Whether the model has contacts or frictions that hold single coordinates."""
+        return self.program.structure.several
 
     @property
     def own(self) -> int:
@@ -173,10 +173,11 @@ class Lanes:
         module, scalar = structure.module, self.program.model if self.several else structure.functions
         geometry = pointer(module.matrices if self.several else module.geometry)
         code = (*self.functions[:3], pointer(module.constants), geometry, *self.functions[3:])
-        contacts = np.array([len(trace.signs), *trace.held, *trace.signs], dtype=np.int64)
+        contacts = np.array([len(trace.signs), *trace.held, *trace.signs, *trace.rubbed], dtype=np.int64)
         sizes = np.concatenate([np.zeros(Size.CONTACTS, dtype=np.int64), contacts])
         given = {
             Size.OWN: module.OWN,
+            Size.FRICTIONS: len(trace.rubbed),
             Size.COLUMNS: module.COLUMNS,
             Size.MARGINS: module.STOPS,
             Size.SIDES: module.SIDES,

@@ -184,7 +184,7 @@ def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple
         tol=request.tol,
     )
     going, state = ends, ends.last
-    if not request.system.model.contacts:  # what lies ahead in a straight line may lie beyond a contact
+    if not request.system.model.held:  # what lies ahead in a straight line may lie beyond a contact
         ahead, period = approached(ends.states, request.max_period)
         going = replace(ends, period=np.where(ends.unsettled, period, ends.period))  # its extrema are those of where it is going
         state = np.where(ends.unsettled[:, None], ahead, ends.last)

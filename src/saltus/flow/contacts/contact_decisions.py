@@ -1,0 +1,230 @@
+"""Decisions in the kernel for several contacts: which contacts stay closed and what sticks, and where impacts come to rest.
+
+Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines the arguments.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.flow.contacts.contact_impacts import (
+    bring_to_rest,
+    closed_bits,
+    contact_position,
+    couple,
+    fill_after,
+    frozen_accumulation,
+    gap_series,
+    hold_coordinates,
+    near_contacts,
+    record_contact_event,
+    slow_impacts,
+    smaller_set,
+)
+from saltus.flow.contacts.contact_layout import TRIED_AGAIN, ContactColumn, ContactPart, FrictionColumn, Solver
+from saltus.flow.contacts.contact_tangent import (
+    accumulation_shifts,
+    clear_shifts,
+    fill_slopes,
+    move_columns,
+    note_shifts,
+    rest_columns,
+    start_columns,
+)
+from saltus.flow.contacts.frictions import (
+    all_stand,
+    choose_slides,
+    hold_frictions,
+    record_slides,
+    slide_bits,
+    slides_before,
+    slides_so,
+    stick_columns,
+    undecided,
+)
+from saltus.flow.kernel_layout import Mode, Setting, Status, Where, Work
+from saltus.flow.memory_layout import EventCode, State
+from saltus.flow.roots import leading
+from saltus.flow.steps import expand, motion_end
+from saltus.taylor import lean_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+TIED = 1e-12  # A smaller reaction vanishes together with that of another contact: rounding of the loads that hold them.
+
+
+@lean_jit
+def holds(where, model, contacts, work, solver, candidates):
+    """Whether the first Taylor coefficients that are not 0 confirm which of the candidates are closed; notes how many are 0."""
+    order, g, own, count = where[Where.ORDER], work[Work.GAP], where[Where.OWN], contacts.shape[0]
+    for i in range(count):
+        if not candidates >> i & 1:
+            continue
+        known = contacts[i, ContactColumn.RELEASED]
+        if contacts[i, ContactColumn.CLOSED] == 1:
+            k = leading(work[Work.MARGINS][i], known, order)
+            if k < order and work[Work.MARGINS][i, k] < 0.0:
+                return False
+        else:
+            gap_series(model, contacts, work, i, contact_position(solver, own, count, i), order, g)
+            k = leading(g, 2 + known, order)
+            if k == order or g[k] < 0.0:
+                return False
+        contacts[i, ContactColumn.SKIP] = k
+    return True
+
+
+@lean_jit
+def choose_closed(where, state, env, model, contacts, frictions, work, solver, candidates, still, t, origin):
+    """Decide which of the candidates, which are at rest at their positions, stay closed; False if nothing is consistent.
+
+    0 <= reaction _|_ second derivative of the gap >= 0, and where both are 0 the same of their first derivatives that are not.
+    Likewise which of the frictions in `still`, which have the speed of their ground, stick: if they can, they do.
+    """
+    count = contacts.shape[0]
+    for number in range((1 << count) * 3 ** frictions.shape[0]):
+        choice = number & ((1 << count) - 1)  # the bits of those that open
+        if choice & ~candidates or not choose_slides(frictions, still, number >> count):
+            continue
+        for i in range(count):
+            if candidates >> i & 1:
+                contacts[i, ContactColumn.CLOSED] = 1 - (choice >> i & 1)
+        hold_coordinates(where, env, contacts)
+        hold_frictions(where, env, frictions)
+        expand(where, state, env, model, work, t, origin, 1.0, where[Where.ORDER])
+        agrees = holds(where, model, contacts, work, solver, candidates)
+        if agrees and slides_so(where, frictions, count, work, solver, still):
+            return True
+    return False
+
+
+@lean_jit
+def note_ties(where, state, env, model, contacts, work, candidates, t, origin):
+    """Note that the reactions vanish of all candidates of which they do to within rounding, as they do of one that is released.
+
+    Cells of a chain that move alike let go at one instant, of which each has its own rounding.
+    """
+    for i in range(contacts.shape[0]):
+        if candidates >> i & 1:
+            contacts[i, ContactColumn.CLOSED] = 1
+    hold_coordinates(where, env, contacts)
+    expand(where, state, env, model, work, t, origin, 1.0, 2)
+    for i in range(contacts.shape[0]):
+        if candidates >> i & 1 and abs(work[Work.MARGINS][i, 0]) <= TIED:
+            contacts[i, ContactColumn.RELEASED] = 1
+
+
+@lean_jit
+def free_pulls(where, state, env, model, contacts, work, solver, t, origin):
+    """Fill the second derivatives of the gaps with no contact closed; returns by how much they change, relatively, in time."""
+    own, change = where[Where.OWN], 0.0
+    first = env[0].size - own
+    for i in range(own):
+        env[0][first + i] = 1.0
+    expand(where, state, env, model, work, t, origin, 1.0, 2)
+    for i in range(contacts.shape[0]):
+        a = work[Work.ACCELERATIONS][contacts[i, ContactColumn.COORDINATE]]
+        solver[Solver.PULLS][i] = model[ContactPart.SIGNS][i] * a[0]
+        change = max(change, abs(a[1] / a[0]) if a[0] != 0.0 else np.inf)
+    return 1.0 + change
+
+
+@lean_jit
+def end_accumulation_of(where, state, settings, env, model, contacts, work, solver, events, t, origin):
+    """Bring to rest what impacts that get smaller and smaller bring to rest soon; returns when, or t."""
+    count, own, tol = contacts.shape[0], where[Where.OWN], settings[Setting.TOLERANCE]
+    if not couple(where, state, env, model, contacts, solver):
+        return t
+    slowest, last = slow_impacts(tol), -1
+    for i in range(count):
+        if 0.0 < solver[Solver.RATES][i] <= slowest and solver[Solver.GAPS][i] == 0.0:
+            slowest, last = solver[Solver.RATES][i], i
+    if last < 0 or contacts[last, ContactColumn.WAITS] > 0:
+        if last >= 0:
+            contacts[last, ContactColumn.WAITS] -= 1
+        return t
+    change = free_pulls(where, state, env, model, contacts, work, solver, t, origin)
+    near = near_contacts(solver, count, slow_impacts(tol))
+    if near == 0:
+        return t
+    limit = min(np.sqrt(10.0 * tol / change), motion_end(where, settings) - t)
+    left, moving = frozen_accumulation(solver, own, count, near, limit), 0
+    if left < 0.0:
+        near = smaller_set(solver, contacts, near)
+        again = frozen_accumulation(solver, own, count, near, limit) if near > 0 else -1.0
+        left = again if again >= 0.0 else left + again
+    for i in range(count):
+        moving |= (1 << i) if near >> i & 1 and solver[Solver.RATES][i] != 0.0 else 0
+    if left < 0.0:
+        contacts[last, ContactColumn.WAITS] = int(-left) // TRIED_AGAIN
+        return t
+    record_contact_event(where, state, contacts, events, EventCode.HELD, moving, t + left)
+    if where[Where.COLUMNS] > 0:
+        accumulation_shifts(where, state, env, model, contacts, work, solver, near, t, origin)
+        note_shifts(where, state, contacts, events, solver[Solver.HELD_SHIFTS], 0)
+    bring_to_rest(where, state, model, contacts, solver, near)
+    fill_after(where, state, contacts, solver, events)
+    if where[Where.COLUMNS] > 0:
+        rest_columns(where, state, env, model, contacts, solver, near)
+    return t + left
+
+
+@lean_jit
+def decide_columns(where, state, env, model, contacts, frictions, work, solver, t, origin):
+    """Take the columns on from an event, or from the start, now that it is known which contacts are closed."""
+    if where[Where.COLUMNS] == 0:
+        return
+    if where[Where.LEAVE_BY] == 1:
+        first = env[0].size - where[Where.OWN]
+        for i in range(first, env[0].size):
+            env[0][i] = 1.0
+        start_columns(where, state, env, model, contacts, work, solver, t, origin, closed_bits(contacts))
+        hold_coordinates(where, env, contacts)
+        hold_frictions(where, env, frictions)
+    if frictions.shape[0] > 0:
+        fill_slopes(where, state, env, model, solver)
+        stick_columns(where, state, solver, frictions, contacts.shape[0])
+    expand(where, state, env, model, work, t, origin, 1.0, 0)
+    move_columns(where, state, work, -1.0)
+    clear_shifts(where, state)
+
+
+@lean_jit
+def decide_contacts(where, state, settings, env, model, contacts, frictions, work, solver, events, origin):
+    """Find out which contacts are closed from here on. Returns PAUSED to go on, or NOT_UNIQUE."""
+    t, count = state[State.TIME], contacts.shape[0]
+    rested, shifts = where[Where.HELD] == 1, State.COORDINATES + 2 * where[Where.DOF]
+    for j in range(where[Where.COLUMNS]):
+        solver[Solver.HELD_SHIFTS][j] = state[shifts + j]
+    settled = end_accumulation_of(where, state, settings, env, model, contacts, work, solver, events, t, origin)
+    candidates, before = closed_bits(contacts), slides_before(frictions)
+    couple(where, state, env, model, contacts, solver)
+    still = undecided(where, state, solver, frictions)
+    if (candidates or still) and not choose_closed(
+        where, state, env, model, contacts, frictions, work, solver, candidates, still, t, origin
+    ):
+        note_ties(where, state, env, model, contacts, work, candidates, t, origin)
+        if not choose_closed(where, state, env, model, contacts, frictions, work, solver, candidates, still, t, origin):
+            return Status.NOT_UNIQUE
+    hold_coordinates(where, env, contacts)
+    hold_frictions(where, env, frictions)
+    opened = candidates & ~closed_bits(contacts)
+    if opened and where[Where.LEAVE_BY] == 0:
+        record_contact_event(where, state, contacts, events, EventCode.RELEASE, opened, t)
+        note_shifts(where, state, contacts, events, state, shifts)
+    if where[Where.LEAVE_BY] == 0:
+        record_slides(where, state, contacts, frictions, events, before, t, shifts)
+    decide_columns(where, state, env, model, contacts, frictions, work, solver, t, origin)
+    where[Where.LEAVE_BY] = 0
+    where[Where.HELD] = 1 if all_stand(where, env, solver, frictions) else 0
+    for i in range(count):
+        contacts[i, ContactColumn.RELEASED] = 0
+    for k in range(frictions.shape[0]):
+        frictions[k, FrictionColumn.REACHED] = 0
+    if where[Where.HELD] == 1 and not rested:
+        all_bits = closed_bits(contacts) | ((1 << frictions.shape[0]) - 1) << count
+        record_contact_event(where, state, contacts, events, EventCode.RESTING, all_bits, settled)
+        note_shifts(where, state, contacts, events, solver[Solver.HELD_SHIFTS], 0)
+    where[Where.MODE] = Mode.REST if where[Where.HELD] == 1 else Mode.ARC
+    where[Where.SIDE] = 1 + (closed_bits(contacts) | slide_bits(frictions, count))
+    return Status.PAUSED

@@ -1,0 +1,240 @@
+"""Dry friction in the kernel for several contacts: what sticks is held as a closed contact is, with a bound on both sides.
+
+`contacts` of the kernel has a row for each friction behind those of the contacts, in the columns of `FrictionColumn`; `frictions`
+are these rows. A friction that slides has the rate q' - w along its direction as its guard, one that sticks its two margins
+(`stick_margins`). The directions stand in the parameters of `env`, before the numbers that say which coordinates are free.
+
+Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines the arguments.
+"""
+
+from __future__ import annotations
+
+from saltus.flow.contacts.complementarity import eliminate
+from saltus.flow.contacts.contact_impacts import record_contact_event
+from saltus.flow.contacts.contact_layout import ContactPart, FrictionColumn, Solver
+from saltus.flow.contacts.contact_tangent import move_columns, note_shifts, slope
+from saltus.flow.kernel_layout import EXACT, ZERO, Mode, Setting, Where, Work
+from saltus.flow.memory_layout import EventCode, State
+from saltus.flow.roots import NEVER, SIMPLE, contact_root, leading
+from saltus.flow.steps import expand, step_size
+from saltus.taylor import lean_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+ALIKE = 1e-12  # Where mu_s = mu_k the acceleration with which sliding begins is 0, and smaller than this by rounding.
+
+
+@lean_jit
+def hold_frictions(where, env, frictions):
+    """Tell the model's functions which way each friction slides, and that what sticks is not free."""
+    first = env[0].size - where[Where.OWN]
+    for k in range(frictions.shape[0]):
+        slides = frictions[k, FrictionColumn.SLIDES]
+        env[0][first - frictions.shape[0] + k] = 1.0 * slides
+        if slides == 0:
+            env[0][first + frictions[k, FrictionColumn.COORDINATE]] = 0.0
+
+
+@lean_jit
+def slide_bits(frictions, count):
+    """What each friction does, behind the bits of `count` contacts: two bits for 0, 1 or 2, its direction and 1."""
+    bits = 0
+    for k in range(frictions.shape[0]):
+        bits |= (1 + frictions[k, FrictionColumn.SLIDES]) << (count + 2 * k)
+    return bits
+
+
+@lean_jit
+def ground_speed(solver, frictions, k):
+    """The speed of a friction's ground."""
+    return solver[Solver.NUMBERS][solver[Solver.NUMBERS].size - frictions.shape[0] + k]
+
+
+@lean_jit
+def sliding_series(frictions, work, solver, k, direction, order, g):
+    """The Taylor coefficients of a friction's sliding speed along a direction."""
+    v = work[Work.VELOCITIES][frictions[k, FrictionColumn.COORDINATE]]
+    for i in range(order + 1):
+        g[i] = direction * v[i]
+    g[0] -= direction * ground_speed(solver, frictions, k)
+
+
+@lean_jit
+def friction_step_size(where, settings, frictions, count, work, natural):
+    """The step, at most `natural`, that the forces of what sticks allow."""
+    tol = settings[Setting.TOLERANCE]
+    sharp = min(tol, EXACT) if where[Where.MODE] == Mode.REST else tol
+    for k in range(frictions.shape[0]):
+        if frictions[k, FrictionColumn.SLIDES] == 0:
+            r = work[Work.MARGINS][count + 2 * k : count + 2 * k + 2]
+            natural = min(natural, step_size(r, where[Where.ORDER], max(1.0, abs(r[0, 0])), sharp))
+    return natural
+
+
+@lean_jit
+def first_friction(where, frictions, count, work, solver, h, whole):
+    """The friction whose guard reaches 0 first within the step, when, by which of its margins, or 2 for its sliding speed.
+
+    Then whether a touch at the step's end makes it too long.
+    """
+    order, hit, first, which, shorter = where[Where.ORDER], -1, NEVER, 2, False
+    for k in range(frictions.shape[0]):
+        slides, skip = frictions[k, FrictionColumn.SLIDES], frictions[k, FrictionColumn.SKIP]
+        for b in range(2):
+            known, guard = skip, work[Work.GAP]
+            if slides == 0:
+                known, guard = skip if frictions[k, FrictionColumn.MARGIN] == b else 0, work[Work.MARGINS][count + 2 * k + b]
+                if known == 0 and guard[0] < -ZERO:
+                    return k, 0.0, b, False
+            elif b == 1:
+                continue
+            else:
+                sliding_series(frictions, work, solver, k, 1.0 * slides, order, guard)
+            if known >= order:
+                continue
+            kind, u, touch = contact_root(guard, known, order, h, work[Work.POLYNOMIAL])
+            if kind == SIMPLE and u < first:
+                hit, first, which = k, u, b if slides == 0 else 2
+            shorter = shorter or (kind != SIMPLE and 0.75 < touch <= 1.0 and whole)
+    return hit, first, which, shorter and hit < 0
+
+
+@lean_jit
+def reach(where, state, env, model, work, solver, frictions, count, t, origin, k, which, later):
+    """Take the motion to the instant at which a friction's guard is 0, with the tangent's columns.
+
+    What slides has then exactly the speed of its ground: dt = -(z - w_c) / a.
+    """
+    own, dof, rest = where[Where.OWN], where[Where.DOF], frictions[k, FrictionColumn.COORDINATE]
+    shifts = State.COORDINATES + 2 * dof
+    if where[Where.COLUMNS] > 0:
+        expand(where, state, env, model, work, t, origin, 1.0, 1)
+        if which < 2:
+            row = count + 2 * k + which
+            model[ContactPart.TANGENT](EventCode.RELEASE, row, t, origin, 1.0, env, where[Where.PIECE], state)
+        for j in range(where[Where.COLUMNS]):
+            if which < 2:
+                state[shifts + j] /= -work[Work.MARGINS][row, 1]
+            else:
+                moved = slope(solver, own, count, j, solver[Solver.NUMBERS].size - frictions.shape[0] + k)
+                sliding = state[State.COORDINATES + dof + own * (1 + j) + rest] - moved
+                state[shifts + j] = -sliding / work[Work.ACCELERATIONS][rest, 0]
+        move_columns(where, state, work, 1.0)
+    if which == 2:
+        state[State.COORDINATES + dof + rest] = ground_speed(solver, frictions, k)
+    frictions[k, FrictionColumn.REACHED] = 3 if which == 2 else 1 + which if later else 0
+
+
+@lean_jit
+def undecided(where, state, solver, frictions):
+    """The frictions, as bits, that have the speed of their ground; of the others it is noted which way they slide."""
+    bits = 0
+    for k in range(frictions.shape[0]):
+        place = State.COORDINATES + where[Where.DOF] + frictions[k, FrictionColumn.COORDINATE]
+        rate = state[place] - ground_speed(solver, frictions, k)
+        if rate == 0.0:
+            bits |= 1 << k
+        else:
+            frictions[k, FrictionColumn.SLIDES], frictions[k, FrictionColumn.SKIP] = 1 if rate > 0.0 else -1, 0
+    return bits
+
+
+@lean_jit
+def choose_slides(frictions, candidates, choice):
+    """Let each of the candidates stick, slide forwards or backwards, by the digits of a number; False if others have one."""
+    for k in range(frictions.shape[0]):
+        digit, choice = choice % 3, choice // 3
+        if candidates >> k & 1:
+            frictions[k, FrictionColumn.SLIDES] = digit if digit < 2 else -1
+        elif digit > 0:
+            return False
+    return True
+
+
+@lean_jit
+def slides_so(where, frictions, count, work, solver, candidates):
+    """Whether the first Taylor coefficients that are not 0 confirm what the candidates do; notes how many are 0."""
+    order, g = where[Where.ORDER], work[Work.GAP]
+    for k in range(frictions.shape[0]):
+        if not candidates >> k & 1:
+            continue
+        slides, reached = frictions[k, FrictionColumn.SLIDES], frictions[k, FrictionColumn.REACHED]
+        frictions[k, FrictionColumn.SKIP], frictions[k, FrictionColumn.MARGIN] = 0, 0
+        if slides == 0:
+            for b in range(2):
+                row = work[Work.MARGINS][count + 2 * k + b]
+                i = leading(row, 1 if reached == 1 + b else 0, order)
+                if i < order and row[i] < 0.0:
+                    return False
+                if i > 0:
+                    frictions[k, FrictionColumn.SKIP], frictions[k, FrictionColumn.MARGIN] = i, b
+            continue
+        sliding_series(frictions, work, solver, k, 1.0 * slides, order, g)
+        i = leading(g, 2 if reached > 0 and abs(g[1]) <= ALIKE else 1, order)
+        if i == order or g[i] < 0.0:
+            return False
+        frictions[k, FrictionColumn.SKIP] = i
+    return True
+
+
+@lean_jit
+def record_slides(where, state, contacts, frictions, events, before, t, shifts):
+    """Record what has begun to stick or to slide, or has turned round, since it did what `before` says, in the bits of 3^k."""
+    for k in range(frictions.shape[0]):
+        was, slides = before % 3 - 1, frictions[k, FrictionColumn.SLIDES]
+        before //= 3
+        if slides != was:
+            kind = EventCode.SLIP if was == 0 else EventCode.STICK if slides == 0 else EventCode.REVERSAL
+            record_contact_event(where, state, contacts, events, kind, 1 << (contacts.shape[0] + k), t)
+            note_shifts(where, state, contacts, events, state, shifts)
+
+
+@lean_jit
+def slides_before(frictions):
+    """What all frictions do, as the digits of a number to the base 3."""
+    number = 0
+    for k in range(frictions.shape[0] - 1, -1, -1):
+        number = 3 * number + 1 + frictions[k, FrictionColumn.SLIDES]
+    return number
+
+
+@lean_jit
+def stick_columns(where, state, solver, frictions, count):
+    """The columns of what sticks: z = w_c, by the impulses with which friction stops what slides beside it, M dz = S p.
+
+    At an instant at which it begins to stick nothing is left to stop. At a start motions beside it slide for a time of the order
+    of their sliding speeds, in which nothing else changes.
+    """
+    own, dof, block = where[Where.OWN], where[Where.DOF], solver[Solver.BLOCK]
+    for j in range(where[Where.COLUMNS]):
+        size = 0
+        for k in range(frictions.shape[0]):
+            if frictions[k, FrictionColumn.SLIDES] == 0:
+                a, column = frictions[k, FrictionColumn.COORDINATE], 0
+                for other in range(frictions.shape[0]):
+                    if frictions[other, FrictionColumn.SLIDES] == 0:
+                        block[size, column] = solver[Solver.INVERSE][a, frictions[other, FrictionColumn.COORDINATE]]
+                        column += 1
+                moved = slope(solver, own, count, j, solver[Solver.NUMBERS].size - frictions.shape[0] + k)
+                block[size, column] = moved - state[State.COORDINATES + dof + own * (1 + j) + a]
+                size += 1
+        eliminate(block, size, size + 1)
+        row = 0
+        for k in range(frictions.shape[0]):
+            if frictions[k, FrictionColumn.SLIDES] == 0:
+                for a in range(own):
+                    gain = solver[Solver.INVERSE][a, frictions[k, FrictionColumn.COORDINATE]]
+                    state[State.COORDINATES + dof + own * (1 + j) + a] += gain * block[row, size]
+                row += 1
+
+
+@lean_jit
+def all_stand(where, env, solver, frictions):
+    """Whether no coordinate moves: none is free, and what sticks does so on ground that stands still."""
+    for i in range(env[0].size - where[Where.OWN], env[0].size):
+        if env[0][i] != 0.0:
+            return False
+    moves = False
+    for k in range(frictions.shape[0]):
+        moves = moves or ground_speed(solver, frictions, k) != 0.0
+    return not moves

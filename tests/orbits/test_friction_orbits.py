@@ -1,0 +1,98 @@
+"""Orbits with dry friction, followed as whole motions: closed forms, derivatives, branches, files, verdicts."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin, sqrt
+
+import numpy as np
+import pytest
+
+import saltus
+
+
+def rubbed(frequency: float = 0.7, friction: float = 0.2, **numbers: float) -> saltus.System:
+    """A mass on ground that stands still under a harmonic force of amplitude 1."""
+    model = saltus.BeltOscillator(**({"kinetic": friction, "static": friction, "belt_speed": 0.0} | numbers))
+    return saltus.System(model=model, load=saltus.Load(frequency=frequency, force=saltus.Harmonic(amplitude=1.0)))
+
+
+def den_hartog(frequency: float, friction: float) -> float:
+    """The amplitude of the motion that never sticks (1931)."""
+    vee, you = 1 / (1 - frequency**2), sin(pi / frequency) / (frequency * (1 + cos(pi / frequency)))
+    return sqrt(vee**2 - (you * friction) ** 2)
+
+
+@pytest.fixture(scope="module")
+def branch() -> saltus.Branch:
+    """Orbits from frequency 0.55 to 0.95."""
+    orbit = saltus.find_orbit(rubbed(), x=0.5, velocity=0.0)
+    return saltus.continue_orbit(orbit, "load.frequency", (0.55, 0.95))
+
+
+def test_a_branch_has_den_hartogs_amplitudes(branch: saltus.Branch) -> None:
+    """All along it, to 1e-10."""
+    assert [end.parameter for end in branch.ends] == pytest.approx([0.55, 0.95])
+    for orbit in branch.orbits:
+        expected = den_hartog(orbit.frequency, 0.2)
+        assert abs(orbit.amplitude - expected) < 1e-10 * expected
+        assert orbit.defect < 1e-11
+
+
+def test_multipliers_are_those_of_differences() -> None:
+    """Of a motion that sticks twice a period: one multiplier is lost with the speed, the other one is that of direct motions."""
+    system = rubbed(0.3, 0.4, damping=0.1)
+    orbit = saltus.find_orbit(system, x=0.2, velocity=0.1)
+    kinds = {str(event.kind) for event in orbit.motion().events}
+    assert {"stick", "slip"} <= kinds
+    assert np.abs(orbit.multipliers).min() < 1e-12
+    x, v = orbit.state
+
+    def after(dx: float, dv: float) -> np.ndarray:
+        motion = saltus.simulate(system, x=x + dx, velocity=v + dv, periods=1, tol=1e-14)
+        return np.array([motion.x, motion.velocity])
+
+    step = 1e-5
+    slopes = [(after(step * (i == 0), step * (i == 1)) - after(-step * (i == 0), -step * (i == 1))) / (2 * step) for i in (0, 1)]
+    expected = np.abs(np.linalg.eigvals(np.array(slopes).T))
+    assert abs(np.abs(orbit.multipliers).max() - expected.max()) < 1e-8
+
+
+def test_its_derivative_to_a_parameter_is_that_of_the_closed_form(branch: saltus.Branch) -> None:
+    """The tangent of the branch, between neighbouring points, and frequency with a section that stays at its phase."""
+    problem = branch.orbits[len(branch.orbits) // 2].problem
+    orbit = branch.orbits[len(branch.orbits) // 2]
+    unknowns, value, step = orbit.solution.unknowns, orbit.solution.values, 1e-6
+    ahead, behind = (problem.evaluate(unknowns, value + s * step).residual for s in (1, -1))
+    assert np.abs((ahead - behind) / (2 * step) - orbit.solution.equations.parameters[:, 0]).max() < 1e-6
+
+
+def test_branches_are_read_from_files(branch: saltus.Branch) -> None:
+    """With the phase of their section."""
+    again = saltus.orbits.orbits_of(branch.to_xarray())
+    assert [orbit.amplitude for orbit in again] == [orbit.amplitude for orbit in branch.orbits]
+
+
+def test_power_is_what_the_force_gives() -> None:
+    """On an orbit friction and damping take what the force gives."""
+    orbit = saltus.find_orbit(rubbed(0.4, 0.3, damping=0.05), x=0.5, velocity=0.0)
+    motion = orbit.motion(tol=1e-14)
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    ends = np.unique(np.concatenate([np.linspace(motion.start, motion.time, 60), [event.time for event in motion.events]]))
+    middle, half = 0.5 * (ends[1:] + ends[:-1]), 0.5 * np.diff(ends)
+    t = (middle[:, None] + half[:, None] * nodes).ravel()
+    given = float(np.dot((half[:, None] * weights).ravel(), np.sin(0.4 * t) * motion.at(t)[1])) / orbit.duration
+    assert abs(saltus.mean_dissipated_power(orbit) - given) < 1e-11
+
+
+def test_verdicts_and_attractors_know_these_orbits() -> None:
+    """A regular motion, and all motions end on it."""
+    system = rubbed(0.6, 0.3, damping=0.05)
+    assert str(saltus.classify(system, x=0.1, velocity=0.2, periods=300).kind) == "periodic"
+    found = saltus.find_attractors(system, starts=12, seed=2)
+    assert [(str(member.kind), member.period) for member in found] == [("periodic", 1)]
+
+
+def test_a_mass_that_sticks_for_good_is_refused() -> None:
+    """It may do so anywhere near, so there is no orbit to follow."""
+    with pytest.raises(saltus.MotionError, match="sticks for good"):
+        saltus.find_orbit(rubbed(0.5, 1.5), x=0.1, velocity=0.0)
