@@ -8,7 +8,7 @@ from typing import Any
 from saltus.errors import ParameterError
 from saltus.public_functions import answering
 
-MOST = 6  # Which of them stick, and which way the others slide, is found by trying, 3^n choices at worst.
+MOST_FRICTIONS = 6  # Which of them stick, and which way the others slide, is found by trying, 3^n choices at worst.
 
 
 @answering("__init__")
@@ -67,8 +67,8 @@ def check_frictions(model: Any) -> None:
     """
     frictions, kind = model.frictions, type(model).__name__
     names = [part.name for part in (*model.contacts, *frictions)]
-    if len(frictions) > MOST:
-        raise ParameterError(f"{kind} has {len(frictions)} frictions, and at most {MOST} can be followed", "model")
+    if len(frictions) > MOST_FRICTIONS:
+        raise ParameterError(f"{kind} has {len(frictions)} frictions, and at most {MOST_FRICTIONS} can be followed", "model")
     if len(set(names)) < len(names):
         raise ParameterError(f"contacts and frictions of {kind} must have names of their own, got {', '.join(names)}", "model")
     if model.sides:

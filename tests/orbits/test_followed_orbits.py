@@ -1,4 +1,4 @@
-"""Orbits with dry friction, followed as whole motions: closed forms, derivatives, branches, files, verdicts."""
+"""Orbits that are followed as whole motions, with dry friction or impacts that die away: closed forms, branches, files."""
 
 from __future__ import annotations
 
@@ -96,3 +96,28 @@ def test_a_mass_that_sticks_for_good_is_refused() -> None:
     """It may do so anywhere near, so there is no orbit to follow."""
     with pytest.raises(saltus.MotionError, match="sticks for good"):
         saltus.find_orbit(rubbed(0.5, 1.5), x=0.1, velocity=0.0)
+
+
+def test_an_orbit_whose_impacts_die_away_is_that_of_the_engine_for_one_contact() -> None:
+    """A mass that is pulled off a stop in every period, bounces and rests: a `RestingOrbit` of `WallOscillator`, or one stop."""
+    load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=1.5, mean=1.0))
+    law, numbers = saltus.VelocityReduction(0.4), {"stiffness": 0.2, "damping": 0.1}
+    wall = saltus.System(model=saltus.WallOscillator(wall=0.0, **numbers), load=load, impact=law)
+    stops = saltus.System(model=saltus.TwoStops(left=-50.0, right=0.0, **numbers), load=load, impact=saltus.NewtonImpact(e=0.4))
+    expected, orbit = saltus.find_orbit(wall, x=-0.5), saltus.find_orbit(stops, x=-0.5)
+    assert abs(orbit.amplitude - expected.amplitude) < 1e-12
+    assert np.abs(orbit.multipliers).max() < 1e-12  # after rest nothing is left of a start
+    branch = saltus.continue_orbit(orbit, "load.force.amplitude", (1.4, 1.6))
+    for value, point in ((branch.orbits[0].system.get("load.force.amplitude"), branch.orbits[0]), (1.6, branch.orbits[-1])):
+        there = saltus.find_orbit(wall.with_({"load.force.amplitude": value}), x=-0.5)
+        assert abs(point.amplitude - there.amplitude) < 1e-11
+
+
+def test_both_layers_have_orbits_whose_impacts_die_away() -> None:
+    """With a restitution: found, and repeated by direct simulation; two multipliers are lost with the layer that rests."""
+    model = saltus.TwoLayer(beta0=np.deg2rad(80), damping=0.1, mass_ratio=0.2)
+    load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.4))
+    orbit = saltus.find_orbit(saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.3)), theta_1=0.1, theta_2=0.0)
+    assert orbit.signature.section is not None
+    assert orbit.defect < 1e-11
+    assert (np.sort(np.abs(orbit.multipliers))[:2] < 1e-12).all()
