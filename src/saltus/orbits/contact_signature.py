@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow import EventKind, Motion, modes_of, simulate
+from saltus.flow import EventKind, Motion, Stop, modes_of, simulate
 from saltus.orbits.contact_problem import ContactProblem, problem_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
@@ -38,8 +38,10 @@ def solved_from(base: Problem, state: dict[str, Any], periods: int, iterations: 
     motion = simulate(base.system, **state, periods=2 * periods, tol=SETTINGS.tol)
     if motion.limit is not None:
         return None
-    problem, unknowns = _as_a_whole(base, motion, periods) if _is_whole(base, motion) else read_signature(base, motion, periods)
-    if not problem.size:
+    whole = _is_whole(base, motion)
+    problem, unknowns = _as_a_whole(base, motion, periods) if whole else read_signature(base, motion, periods)
+    later = motion.events and motion.events[-1].time > 0.5 * (motion.start + motion.time)
+    if not problem.size or (whole and motion.stop is Stop.REST and not later):
         raise MotionError("the motion comes to rest with all coordinates held at contacts for good, which is no orbit to follow")
     return PeriodicOrbit.near(problem, unknowns, problem.values, iterations=iterations)
 
