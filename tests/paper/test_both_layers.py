@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from saltus.paper.figures.both_layers import FATES, beside, embedded, stable_states
-from saltus.paper.figures.harmonic_loads import AMPLITUDE, under_force
+from saltus.paper.figures.harmonic_loads import AMPLITUDE, FREQUENCY, under_force
 
 
 def test_a_state_of_the_reduced_model_opens_the_layer_of_its_sign():
@@ -22,6 +22,16 @@ def test_steady_motions_are_exact_up_to_the_load_that_opens_the_closed_layer():
     amplitude = data[AMPLITUDE].values
     assert same[amplitude < 0.174].all()
     assert not same[amplitude > 0.174].any()
+
+
+def test_a_transfer_changes_no_motion_whose_impacts_open_both_layers():
+    """It acts at closed contacts: with e > 0 the other layer is open when one closes."""
+    places = {FREQUENCY: np.array([0.2876543, 0.1938271, 0.66]), AMPLITUDE: np.array([0.5, 0.2, 0.2])}
+    data = beside(under_force(), places, ((0.001, 0.5, 0.0), (0.001, 0.5, 0.5), (0.001, 0.0, 0.0), (0.001, 0.0, 1.0)))
+    full = data["full"].values
+    assert np.isfinite(full[0]).any()
+    np.testing.assert_array_equal(full[0], full[1])
+    assert not np.array_equal(full[2], full[3], equal_nan=True)
 
 
 @pytest.mark.parametrize("stiffness", [1.0, 1.1])

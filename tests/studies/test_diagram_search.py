@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from shared_systems import forced
+from shared_systems import forced, under
 from study_cases import FREQUENCY
 
 from saltus.branch_tables import branches_of
@@ -15,6 +15,7 @@ from saltus.orbits.newton import solve
 from saltus.studies import response_spectrum
 from saltus.studies.diagram.diagram_search import MissedShare
 from saltus.studies.diagram.simulated import starts_at
+from saltus.systems import Harmonic
 
 WINDOW = ((-4.0, 4.0), (-4.0, 4.0))
 SYSTEM = forced(1.0)
@@ -40,13 +41,13 @@ def test_the_interval_of_the_missed_share_is_wilsons(missed, sample, low, high):
     assert found.interval[0] <= found.share <= found.interval[1]
 
 
-def independent_attractors(bounds, values, starts, seed):
+def independent_attractors(bounds, values, starts, seed, system=SYSTEM):
     """What random states lead to, by another seed and tolerance: value, period, highest, lowest, share of the starts."""
     rng = np.random.default_rng(seed)
     grid = rng.uniform(*bounds, values)
     column = np.repeat(grid, starts)
     ends = find_recurrence(
-        SYSTEM, rng.uniform(-4, 4, (len(column), 2)), 800, parameters={FREQUENCY: column}, kept=0, extrema=True, tol=1e-13
+        system, rng.uniform(-4, 4, (len(column), 2)), 800, parameters={FREQUENCY: column}, kept=0, extrema=True, tol=1e-13
     )
     rows = []
     for value in grid:
@@ -95,8 +96,8 @@ def test_what_an_independent_simulation_finds_lies_on_the_stable_branches(diagra
 
 def test_all_that_was_simulated_lies_on_a_branch_or_is_listed_with_its_reason(diagram):
     assert diagram["attractors"]["placed"].values.all()
-    assert set(diagram["unplaced"]["reason"].values.tolist()) <= {"longer"}
-    assert (diagram["unplaced"]["period"].values > diagram.attrs["max_period"]).all()
+    assert set(diagram["unplaced"]["reason"].values.tolist()) <= {"rare"}
+    assert (diagram["unplaced"]["period"].values > 6).all()
     assert diagram.attrs["values"] == len(diagram["search"]["searched"]) == 61
 
 
@@ -111,6 +112,19 @@ def test_what_a_diagram_leaves_out_is_in_its_estimate(diagram):
     assert small.attrs["missed_low"] - 0.1 < share < small.attrs["missed_high"] + 0.1
     assert small.attrs["missed_low"] > diagram.attrs["missed_high"]
     assert "longer" in small["unplaced"]["reason"].values
+
+
+def test_motions_of_long_periods_are_followed_where_random_ones_end_on_them():
+    """On a ground that moves by 0.5 one of nine forcing periods takes a quarter of the states."""
+    system = under(ground_horizontal=Harmonic(0.5), vertical=-0.5)
+    bounds, options = (2.92, 2.96), {"window": WINDOW, "effort": "quick", "repelling": 0, "bands": False, "switch": False}
+    rows = [row for row in independent_attractors(bounds, 3, 50, 13, system) if row[1] == 9 and row[4] >= 0.1]
+    assert len(rows) >= 3
+    found = response_spectrum(system, FREQUENCY, bounds, **options)
+    assert [row for row in rows if not lies_on_a_stable_branch(found, row)] == []
+    shorter = response_spectrum(system, FREQUENCY, bounds, max_period=6, **options)
+    assert "longer" in shorter["unplaced"]["reason"].values
+    assert shorter.attrs["missed"] > 0
 
 
 def test_a_closed_curve_passes_every_value_an_even_number_of_times():

@@ -135,7 +135,8 @@ def judge_unsettled(
     run.follow(settings.first_periods, part_of(progress, 0.0, 0.2, "judging"))
     run.measure()
     for i in range(settings.rounds):
-        run.open &= (run.positive & ~run.lasts) | (~run.positive & ~run.negative & (run.gone > 0))
+        open_chaos = run.positive & ~run.lasts & run.may_last(settings.rounds - i)
+        run.open &= open_chaos | (~run.positive & ~run.negative & (run.gone > 0))
         run.follow(settings.round_periods, part_of(progress, 0.3 + 0.7 * i / settings.rounds, 1.0, "judging"))
     run.look_for_long_periods()
     progress(1.0, "judging")
@@ -218,8 +219,18 @@ class _Judgement:
     @property
     def lasts(self) -> np.ndarray:
         """Where none has settled for so long that a transient is excluded, (n,)."""
+        return self._lacking <= 0.0
+
+    @property
+    def _lacking(self) -> np.ndarray:
+        """In how many more forcing periods of companions none may settle, so that a transient is excluded, (n,)."""
         life = self.before / np.maximum(self.gone, 1)
-        return np.asarray(self.exposure - self.before >= np.maximum(self.settings.exposure, 3.0 * life))
+        return np.asarray(np.maximum(self.settings.exposure, 3.0 * life) - (self.exposure - self.before))
+
+    def may_last(self, rounds: int) -> np.ndarray:
+        """Where so many more rounds can exclude a transient, or are needed to call it one, (n,)."""
+        within = self._lacking <= rounds * self.settings.round_periods * self.settings.companions
+        return np.asarray(within | (self.gone < self.settings.settled))
 
     def _keep_settled(self, rows: np.ndarray, ends: Recurrence) -> None:
         """Remember on what companions have settled."""

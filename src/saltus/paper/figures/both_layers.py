@@ -19,10 +19,11 @@ from saltus.paper.figures.harmonic_loads import AMPLITUDE, FREQUENCY, under_forc
 from saltus.paper.figures.phase_portraits import constant_load
 from saltus.systems import NewtonImpact, System, TwoLayer
 
-# Of the full model: m, e of both layers, and the transfer g. With m = 0 and (e, g) = (0, 1) it has the paper's crossing.
+# Of the full model: m, e of both layers, and the transfer g. With m = 0 and (e, g) = (0, 1) it has the paper's crossing. With
+# e > 0 the transfer changes no motion, as the other layer is open when one closes.
 VARIANTS: tuple[tuple[float, float, float], ...] = (
     (0.0, 0.0, 1.0),
-    *((m, e, g) for m in (0.001, 0.01) for e, g in ((0.0, 1.0), (0.0, 0.0), (0.5, 0.0), (0.5, 0.5))),
+    *((m, e, g) for m in (0.001, 0.01) for e, g in ((0.0, 1.0), (0.0, 0.0), (0.5, 0.0))),
 )
 REFERENCE = (0.001, 0.0, 0.0)  # the variant of the pictures: almost no mass, frictionless inelastic contact (erratum 25)
 VERTICAL_LOAD = "load.vertical"

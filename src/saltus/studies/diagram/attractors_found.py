@@ -21,6 +21,10 @@ class Place(NumberedSentence):
     NO_ORBIT = 3, "Newton's method finds no orbit near it"
     UNSTABLE = 4, "the orbit near it is not called stable: it grazes, or is about to lose its stability"
     ELSEWHERE = 5, "the branch of the orbit near it does not come back to it"
+    RARE = 6, "its period is long, and no random motion ends on it"
+
+
+LONG = 6  # Motions of longer periods are many, and most attract little: those are followed on which random motions end.
 
 
 @dataclass
@@ -62,12 +66,19 @@ class AttractorsFound:
         self.starts = np.diff(np.append(begin, len(rows)))
         self.attractor = np.arange(len(self.motions))
         self.attractor[rows] = np.repeat(self.rows, self.starts)
-        self.place[self.rows[self.motions.period[self.rows] > self.max_period]] = Place.LONGER
+        period = self.motions.period[self.rows]
+        self.place[self.rows[period > self.max_period]] = Place.LONGER
+        self.place[np.intersect1d(self.open, self.rows[period > LONG])] = Place.RARE
 
     @property
     def open(self) -> np.ndarray:
         """The rows of attractors of which it is not known yet where they stand."""
         return np.asarray(self.rows[self.place[self.rows] == Place.OPEN])
+
+    def reopen(self, motions: np.ndarray) -> None:
+        """Motions of these rows end on attractors that are not rare, then."""
+        ends = self.attractor[motions]
+        self.place[ends[self.place[ends] == Place.RARE]] = Place.OPEN
 
     @property
     def unplaced(self) -> np.ndarray:

@@ -15,6 +15,7 @@ from saltus.orbits import STEP
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.checks import check_diagram
+from saltus.studies.diagram.attractors_found import LONG
 from saltus.studies.diagram.branch_set import BranchSet
 from saltus.studies.diagram.diagram_dataset import diagram_tree
 from saltus.studies.diagram.diagram_search import DiagramSearch
@@ -76,7 +77,7 @@ def bifurcation_diagram(
     bounds: tuple[float, float] = (0.0, 3.0),
     *,
     effort: str = "standard",
-    max_period: int = 6,
+    max_period: int = 16,
     values: Iterable[float] | None = None,
     starts: int | None = None,
     window: Box | None = None,
@@ -106,7 +107,8 @@ def bifurcation_diagram(
     path, bounds, effort
         Dotted path of the parameter, its range, and how much is tried, see `Effort`.
     max_period
-        The longest period, in forcing periods, that is followed.
+        The longest period, in forcing periods, that is followed; of those beyond 6 only what random motions end on, while it
+        is stable.
     values
         Where is simulated, by default evenly, as many as the effort says. If given, what is random is not followed.
     starts, window, seed
@@ -146,8 +148,8 @@ def bifurcation_diagram(
     progress(0.0, "searching")
     plan, middle = diagram_plan(system, path, (low, high), area, seed), system.with_({path: 0.5 * (low + high)})
     with diagram_work(middle, path, plan, None if store is None else Path(store), workers, scheduler) as work:
-        branches = BranchSet(work, (low, high), max_period, step, switch, tried.branches)
-        search = DiagramSearch(work, (low, high), grid, area, seed, tried, branches)
+        branches = BranchSet(work, (low, high), min(max_period, LONG), step, switch, tried.branches)
+        search = DiagramSearch(work, (low, high), grid, area, seed, tried, branches, max_period)
         _search(search, repelling, bands, values is None, progress)
         tree = diagram_tree(search, kind="bifurcation_diagram", effort=str(read_effort(effort)), max_period=max_period)
     progress(1.0, "done")
@@ -176,7 +178,7 @@ def response_spectrum(
     bounds: tuple[float, float] = (0.1, 3.0),
     *,
     effort: str = "standard",
-    max_period: int = 6,
+    max_period: int = 16,
     values: Iterable[float] | None = None,
     starts: int | None = None,
     window: Box | None = None,

@@ -123,7 +123,8 @@ def _moved(orbit: RestingOrbit, rounds: int) -> float:
 def _attractors(search: DiagramSearch) -> xarray.Dataset:
     """What motions settled on at the values of the grid, a dot for each attractor that is followed."""
     found = search.found
-    shown = np.isin(found.motions.value[found.rows], search.grid) & (found.place[found.rows] != Place.LONGER)
+    left = np.isin(found.place[found.rows], (Place.LONGER, Place.RARE))
+    shown = np.isin(found.motions.value[found.rows], search.grid) & ~left
     data = _dots(search, found.rows[shown])
     data["starts"] = ("dot", found.starts[shown], {"long_name": "motions of the simulation that have settled on it"})
     data["placed"] = ("dot", (found.place[found.rows[shown]] == Place.ON_BRANCH).astype(np.int8))

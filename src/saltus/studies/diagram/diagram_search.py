@@ -13,7 +13,7 @@ from saltus.checks import Window
 from saltus.flow import motions_from, stroboscopic
 from saltus.orbits import PeriodicOrbit, keeps_symmetry, orbits_near_returns, solved_near, within_window
 from saltus.progress import Progress, silent
-from saltus.studies.diagram.attractors_found import AttractorsFound, Place
+from saltus.studies.diagram.attractors_found import LONG, AttractorsFound, Place
 from saltus.studies.diagram.band_edges import seeds_of
 from saltus.studies.diagram.bands import Bands
 from saltus.studies.diagram.branch_set import BranchSet
@@ -37,6 +37,9 @@ class DiagramSearchSettings:
     # Where a stable part of a branch ends, motions are started from its last orbit, these shares of the range further on both
     # sides: what they fall to is there where no start of the grid may lead.
     beyond: tuple[float, ...] = (3e-5, 3e-4)
+    # Forcing periods that random motions are given which have not settled where there is no chaos: transients of the mean life
+    # that is excluded for chaos, 6600, leave one in twenty.
+    lasting: int = 20_000
 
 
 SETTINGS = DiagramSearchSettings()
@@ -72,6 +75,7 @@ class DiagramSearch:
     seed: int
     effort: EffortSettings
     branches: BranchSet
+    max_period: int  # the longest one that is followed
     found: AttractorsFound = field(init=False)
     chaos: Bands | None = None
     missed: MissedShare = field(default_factory=MissedShare)
@@ -81,7 +85,7 @@ class DiagramSearch:
         """The simulation of the diagram: motions from the starts at every value of the grid."""
         states = starts_at(self.system, self.grid, self.effort.starts, self.window, self.seed)
         motions = self.simulated(np.repeat(self.grid, self.effort.starts), states.reshape(-1, self.system.dimension), progress)
-        self.found = AttractorsFound(motions, self.branches.max_period)
+        self.found = AttractorsFound(motions, self.max_period)
 
     def simulated(self, values: np.ndarray, states: np.ndarray, progress: Progress = silent) -> SimulatedMotions:
         """Motions from states (n, d) at values (n,), as long as the effort says."""
@@ -114,7 +118,7 @@ class DiagramSearch:
                 row = _middle(run)
                 if not self._is_placed(row, self.branches.placed[self.found.looked[row] :]):
                     self._prepare(runs[number:])
-                    self.found.place[row] = self._follow(row, while_stable=self._is_narrow(run))
+                    self.found.place[row] = self._follow(row, while_stable=self._is_partial(run))
                 known = len(self.branches.placed)
                 progress(known / (known + len(rows)), f"following, branches: {known}")
 
@@ -131,8 +135,11 @@ class DiagramSearch:
     def _is_placed(self, row: int, branches: list[PlacedBranch]) -> bool:
         return bool(placed(self.found.motions.only([row]), branches, self.mirrored)[0])
 
-    def _is_narrow(self, run: np.ndarray) -> bool:
-        """Whether motions of a run are stable in a small part of the range alone, as far as simulated values show."""
+    def _is_partial(self, run: np.ndarray) -> bool:
+        """Whether motions of a run are followed only while they are stable: those of long periods, and those that are so in a
+        small part of the range alone, as far as simulated values show."""
+        if self.found.motions.period[run[0]] > LONG:
+            return True
         span, gap = np.ptp(self.found.motions.value[run]), np.diff([self.bounds[0], *self.grid, self.bounds[1]]).max()
         return bool(span + 2.0 * gap < SETTINGS.narrow * (self.bounds[1] - self.bounds[0]))
 
@@ -145,7 +152,7 @@ class DiagramSearch:
             return
         chosen: dict[Any, tuple[int, bool]] = {}
         for run in runs:
-            row, narrow = _middle(run), self._is_narrow(run)
+            row, narrow = _middle(run), self._is_partial(run)
             key = row if narrow else (int(self.found.motions.period[row]),)
             wanted = len(chosen) < self.work.at_once and key not in chosen and row not in self.prepared
             if wanted and not self._is_placed(row, self.branches.placed[self.found.looked[row] :]):
@@ -176,7 +183,7 @@ class DiagramSearch:
         grid = self.grid[np.unique(np.linspace(0, len(self.grid) - 1, self.effort.repelling_values).astype(int))]
         begin = starts_at(self.system, grid, self.effort.starts, self.window, self.seed)
         columns = {self.path: np.repeat(grid, self.effort.starts)}
-        options = {"periods": SETTINGS.transient, "last": "all", "tol": 1e-10}
+        options = {"periods": SETTINGS.transient, "last": "all", "tol": 1e-10, "until": ("rest",)}
         d, motions = self.system.dimension, self.found.motions
         early = stroboscopic(self.system, motions_from(self.system, begin.reshape(-1, d), parameters=columns, **options))
         shape = (len(grid), self.effort.starts, -1, d)
@@ -228,7 +235,8 @@ class DiagramSearch:
     def estimate(self, follow: bool) -> None:
         """Estimate which share of the states ends on something that the diagram does not have, by random motions.
 
-        With `follow` these motions are followed too, after they have been counted, and new ones are counted then.
+        What has not settled where there is no chaos is given more time, as it is on its way to something. With `follow` these
+        motions are followed too, after they have been counted, and new ones are counted then.
         """
         for number in range(self.effort.samples):
             motions = self._random_motions(number)
@@ -240,6 +248,7 @@ class DiagramSearch:
             self.missed = MissedShare(int(missed.sum()), len(motions), number + 1)
             if not follow or not missed.any():
                 return
+            self.found.reopen(np.arange(first, len(self.found.motions)))
             self.follow(silent)
 
     def _random_motions(self, number: int) -> SimulatedMotions:
@@ -247,7 +256,11 @@ class DiagramSearch:
         rng = np.random.default_rng([self.seed, number, self.effort.sample])
         values = rng.uniform(*self.bounds, self.effort.sample)
         points = rng.uniform(-1.0, 1.0, (self.effort.sample, len(self.window)))
-        return self.simulated(values, within_window(self.system, points, self.window))
+        motions = self.simulated(values, within_window(self.system, points, self.window))
+        loose = np.flatnonzero(motions.unsettled & ~self._in_bands(values))
+        if loose.size:
+            motions.gone_on(loose, self.work.followed(values[loose], motions.last[loose], SETTINGS.lasting))
+        return motions
 
     def _in_bands(self, values: np.ndarray) -> np.ndarray:
         """Which values lie in a band of chaos, (n,)."""

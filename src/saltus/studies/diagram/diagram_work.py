@@ -96,9 +96,10 @@ class DiagramWork:
 
     def simulate(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent) -> SimulatedMotions:
         """`simulate_from` states at values of the parameter."""
-        return simulate_from(self.system, self.path, values, states, periods, progress, self._followed)
+        return simulate_from(self.system, self.path, values, states, periods, progress, self.followed)
 
-    def _followed(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress) -> SimulatedMotions:
+    def followed(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent) -> SimulatedMotions:
+        """`followed` from states at values of the parameter: no longer than so many periods, also where they are slow."""
         if self.parts is None:
             return followed(self.system, self.path, values, states, periods, progress)
         begun = np.column_stack([values, states]).tolist()

@@ -78,6 +78,11 @@ class SimulatedMotions:
         """Some of the motions."""
         return SimulatedMotions(*(getattr(self, part.name)[rows] for part in fields(self)))
 
+    def gone_on(self, rows: np.ndarray, later: SimulatedMotions) -> None:
+        """Put what has become of some of the motions in their places."""
+        for part in fields(self):
+            getattr(self, part.name)[rows] = getattr(later, part.name)
+
     def joined(self, *others: SimulatedMotions) -> SimulatedMotions:
         """These motions, then others."""
         every = (self, *others)
@@ -120,9 +125,7 @@ def simulate_from(
     found = follow(values, states, periods, progress)
     slow = np.flatnonzero(found.unsettled & _is_slow(found))
     if slow.size:
-        further = follow(values[slow], found.last[slow], SETTINGS.patience * periods, silent)
-        for part in fields(found):
-            getattr(found, part.name)[slow] = getattr(further, part.name)
+        found.gone_on(slow, follow(values[slow], found.last[slow], SETTINGS.patience * periods, silent))
     return found
 
 
