@@ -173,15 +173,15 @@ def _machine_code_of(outer: Any) -> Iterator[None]:
     if MAKE_FUNCTION is None or not all(hasattr(*part) for part in parts):
         yield
         return
-    whole, optimise, finish = (getattr(*part) for part in parts)
+    emit, optimise, finish = (getattr(*part) for part in parts)
     inner: dict[Any, tuple[str, Any]] = {}  # by library: the environments of functions that are only linked
     mine = threading.get_ident()
 
     def get_executable(self: Any, library: Any, described: Any, environment: Any) -> Any:
         if threading.get_ident() != mine:
-            return whole(self, library, described, environment)
+            return emit(self, library, described, environment)
         if described.qualname == outer.__qualname__:
-            made = whole(self, library, described, environment)
+            made = emit(self, library, described, environment)
             for name, own in inner.values():
                 if library.codegen._engine.is_symbol_defined(name):
                     library.codegen.set_env(name, own)
