@@ -41,14 +41,14 @@ def test_a_motion_solves_the_equation_of_each_of_its_segments(name):
 @pytest.mark.parametrize("name", CASES)
 def test_extrema_of_segments_are_those_of_the_motion(name):
     motion, problem, unknowns = at_impacts(name)
-    looks = problem.evaluate(unknowns, problem.values, look=True).looks
+    extremes = problem.evaluate(unknowns, problem.values, with_extremes=True).extremes
     times = unknowns[::2] / problem.system.load.frequency
     for i in range(len(times) - 1):
         x, _ = motion.at(np.linspace(times[i], times[i + 1], 4001))
         fine = 1e-6  # a parabola between samples
-        assert x.max() - 1e-11 <= looks[i, at.TOP] <= x.max() + fine
-        assert x.min() - fine <= looks[i, at.BOTTOM] <= x.min() + 1e-11
-        assert looks[i, at.HUMP] > 0.0
+        assert x.max() - 1e-11 <= extremes[i, at.TOP] <= x.max() + fine
+        assert x.min() - fine <= extremes[i, at.BOTTOM] <= x.min() + 1e-11
+        assert extremes[i, at.HUMP] > 0.0
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -182,7 +182,7 @@ def test_lowest_gap_inside_a_segment_and_its_instant():
     system = walled(A=0.0, W=1.0, c=0.02, wall=-0.05, e=0.8)
     problem = Problem(system, Signature((1,), 2), ("load.frequency", "load.force.amplitude", "model.wall"))
     speed = 0.5
-    looks = problem.evaluate(np.array([0.3, speed]), problem.values, look=True).looks[0]
+    extremes = problem.evaluate(np.array([0.3, speed]), problem.values, with_extremes=True).extremes[0]
     # x'' + c x' + x = 0 from (wall, -e v)
     c, wall, v = 0.02, -0.05, -0.8 * speed
     w = math.sqrt(1 - c * c / 4)
@@ -190,9 +190,9 @@ def test_lowest_gap_inside_a_segment_and_its_instant():
     x = np.exp(-c * times / 2) * (wall * np.cos(w * times) + (v + c * wall / 2) / w * np.sin(w * times))
     tops = [i for i in range(1, len(x) - 1) if x[i - 1] < x[i] >= x[i + 1]]
     top = max(tops, key=lambda i: x[i])
-    assert looks[at.HUMP] == pytest.approx(wall - x[top], abs=1e-9)
-    assert looks[at.HUMP] < 0.0
-    assert looks[at.HUMP_TIME] - 0.3 == pytest.approx(times[top], abs=4e-5)
+    assert extremes[at.HUMP] == pytest.approx(wall - x[top], abs=1e-9)
+    assert extremes[at.HUMP] < 0.0
+    assert extremes[at.HUMP_TIME] - 0.3 == pytest.approx(times[top], abs=4e-5)
 
 
 def test_parameters_that_leave_the_model_its_meaning_are_refused_by_the_system_and_survive_the_equations():

@@ -1,6 +1,6 @@
 from .approach import approached
 from .compiled import load_contact_segments, load_segments
-from .contacts.contact_layout import ContactColumn, SegmentEnd, SegmentLook, SegmentPlan
+from .contacts.contact_layout import ContactColumn, SegmentEnd, SegmentExtremes, SegmentPlan
 from .dense_output import DenseOutput
 from .ensemble.compiled_lanes import load_advance, load_driver, load_helpers
 from .ensemble.dataset_reading import stop_names, stroboscopic
@@ -54,7 +54,7 @@ __all__ = [
     "RecurrenceSettings",
     "Release",
     "SegmentEnd",
-    "SegmentLook",
+    "SegmentExtremes",
     "SegmentPlan",
     "Sensitivities",
     "Stop",

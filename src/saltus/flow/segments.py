@@ -27,7 +27,7 @@ from saltus.taylor import not_here as cached_jit
 SEGMENT_START, SEGMENT_END, APPROACH = 0, 1, 2  # in `spans`: times, and the gap's speed before the impact that starts it
 BEFORE, ALONG = 0, 1  # in `sides`: the side before that impact (0: from a state), and the side of the segment (0: all)
 QUOTIENT, RESET_DRIFT, KINDS = 0, 1, 2  # in `ends`: (x - contact) / duration, dv+/dt; x, v, a at the end and at the start
-HUMP, HUMP_TIME, TOP, BOTTOM = 0, 1, 2, 3  # in `looks`: lowest inner minimum of the gap, when, range of x
+HUMP, HUMP_TIME, TOP, BOTTOM = 0, 1, 2, 3  # in `extremes`: lowest inner minimum of the gap, when, range of x
 CROSSINGS, SHALLOWEST, DEEPEST = 4, 5, 6  # how often the contact is passed, the least depth of a side's arc, the last arc's depth
 LEAST_MARGIN = 7  # the margins' least values, from here on
 SLOWEST = 1e-9  # A slower passage has the tangent of this one: near a grazing two cancel, and 1e-16 / speed is their rounding.
@@ -36,7 +36,7 @@ SHORT = 1e-6  # a segment's duration below which the derivatives of its quotient
 
 
 @lean_jit
-def look_at_other(q, v, h, order, roots, poly, seen):
+def extremes_of_other(q, v, h, order, roots, poly, seen):
     """Take in the range of a coordinate that has no contact."""
     scale_gap(v, 0, order, h, poly)
     size = 0.0
@@ -48,7 +48,7 @@ def look_at_other(q, v, h, order, roots, poly, seen):
 
 
 @lean_jit
-def look(where, model, work, side, t, h, order, roots, seen):
+def extremes_in_step(where, model, work, side, t, h, order, roots, seen):
     """Take in what a step of a segment shows: turning points of the coordinates, minima of the gap and of the margins."""
     q, v, m, poly = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.MARGINS], work[Work.POLYNOMIAL]
     seen[TOP], seen[BOTTOM] = max(seen[TOP], q[0, 0]), min(seen[BOTTOM], q[0, 0])
@@ -69,7 +69,7 @@ def look(where, model, work, side, t, h, order, roots, seen):
         if where[Where.SIDES] > 0 and rate * turn > 0.0 and gap < seen[HUMP]:
             seen[HUMP], seen[HUMP_TIME] = gap, t + roots[i] * h
     for a in range(1, where[Where.OWN]):
-        look_at_other(q[a], v[a], h, order, roots, poly, seen)
+        extremes_of_other(q[a], v[a], h, order, roots, poly, seen)
     for j in range(where[Where.MARGINS]):
         least, size = min(m[j, 0], horner(m[j], order, h)), abs(m[j, 0])
         for k in range(1, order + 1):
@@ -125,7 +125,7 @@ def segment_step(where, settings, env, model, work, t, end, side, size):
 
 
 @lean_jit
-def follow(where, state, settings, env, model, work, begin, end, side, looking, roots, seen):
+def follow(where, state, settings, env, model, work, begin, end, side, recording, roots, seen):
     """Follow one segment. Returns the quotient (x - contact) / duration of its first coordinate, or nan where it fails."""
     q, v = work[Work.POSITIONS], work[Work.VELOCITIES]
     order, t, forwards = where[Where.ORDER], begin, end >= begin
@@ -137,14 +137,14 @@ def follow(where, state, settings, env, model, work, begin, end, side, looking, 
             return math.nan
         last = natural >= abs(end - t)
         h = end - t if last else (natural if forwards else -natural)
-        if looking and h > 0.0:
-            look(where, model, work, side, t, h, order, roots, seen)
+        if recording and h > 0.0:
+            extremes_in_step(where, model, work, side, t, h, order, roots, seen)
         if count == 0 and last:  # without the cancellation of x - contact where the segment is short
             quotient = horner(q[0, 1:], order - 1, h)
         move(where, state, q, v, h)
         if last:
             x = state[State.COORDINATES]
-            if looking:
+            if recording:
                 seen[TOP], seen[BOTTOM] = max(seen[TOP], x), min(seen[BOTTOM], x)
             return quotient if count == 0 else (x - model[ModelPart.GEOMETRY][Geometry.CONTACT]) / (end - begin)
         t += h
@@ -166,7 +166,7 @@ def pass_contact(where, state, env, model, t, side):
 
 
 @lean_jit
-def follow_through(where, state, settings, env, model, work, begin, end, side, looking, roots, seen):
+def follow_through(where, state, settings, env, model, work, begin, end, side, recording, roots, seen):
     """Follow one segment through all sides of a continuous contact. Returns the side at its end, or 0 where it fails."""
     order, t, skip, first = where[Where.ORDER], begin, 0, np.inf
     for _ in range(MOST_STEPS):
@@ -177,23 +177,23 @@ def follow_through(where, state, settings, env, model, work, begin, end, side, l
         h = min(natural, end - t)
         kind, u, _ = contact_root(work[Work.GAP], skip, order, h, work[Work.POLYNOMIAL])
         tau = u * h if kind == SIMPLE else h
-        if looking:
-            look(where, model, work, side, t, tau, order, roots, seen)
+        if recording:
+            extremes_in_step(where, model, work, side, t, tau, order, roots, seen)
         move(where, state, work[Work.POSITIONS], work[Work.VELOCITIES], tau)
         last, t, skip = kind != SIMPLE and h == end - t, t + tau, 0
         if kind == SIMPLE:
             following = pass_contact(where, state, env, model, t, side)
-            if looking and following != side:
+            if recording and following != side:
                 if seen[CROSSINGS] == 0.0:  # the arc before the first passage goes on with that after the last one
                     first = seen[DEEPEST]
                 else:
                     seen[SHALLOWEST] = min(seen[SHALLOWEST], seen[DEEPEST])
                 seen[CROSSINGS], seen[DEEPEST] = seen[CROSSINGS] + 1.0, -np.inf
             side, skip = following, 1
-        if looking:
+        if recording:
             seen[TOP], seen[BOTTOM] = max(seen[TOP], state[State.COORDINATES]), min(seen[BOTTOM], state[State.COORDINATES])
         if last:
-            if looking and seen[CROSSINGS] > 0.0:
+            if recording and seen[CROSSINGS] > 0.0:
                 seen[SHALLOWEST] = min(seen[SHALLOWEST], max(first, seen[DEEPEST]))
             return side
     return 0.0
@@ -212,18 +212,18 @@ def copy_state(where, state, work, ends, columns, first):
 
 
 @cached_jit(SEGMENTS)
-def follow_segments(where, settings, env, model, spans, sides, states, ends, columns, looks):
+def follow_segments(where, settings, env, model, spans, sides, states, ends, columns, extremes):
     """Follow all segments; returns how many of them have succeeded.
 
     A segment's columns are d/d(speed before its impact), d/d(its start) and the parameters, or, started from a state (its
     coordinates and velocities in `states`), its derivatives to that state and to the parameters. They stand in `columns` at the
-    end (first the coordinates, then the velocities) and then at the start. With `looks` empty nothing is recorded between.
+    end (first the coordinates, then the velocities) and then at the start. With `extremes` empty nothing is recorded between.
     From a state with the side 0 a segment goes through all sides.
     """
     dof, own = where[Where.DOF], where[Where.OWN]
     work, roots, nothing = work_arrays(where), np.zeros(where[Where.ORDER] + 2), np.zeros(1)
     state = np.zeros(State.COORDINATES + 2 * dof + where[Where.COLUMNS])
-    looking = looks.shape[0] > 0
+    recording = extremes.shape[0] > 0
     for s in range(spans.shape[0]):
         begin, end, side, drift = spans[s, SEGMENT_START], spans[s, SEGMENT_END], float(sides[s, ALONG]), 0.0
         through = sides[s, BEFORE] == 0 and sides[s, ALONG] == 0
@@ -235,15 +235,15 @@ def follow_segments(where, settings, env, model, spans, sides, states, ends, col
         else:
             start_from_state(where, state, env, model, work, begin, side, states[s])
         copy_state(where, state, work, ends[s], columns[s, 2 * own :], KINDS + 3 * own)
-        if looking:
-            looks[s] = np.inf
-            looks[s, TOP], looks[s, DEEPEST], looks[s, CROSSINGS] = -np.inf, -np.inf, 0.0
-        seen = looks[s] if looking else nothing
+        if recording:
+            extremes[s] = np.inf
+            extremes[s, TOP], extremes[s, DEEPEST], extremes[s, CROSSINGS] = -np.inf, -np.inf, 0.0
+        seen = extremes[s] if recording else nothing
         if through:
-            side = follow_through(where, state, settings, env, model, work, begin, end, side, looking, roots, seen)
+            side = follow_through(where, state, settings, env, model, work, begin, end, side, recording, roots, seen)
             ends[s, QUOTIENT] = math.nan if side == 0.0 else 0.0
         else:
-            ends[s, QUOTIENT] = follow(where, state, settings, env, model, work, begin, end, side, looking, roots, seen)
+            ends[s, QUOTIENT] = follow(where, state, settings, env, model, work, begin, end, side, recording, roots, seen)
         ends[s, RESET_DRIFT] = drift
         expand(where, state, env, model, work, end, 0.0, side, 0)
         copy_state(where, state, work, ends[s], columns[s], KINDS)

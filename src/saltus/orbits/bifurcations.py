@@ -94,8 +94,8 @@ def grazing(point: OrbitPoint) -> float:
 
 def touching(point: OrbitPoint) -> float:
     """How far an orbit is from touching a contact that is no singularity; its sign turns with each pair of passages more."""
-    orbit, looks = point.orbit, point.equations.looks
-    pairs = int(looks[:, at.CROSSINGS].sum()) // 2
+    orbit, extremes = point.orbit, point.equations.extremes
+    pairs = int(extremes[:, at.CROSSINGS].sum()) // 2
     return float((-1) ** pairs * min(NEAREST, orbit.clearance, orbit.shallowest))
 
 

@@ -57,8 +57,8 @@ def room(point: SpecialCurvePoint) -> float:
     orbit, touching = point.orbit, point.touching
     n = len(orbit.signature.sides)
     speeds = np.delete(point.solution.unknowns[1::2], touching) if n else np.empty(0)
-    looks = point.equations.looks
-    humps, phases = looks[:, at.HUMP], looks[:, at.HUMP_TIME] * orbit.frequency
+    extremes = point.equations.extremes
+    humps, phases = extremes[:, at.HUMP], extremes[:, at.HUMP_TIME] * orbit.frequency
     if touching:
         touch = point.solution.unknowns[2 * touching[0]]
         away = np.abs(np.array([phases - touch + turn * orbit.problem.closing for turn in (-1, 0, 1)])).min(axis=0)

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from saltus.flow import ContactColumn, EventCode, SegmentEnd, SegmentLook, SegmentPlan, load_contact_segments
+from saltus.flow import ContactColumn, EventCode, SegmentEnd, SegmentExtremes, SegmentPlan, load_contact_segments
 from saltus.flow import segments as at
 from saltus.orbits.followed_problem import FollowedProblem
 from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
@@ -31,7 +31,7 @@ START_SHARE = 0.4  # share of a segment at which a motion is started: in the mid
 class ContactEquations(Equations):
     """The problem at one point. Its derivatives are `here`, to the unknowns, and `there`, to those at the end of the period."""
 
-    seen: np.ndarray  # (n, ...): what is seen along each segment, by `SegmentLook`; empty if not asked for
+    seen: np.ndarray  # (n, ...): what is seen along each segment, by `SegmentExtremes`; empty if not asked for
     state_count: int  # of the unknowns those that are a state
 
     def jacobian(self, closing: float = 1.0) -> np.ndarray:
@@ -116,16 +116,16 @@ class ContactProblem(Problem):
         assert isinstance(equations, ContactEquations)
         phases = self.split(unknowns)[1]
         apart = np.diff(np.append(phases, phases[:1] + self.closing))
-        forces = equations.seen[:, [SegmentLook.FORCE, SegmentLook.PULL, SegmentLook.TAIL]]
+        forces = equations.seen[:, [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL]]
         return float(min(forces.min(), apart.min(initial=math.inf)))
 
-    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, look: bool = False) -> ContactEquations | None:
+    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False) -> ContactEquations | None:
         frequency = self.frequency(values)
         if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
             return None
         state, phases = self.split(unknowns)
         times = (np.append(phases, phases[0] + self.closing) if phases.size else np.array([0.0, self.closing])) / frequency
-        followed = self._followed(self.plan, times, state, values, look)
+        followed = self._followed(self.plan, times, state, values, with_extremes)
         return None if followed is None else self._assembled(state, times, frequency, *followed)
 
     def carried_along(self, state: np.ndarray, closed: int, times: np.ndarray, values: np.ndarray) -> np.ndarray | None:
@@ -135,7 +135,7 @@ class ContactProblem(Problem):
         return None if followed is None else np.asarray(followed[0][0, begin : begin + 2 * self.own])
 
     def _followed(
-        self, plan: np.ndarray, times: np.ndarray, state: np.ndarray, values: np.ndarray, look: bool
+        self, plan: np.ndarray, times: np.ndarray, state: np.ndarray, values: np.ndarray, with_extremes: bool
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
         """What `follow_contact_segments` fills; None where a segment cannot be followed."""
         parameters = self._values.copy()
@@ -146,7 +146,7 @@ class ContactProblem(Problem):
         contacts[:, ContactColumn.COORDINATE] = self._run.trace.held
         ends, columns = np.zeros((n, SegmentEnd.NUMBERS + 10 * own)), np.zeros((n, 2 * own + 1, width))
         maps = np.zeros((n, 2 * own, width))
-        seen = np.zeros((n if look else 0, SegmentLook.MARGINS + max(1, len(self.margins))))
+        seen = np.zeros((n if with_extremes else 0, SegmentExtremes.MARGINS + max(1, len(self.margins))))
         done = load_contact_segments()(
             self._where, self._settings, env, model, contacts, plan, times, state, ends, columns, maps, seen
         )
@@ -197,16 +197,16 @@ class ContactProblem(Problem):
         if events:
             there[:, first] = total[:, end_phase]
         residual = np.append(guards, (after - state)[free])
-        return ContactEquations(residual, here, there, total[:, parameters:], ends, self._looks(seen), seen, first)
+        return ContactEquations(residual, here, there, total[:, parameters:], ends, self._extremes(seen), seen, first)
 
-    def _looks(self, seen: np.ndarray) -> np.ndarray:
+    def _extremes(self, seen: np.ndarray) -> np.ndarray:
         """What is seen along the segments in the places of the other orbits'."""
-        looks = np.full((len(seen), at.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
-        looks[:, [at.TOP, at.BOTTOM]] = seen[:, [SegmentLook.TOP, SegmentLook.BOTTOM]]
-        looks[:, [at.HUMP, at.HUMP_TIME]] = seen[:, [SegmentLook.GAP, SegmentLook.GAP + 1]]
-        looks[:, at.CROSSINGS] = 0.0
-        looks[:, at.LEAST_MARGIN :] = seen[:, SegmentLook.MARGINS :]
-        return looks
+        extremes = np.full((len(seen), at.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
+        extremes[:, [at.TOP, at.BOTTOM]] = seen[:, [SegmentExtremes.TOP, SegmentExtremes.BOTTOM]]
+        extremes[:, [at.HUMP, at.HUMP_TIME]] = seen[:, [SegmentExtremes.GAP, SegmentExtremes.GAP + 1]]
+        extremes[:, at.CROSSINGS] = 0.0
+        extremes[:, at.LEAST_MARGIN :] = seen[:, SegmentExtremes.MARGINS :]
+        return extremes
 
     def within(self, unknowns: np.ndarray, equations: Equations, values: np.ndarray) -> tuple[np.ndarray, float]:
         """A state within the longest segment, and its time; of an orbit without events that at phase 0."""

@@ -52,7 +52,7 @@ class FollowedProblem(Problem):
         """The state at the section, and its time."""
         return self.start_state(unknowns, self.at(values)), float(self.signature.section or 0.0) / self.frequency(values)
 
-    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, look: bool = False) -> Equations | None:
+    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False) -> Equations | None:
         frequency = self.frequency(values)
         if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
             return None
@@ -70,7 +70,7 @@ class FollowedProblem(Problem):
             parameters[:, self.paths.index(FREQUENCY)] -= (rates - found.state @ rates) * phase / frequency**2
         after = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity))
         here, there = found.state[None], -np.eye(len(after))[None]
-        return Equations(after - unknowns, here, there, parameters, self._impacts(motion), self._looks(motion, look))
+        return Equations(after - unknowns, here, there, parameters, self._impacts(motion), self._extremes(motion, with_extremes))
 
     def _followed(self, system: System, state: np.ndarray, time: float) -> Sensitivities:
         """The motion over the time that the equations cover, with its derivatives."""
@@ -90,12 +90,12 @@ class FollowedProblem(Problem):
                 rows.append((time, min(speeds)))
         return np.array(rows).reshape(-1, 2)
 
-    def _looks(self, motion: Motion, look: bool) -> np.ndarray:
+    def _extremes(self, motion: Motion, with_extremes: bool) -> np.ndarray:
         """The extrema of all coordinates and the least values of the margins, in the places of the other orbits'."""
-        looks = np.full((int(look), at.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
-        if not look or motion.dense is None:
-            return looks
-        looks[:, at.CROSSINGS] = 0.0
+        extremes = np.full((int(with_extremes), at.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
+        if not with_extremes or motion.dense is None:
+            return extremes
+        extremes[:, at.CROSSINGS] = 0.0
         dense = motion.dense
         share = np.linspace(0.0, 1.0, SAMPLES)
         steps = np.flatnonzero(dense.length > 0.0)
@@ -103,7 +103,7 @@ class FollowedProblem(Problem):
         series, powers = dense.series[steps], np.arange(dense.series.shape[2])
         position = np.einsum("sdk,spk->dsp", series, tau[:, :, None] ** powers)
         velocity = np.einsum("sdk,spk->dsp", series[:, :, 1:] * powers[1:], tau[:, :, None] ** powers[:-1])
-        looks[0, at.TOP], looks[0, at.BOTTOM] = -_turning(-series, -position, tau), _turning(series, position, tau)
+        extremes[0, at.TOP], extremes[0, at.BOTTOM] = -_turning(-series, -position, tau), _turning(series, position, tau)
         if self.margins:
             bends = series[:, :, 2:] * (powers[2:] * powers[1:-1])
             acceleration = np.einsum("sdk,spk->dsp", bends, tau[:, :, None] ** powers[:-2])
@@ -111,8 +111,8 @@ class FollowedProblem(Problem):
             t, side = dense.start[steps, None] + tau, (*motion.system.model.sides, 1)[0]
             margins = motion.system.model.margins(t, q, v, a, side, motion.system.load)
             for j, name in enumerate(self.margins):
-                looks[0, at.LEAST_MARGIN + j] = _least(np.broadcast_to(margins[name], t.shape))
-        return looks
+                extremes[0, at.LEAST_MARGIN + j] = _least(np.broadcast_to(margins[name], t.shape))
+        return extremes
 
 
 def _turning(series: np.ndarray, values: np.ndarray, tau: np.ndarray) -> float:

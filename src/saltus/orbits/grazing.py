@@ -80,9 +80,9 @@ def _turns_round(problem: Problem, side: int) -> bool:
 def inserted(point: OrbitPoint) -> tuple[Problem, np.ndarray]:
     """The problem and its unknowns with impacts of no speed where the gap touches zero."""
     problem, signature = point.orbit.problem, point.orbit.signature
-    looks = point.equations.looks
-    segment = int(np.argmin(looks[:, at.HUMP]))
-    phase = looks[segment, at.HUMP_TIME] * problem.frequency(point.solution.values)
+    extremes = point.equations.extremes
+    segment = int(np.argmin(extremes[:, at.HUMP]))
+    phase = extremes[segment, at.HUMP_TIME] * problem.frequency(point.solution.values)
     side = signature.along()[segment]
     sides = (side,) if _turns_round(problem, side) else (side, -side)
     touches = np.array([phase, 0.0] * len(sides))

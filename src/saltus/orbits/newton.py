@@ -31,7 +31,7 @@ def solve(problem: Problem, unknowns: np.ndarray, values: np.ndarray, iterations
     """The orbit near a first guess at fixed parameters, or None where Newton's method does not converge."""
 
     def evaluate(place: np.ndarray, thorough: bool) -> Equations | None:
-        return problem.evaluate(place, values, look=thorough)
+        return problem.evaluate(place, values, with_extremes=thorough)
 
     def linear(found: Equations, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return found.jacobian(), -found.residual

@@ -85,7 +85,7 @@ class PeriodicOrbit(Result):
         values
             The parameters' values.
         """
-        equations = problem.evaluate(unknowns, values, look=True)
+        equations = problem.evaluate(unknowns, values, with_extremes=True)
         return None if equations is None else PeriodicOrbit(problem, Solution(unknowns, values, equations, 0))
 
     @cached_property
@@ -151,19 +151,19 @@ class PeriodicOrbit(Result):
         return self.solution.residual
 
     @cached_property
-    def _looks(self) -> np.ndarray:
-        return self.solution.equations.looks
+    def _extremes(self) -> np.ndarray:
+        return self.solution.equations.extremes
 
     @cached_property
     def highest(self) -> float:
         """The largest value of the coordinate, or of all of several."""
-        top, bottom = self._looks[:, at.TOP].max(), self._looks[:, at.BOTTOM].min()
+        top, bottom = self._extremes[:, at.TOP].max(), self._extremes[:, at.BOTTOM].min()
         return float(max(top, -bottom) if self.symmetric else top)
 
     @cached_property
     def lowest(self) -> float:
         """The least value of the coordinate, or of all of several."""
-        return -self.highest if self.symmetric else float(self._looks[:, at.BOTTOM].min())
+        return -self.highest if self.symmetric else float(self._extremes[:, at.BOTTOM].min())
 
     @property
     def amplitude(self) -> float:
@@ -173,17 +173,17 @@ class PeriodicOrbit(Result):
     @cached_property
     def clearance(self) -> float:
         """How far the gap stays from 0 at its lowest minimum between impacts; inf where it has none; below 0: no orbit."""
-        return float(self._looks[:, at.HUMP].min())
+        return float(self._extremes[:, at.HUMP].min())
 
     @property
     def crossings(self) -> int:
         """How often it passes a contact that is no singularity, in one of its periods; 0 where it has impacts."""
-        return int(self._looks[:, at.CROSSINGS].sum()) * (2 if self.symmetric else 1)
+        return int(self._extremes[:, at.CROSSINGS].sum()) * (2 if self.symmetric else 1)
 
     @property
     def shallowest(self) -> float:
         """The least depth to which it goes beyond a contact that is no singularity, on either side; inf without passages."""
-        return float(self._looks[:, at.SHALLOWEST].min())
+        return float(self._extremes[:, at.SHALLOWEST].min())
 
     @cached_property
     def slowest(self) -> float:
@@ -205,7 +205,7 @@ class PeriodicOrbit(Result):
     @cached_property
     def margins(self) -> dict[str, float]:
         """The least value of each of the model's margins; below 0 the mechanism could not move so (errata 20, 21)."""
-        least = self._looks[:, at.LEAST_MARGIN :].min(axis=0)
+        least = self._extremes[:, at.LEAST_MARGIN :].min(axis=0)
         return dict(zip(self.problem.margins, map(float, least), strict=False))
 
     @cached_property

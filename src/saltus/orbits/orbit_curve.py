@@ -75,7 +75,7 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
     def evaluate(self, place: np.ndarray, thorough: bool) -> Any:
         """The orbit's equations, with the extrema between the impacts if `thorough`."""
         n = self.problem.size
-        return self.problem.evaluate(place[:n], place[n:], look=thorough)
+        return self.problem.evaluate(place[:n], place[n:], with_extremes=thorough)
 
     def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> OrbitPoint:
         return OrbitPoint(self, found.place, tangent, found.iterations, found.evaluation)

@@ -90,7 +90,7 @@ def _point(curve: OrbitCurve, place: np.ndarray, tangent: np.ndarray, iterations
 
 
 def _orbit(problem: Problem, unknowns: np.ndarray, values: np.ndarray, iterations: int) -> PeriodicOrbit:
-    equations = problem.evaluate(unknowns, values, look=True)
+    equations = problem.evaluate(unknowns, values, with_extremes=True)
     if equations is None:
         raise ParameterError(DAMAGED)
     return PeriodicOrbit(problem, Solution(unknowns, values, equations, iterations))

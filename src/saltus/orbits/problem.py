@@ -43,7 +43,7 @@ class Equations:
     there: np.ndarray  # (n, d, d)
     parameters: np.ndarray  # (n d, parameters)
     ends: np.ndarray
-    looks: np.ndarray  # (n, 4 + margins): extrema within each segment, by `HUMP`, ... of `segments.py`; empty if not asked for
+    extremes: np.ndarray  # (n, 4 + margins): extrema within each segment, by `HUMP`, ... of `segments.py`; empty if not asked for
 
     @cached_property
     def _open(self) -> np.ndarray:
@@ -98,7 +98,7 @@ class FollowedSegments(NamedTuple):
 
     ends: np.ndarray
     columns: np.ndarray  # the derivatives of the ends
-    looks: np.ndarray
+    extremes: np.ndarray
     rates: np.ndarray  # the sign of the gap's rate on each side
 
 
@@ -153,7 +153,7 @@ class Problem:
 
     @property
     def margins(self) -> tuple[str, ...]:
-        """The model's margins, in the order of `looks`."""
+        """The model's margins, in the order of `extremes`."""
         return tuple(self._run.limits)
 
     @cached_property
@@ -208,13 +208,13 @@ class Problem:
         """A change of the unknowns as one of `repeated` ones, with the other sign in the second round."""
         return np.concatenate([direction, -direction])
 
-    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, look: bool = False) -> Equations | None:
+    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False) -> Equations | None:
         """The equations at a point, or None where the motion cannot be followed."""
         frequency = self.frequency(values)
         if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
             return None
         segments = self._segments(unknowns, frequency)
-        followed = self.follow_segments(segments, values, look)
+        followed = self.follow_segments(segments, values, with_extremes)
         if followed is None:
             return None
         if not self.signature.sides:
@@ -228,16 +228,16 @@ class Problem:
         followed = self.follow_segments(Segments(spans, sides, state.reshape(1, -1)), values)
         return None if followed is None else followed.ends[0, at.KINDS : at.KINDS + 2 * self.own]
 
-    def follow_segments(self, segments: Segments, values: np.ndarray, look: bool = False) -> FollowedSegments | None:
-        """The smooth motion along segments, with the extrema within each if `look`; None where one cannot be followed."""
+    def follow_segments(self, segments: Segments, values: np.ndarray, with_extremes: bool = False) -> FollowedSegments | None:
+        """The smooth motion along segments, with its extremes if asked for; None where a segment cannot be followed."""
         parameters = self._values.copy()
         parameters[self._places] = values
         env, model = self._run.structure.prepare(parameters, self._records)
         n, own = len(segments.spans), self.own
         ends, columns = np.zeros((n, at.KINDS + 6 * own)), np.zeros((n, 4 * own, self._where[Where.COLUMNS]))
-        looks = np.zeros((n if look else 0, at.LEAST_MARGIN + max(1, self._where[Where.MARGINS])))
-        done = load_segments()[0](self._where, self._settings, env, model, *segments, ends, columns, looks)
-        return None if done < n else FollowedSegments(ends, columns, looks, np.sign(model[4][1:]))
+        extremes = np.zeros((n if with_extremes else 0, at.LEAST_MARGIN + max(1, self._where[Where.MARGINS])))
+        done = load_segments()[0](self._where, self._settings, env, model, *segments, ends, columns, extremes)
+        return None if done < n else FollowedSegments(ends, columns, extremes, np.sign(model[4][1:]))
 
     def _segments(self, unknowns: np.ndarray, frequency: float) -> Segments:
         """The segments between the impacts."""
@@ -264,17 +264,17 @@ class Problem:
 
     def _shooting(self, unknowns: np.ndarray, frequency: float, followed: FollowedSegments) -> Equations:
         own, sign = self.own, -1.0 if self.signature.symmetric else 1.0
-        ends, columns, looks, _ = followed
+        ends, columns, extremes, _ = followed
         state = ends[0, at.KINDS : at.KINDS + 2 * own]
         rates = ends[0, at.KINDS + own : at.KINDS + 3 * own]
         parameters = sign * columns[0, : 2 * own, 2 * own :]
         if FREQUENCY in self.paths:
             parameters[:, self.paths.index(FREQUENCY)] -= sign * rates * self.closing / frequency**2
         here, there = sign * columns[:, : 2 * own, : 2 * own], -np.eye(2 * own)[None]
-        return Equations(sign * state - unknowns, here, there, parameters, ends, looks)
+        return Equations(sign * state - unknowns, here, there, parameters, ends, extremes)
 
     def _crossing(self, unknowns: np.ndarray, frequency: float, segments: Segments, followed: FollowedSegments) -> Equations:
-        spans, (ends, columns, looks, rates) = segments.spans, followed
+        spans, (ends, columns, extremes, rates) = segments.spans, followed
         n, count = len(spans), len(self.paths)
         sign = np.where(segments.sides[:, 1] > 0, rates[0], rates[1])
         residual, here, there = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
@@ -282,7 +282,7 @@ class Problem:
         place = self.paths.index(FREQUENCY) if FREQUENCY in self.paths else -1
         following = np.append(unknowns[3::2], unknowns[1])
         load_segments()[1](spans, sign, following, frequency, place, ends, columns, residual, here, there, parameters)
-        return Equations(residual.ravel(), here, there, parameters.reshape(2 * n, count), ends, looks)
+        return Equations(residual.ravel(), here, there, parameters.reshape(2 * n, count), ends, extremes)
 
 
 def _ready(system: System, paths: tuple[str, ...]) -> Any:

@@ -247,13 +247,14 @@ def _between(problem: Problem, motion: Motion, excursions: np.ndarray) -> tuple[
     states[opened] = np.stack(motion.at(into), axis=1)
     spans = np.stack([begins, impacts.time, approach], axis=1)
     along = impacts.side.astype(np.int64)
-    followed = problem.follow_segments(Segments(spans, np.stack([before, along], axis=1), states), problem.values, look=True)
+    segments = Segments(spans, np.stack([before, along], axis=1), states)
+    followed = problem.follow_segments(segments, problem.values, with_extremes=True)
     if followed is None:
         return None, np.empty(0)
-    ends, _, looks, rates = followed
+    ends, _, extremes, rates = followed
     sign = np.where(along > 0, rates[0], rates[-1])
     closed = np.stack([ends[:, at.KINDS] - contact, -sign * ends[:, at.KINDS + 1] - speeds], axis=1)
     nothing = np.empty((0, 2, 2))
-    equations = Equations(closed.ravel(), nothing, nothing, np.empty((0, len(problem.paths))), ends, looks)
+    equations = Equations(closed.ravel(), nothing, nothing, np.empty((0, len(problem.paths))), ends, extremes)
     bends: np.ndarray = sign * ends[:, at.KINDS + 2]
     return equations, bends

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from saltus.flow import SegmentEnd, SegmentLook, SegmentPlan
+from saltus.flow import SegmentEnd, SegmentExtremes, SegmentPlan
 from saltus.orbits.contact_problem import AFTER_RELEASE, ContactEquations, ContactProblem, bounces
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.signature import ModeChange, Signature
@@ -77,13 +77,13 @@ class Switching:
         events, seen = list(self.events), self.equations.seen
         for s in range(len(events)):
             here = events[s]
-            if abs(seen[s, SegmentLook.PULL]) < TOLERANCES.touch:
-                contact = int(seen[s, SegmentLook.PULL + 1])
+            if abs(seen[s, SegmentExtremes.PULL]) < TOLERANCES.touch:
+                contact = int(seen[s, SegmentExtremes.PULL + 1])
                 changed = here.event.closed ^ (1 << contact)
                 again = ModeChange(bool(here.event.closed >> contact & 1), contact, here.event.closed)
                 yield [*events[:s], here.leaving(changed), replace(here, event=again), *events[s + 1 :]]
-            if abs(seen[s, SegmentLook.TAIL]) < TOLERANCES.touch:
-                contact, following = int(seen[s, SegmentLook.TAIL + 1]), events[(s + 1) % len(events)]
+            if abs(seen[s, SegmentExtremes.TAIL]) < TOLERANCES.touch:
+                contact, following = int(seen[s, SegmentExtremes.TAIL + 1]), events[(s + 1) % len(events)]
                 phase = following.phase + (self.problem.closing if s + 1 == len(events) else 0.0)
                 release = ModeChange(False, contact, here.event.closed & ~(1 << contact))
                 yield [*events[: s + 1], Timed(release, phase), *events[s + 1 :]]
@@ -99,14 +99,14 @@ class Switching:
         """With the impact without speed where a gap touches 0, or the excursion of no duration where a reaction does."""
         events, seen = list(self.events), self.equations.seen
         frequency = self.problem.frequency(self.point.solution.values)
-        for place in (SegmentLook.GAP, SegmentLook.FORCE):
+        for place in (SegmentExtremes.GAP, SegmentExtremes.FORCE):
             s = int(np.argmin(seen[:, place]))
             if abs(seen[s, place]) > TOLERANCES.touch:
                 continue
             contact, closed = int(seen[s, place + 2]), int(self.problem.plan[s, SegmentPlan.ALONG])
             phase, at = float(seen[s, place + 1]) * frequency, s + 1 if events else 0
             new = [Timed(ModeChange(True, contact, closed), phase)]
-            if place == SegmentLook.FORCE:
+            if place == SegmentExtremes.FORCE:
                 if bounces(self.problem.system, contact):
                     continue  # its closings bounce, and die away: no equations yet
                 new = [Timed(ModeChange(False, contact, closed & ~(1 << contact)), phase), *new]

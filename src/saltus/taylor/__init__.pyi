@@ -29,7 +29,7 @@ from .lane_vectors import (
     vector_lane,
     with_lane,
 )
-from .load_pieces import record_table, record_tables
+from .load_tables import record_table, record_tables
 from .memory import Places
 from .private_numba import entry_point, inline_jit, jit, lean_jit, not_here, pointer, pointers
 from .records import anchor, expand_record, own_records

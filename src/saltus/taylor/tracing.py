@@ -33,7 +33,7 @@ from saltus.taylor.graph import (
     substitute,
     uses_velocity,
 )
-from saltus.taylor.load_pieces import AFTER, SINCE, WITHIN
+from saltus.taylor.load_tables import AFTER, SINCE, WITHIN
 
 
 class LoadTime:
@@ -110,7 +110,7 @@ class Trace:
     dof: int = 1  # of the model
     columns: int = 0
     paths: tuple[str, ...] = ()  # of the parameters that the last columns are derivatives to
-    records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative (see `load_pieces.py`)
+    records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative (see `load_tables.py`)
     sides: int = 0  # of the contact
     acceleration: list[Expr] = field(default_factory=list)
     gap: Expr | None = None

@@ -78,7 +78,7 @@ class SegmentEnd(IntEnum):
     NUMBERS = 4  # state and rates at the start, both at the end, the state after the event: 10 numbers for each coordinate
 
 
-class SegmentLook(IntEnum):
+class SegmentExtremes(IntEnum):
     """Places in what is seen along a segment."""
 
     TOP = 0  # the largest value of any coordinate

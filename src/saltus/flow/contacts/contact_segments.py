@@ -25,7 +25,7 @@ from saltus.flow.contacts.contact_impacts import (
     restitution,
     solver_arrays,
 )
-from saltus.flow.contacts.contact_layout import ContactColumn, ContactPart, SegmentEnd, SegmentLook, SegmentPlan, Solver
+from saltus.flow.contacts.contact_layout import ContactColumn, ContactPart, SegmentEnd, SegmentExtremes, SegmentPlan, Solver
 from saltus.flow.contacts.contact_tangent import fill_slopes, hold_columns, impulse_columns, lift, note_velocities
 from saltus.flow.function_types import CONTACT_SEGMENTS
 from saltus.flow.kernel_layout import Where, Work
@@ -82,7 +82,7 @@ def least_of(c, order, h, t, poly, roots, seen, place):
 
 
 @lean_jit
-def look_at_step(where, state, model, contacts, work, solver, t, h, begin, end, roots, seen, least):
+def extremes_at_step(where, state, model, contacts, work, solver, t, h, begin, end, roots, seen, least):
     """Take in what a step shows: turning points of the coordinates, inner minima of the guards, the margins' least values."""
     order, own, count, poly = where[Where.ORDER], where[Where.OWN], contacts.shape[0], work[Work.POLYNOMIAL]
     for a in range(own):
@@ -93,7 +93,8 @@ def look_at_step(where, state, model, contacts, work, solver, t, h, begin, end, 
         for i in range(roots_within(poly, order, roots, NOISE * size) + 2):
             u = 0.0 if i == 0 else 1.0 if i == 1 else roots[i - 2]
             x = horner(q, order, u * h)
-            seen[SegmentLook.TOP], seen[SegmentLook.BOTTOM] = max(seen[SegmentLook.TOP], x), min(seen[SegmentLook.BOTTOM], x)
+            seen[SegmentExtremes.TOP] = max(seen[SegmentExtremes.TOP], x)
+            seen[SegmentExtremes.BOTTOM] = min(seen[SegmentExtremes.BOTTOM], x)
     for i in range(count):
         guard = work[Work.GAP]
         if contacts[i, ContactColumn.CLOSED] == 1:
@@ -102,19 +103,19 @@ def look_at_step(where, state, model, contacts, work, solver, t, h, begin, end, 
             gap_series(model, contacts, work, i, contact_position(solver, own, count, i), order, guard)
         least[0], least[1] = np.inf, 0.0
         least_of(guard, order, h, t, poly, roots, least, 0)
-        place = SegmentLook.FORCE if contacts[i, ContactColumn.CLOSED] == 1 else SegmentLook.GAP
+        place = SegmentExtremes.FORCE if contacts[i, ContactColumn.CLOSED] == 1 else SegmentExtremes.GAP
         inside = ENDS * (end - begin) < least[1] - begin < (1.0 - ENDS) * (end - begin)
         if inside and least[0] < seen[place]:
             seen[place], seen[place + 1], seen[place + 2] = least[0], least[1], i
     for j in range(count, where[Where.MARGINS]):
-        place, m = SegmentLook.MARGINS + j - count, work[Work.MARGINS][j]
+        place, m = SegmentExtremes.MARGINS + j - count, work[Work.MARGINS][j]
         least[0] = min(m[0], horner(m, order, h))
         least_of(m, order, h, t, poly, roots, least, 0)
         seen[place] = min(seen[place], least[0])
 
 
 @lean_jit
-def look_at_start(where, state, model, contacts, work, solver, opened, seen):
+def extremes_at_start(where, state, model, contacts, work, solver, opened, seen):
     """The least of the reactions with which contacts are closed, and of the acceleration with which `opened` leaves from rest."""
     for i in range(contacts.shape[0]):
         pull, coordinate = np.inf, contacts[i, ContactColumn.COORDINATE]
@@ -122,18 +123,18 @@ def look_at_start(where, state, model, contacts, work, solver, opened, seen):
             pull = work[Work.MARGINS][i, 0]
         elif i == opened and abs(state[State.COORDINATES + where[Where.DOF] + coordinate]) < AT_REST:
             pull = model[ContactPart.SIGNS][i] * work[Work.ACCELERATIONS][coordinate, 0]
-        if pull < seen[SegmentLook.PULL]:
-            seen[SegmentLook.PULL], seen[SegmentLook.PULL + 1] = pull, i
+        if pull < seen[SegmentExtremes.PULL]:
+            seen[SegmentExtremes.PULL], seen[SegmentExtremes.PULL + 1] = pull, i
 
 
 @lean_jit
-def look_at_section(where, state, model, contacts, work, solver, t, seen):
+def extremes_at_section(where, state, model, contacts, work, solver, t, seen):
     """Take in the guards at the start of a segment that begins with no event: they may have their minimum just there."""
     own, count = where[Where.OWN], contacts.shape[0]
     for i in range(count):
         closed, x = contacts[i, ContactColumn.CLOSED] == 1, state[State.COORDINATES + contacts[i, ContactColumn.COORDINATE]]
         gap = model[ContactPart.SIGNS][i] * (x - contact_position(solver, own, count, i))
-        value, place = work[Work.MARGINS][i, 0] if closed else gap, SegmentLook.FORCE if closed else SegmentLook.GAP
+        value, place = work[Work.MARGINS][i, 0] if closed else gap, SegmentExtremes.FORCE if closed else SegmentExtremes.GAP
         if value < seen[place]:
             seen[place], seen[place + 1], seen[place + 2] = value, t, i
 
@@ -150,7 +151,7 @@ def follow_segment(where, state, settings, env, model, contacts, work, solver, b
         last = natural >= abs(end - t)
         h = end - t if last else (natural if forwards else -natural)
         if seen.size > 1 and h > 0.0:
-            look_at_step(where, state, model, contacts, work, solver, t, h, begin, end, roots, seen, least)
+            extremes_at_step(where, state, model, contacts, work, solver, t, h, begin, end, roots, seen, least)
         move(where, state, work[Work.POSITIONS], work[Work.VELOCITIES], h)
         if last:
             return count + 1
@@ -278,12 +279,12 @@ def guard_at_end(where, state, env, model, contacts, work, solver, t, kind, cont
 
 
 @lean_jit
-def look_at_end(work, contacts, released, seen):
+def extremes_at_end(work, contacts, released, seen):
     """The least of the reactions with which a segment ends, of the contacts but the one that is released there."""
     for i in range(contacts.shape[0]):
         reaction = work[Work.MARGINS][i, 0]
-        if contacts[i, ContactColumn.CLOSED] == 1 and i != released and reaction < seen[SegmentLook.TAIL]:
-            seen[SegmentLook.TAIL], seen[SegmentLook.TAIL + 1] = reaction, i
+        if contacts[i, ContactColumn.CLOSED] == 1 and i != released and reaction < seen[SegmentExtremes.TAIL]:
+            seen[SegmentExtremes.TAIL], seen[SegmentExtremes.TAIL + 1] = reaction, i
 
 
 @lean_jit
@@ -303,14 +304,14 @@ def pass_event(where, state, env, model, contacts, solver, row, ends, maps):
 
 
 @cached_jit(CONTACT_SEGMENTS)
-def follow_contact_segments(where, settings, env, model, contacts, plan, times, first, ends, columns, maps, looks):
+def follow_contact_segments(where, settings, env, model, contacts, plan, times, first, ends, columns, maps, extremes):
     """Follow segments one after the other, each from the state that the event before it leaves; returns how many succeed.
 
     `plan` says for each which contacts are closed along it, with which event it ends at which contact, and which contacts are
     closed afterwards (`SegmentPlan`); `times` (n + 1) are those of its ends, `first` is the state at the first one. `ends` holds
     numbers in the places of `SegmentEnd`; `columns` the derivatives to the state at the start and to the parameters of the state
     at the end, at a fixed time, and of the guard; `maps` those of the state after the event to the state before it and to the
-    parameters. `looks` is filled, in the places of `SegmentLook`, if it has rows.
+    parameters. `extremes` is filled, in the places of `SegmentExtremes`, if it has rows.
     """
     own, dof = where[Where.OWN], where[Where.DOF]
     work, solver = work_arrays(where), solver_arrays(own, contacts.shape[0], where[Where.COLUMNS], 0)
@@ -328,14 +329,14 @@ def follow_contact_segments(where, settings, env, model, contacts, plan, times, 
         hold_contacts(where, state, env, model, contacts, solver, plan[s, SegmentPlan.ALONG])
         expand(where, state, env, model, work, begin, 0.0, 1.0, 1)
         copy_numbers(where, state, work, ends[s], SegmentEnd.NUMBERS)
-        seen = looks[s] if looks.shape[0] > 0 else nothing
-        if looks.shape[0] > 0:
+        seen = extremes[s] if extremes.shape[0] > 0 else nothing
+        if extremes.shape[0] > 0:
             for k in range(seen.size):
                 seen[k] = np.inf
-            seen[SegmentLook.TOP] = -np.inf
-            look_at_start(where, state, model, contacts, work, solver, opened, seen)
+            seen[SegmentExtremes.TOP] = -np.inf
+            extremes_at_start(where, state, model, contacts, work, solver, opened, seen)
             if kind < 0:
-                look_at_section(where, state, model, contacts, work, solver, begin, seen)
+                extremes_at_section(where, state, model, contacts, work, solver, begin, seen)
         steps = follow_segment(where, state, settings, env, model, contacts, work, solver, begin, end, roots, seen, least)
         if steps == 0:
             return s
@@ -348,8 +349,8 @@ def follow_contact_segments(where, settings, env, model, contacts, plan, times, 
         copy_columns(where, state, columns[s])
         if not math.isfinite(ends[s, SegmentEnd.NUMBERS + 8 * own - 1]):
             return s
-        if looks.shape[0] > 0:
-            look_at_end(work, contacts, contact if kind == EventCode.RELEASE else -1, seen)
+        if extremes.shape[0] > 0:
+            extremes_at_end(work, contacts, contact if kind == EventCode.RELEASE else -1, seen)
         if kind >= 0:
             if single:
                 velocity = state[State.COORDINATES + dof + contacts[contact, ContactColumn.COORDINATE]]

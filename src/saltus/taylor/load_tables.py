@@ -1,4 +1,4 @@
-"""What a system's loads do piece by piece: the polynomials of records, and the clocks of pulses, between their breakpoints.
+"""What a system's loads do between their breakpoints: the polynomials of records, and the clocks of pulses.
 
 A trace reads them by rows (dotted path, order). Of a record it is the order of the derivative. A pulse is a closed form of its
 own time, and its rows are polynomials of degree 1: SINCE, the time since its start, at most its length; its derivative WITHIN,
