@@ -178,6 +178,7 @@ def good(made):
     }
     asked = {name: (getattr(importlib.import_module(_room(name)), name.partition(".")[2]), kw) for name, kw in functions.items()}
     return asked | {
+        "BeltOscillator": (saltus.BeltOscillator, {}),
         "Branch.at": (branch.at, {"value": 1.0}),
         "Branch.is_joined": (branch.is_joined, {"before": 0}),
         "Branch.solved_at": (branch.solved_at, {"value": 1.0}),
@@ -185,6 +186,7 @@ def good(made):
         "Chirp": (saltus.Chirp, {"amplitude": 0.1, "frequency": 1.0, "end_frequency": 2.0, "duration": 3.0}),
         "Contact": (saltus.Contact, contact),
         "EnergyRestitution": (saltus.EnergyRestitution, {"r": 0.9}),
+        "Friction": (saltus.Friction, {"name": "belt", "coordinate": "x", "kinetic": 0.2}),
         "HalfSine": (saltus.HalfSine, {"amplitude": 0.1, "frequency": 1.0}),
         "Harmonic": (saltus.Harmonic, {"amplitude": 0.1}),
         "Load": (saltus.Load, {"frequency": 1.0, "horizontal": 0.1}),

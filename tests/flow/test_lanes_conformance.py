@@ -71,7 +71,9 @@ def some_paths(system):
     )
 
 
-ONE_CONTACT = {name: model for name, model in MODELS.items() if model.contacts is Model.contacts}
+ONE_CONTACT = {
+    name: model for name, model in MODELS.items() if model.contacts is Model.contacts and model.frictions is Model.frictions
+}
 CASES = {**ONE_CONTACT, "Duffing": Duffing, "Curved": Curved, "Pair": Pair}
 
 

@@ -3,13 +3,21 @@
 import math
 
 import mpmath
+import numba
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from saltus.flow.roots import NEVER, NONE, SIMPLE, excluded, first_root, horner, newton, to_bernstein, variations
+from saltus.flow import roots as compiled
+from saltus.flow.roots import NEVER, NONE, SIMPLE
+from saltus.taylor.private_numba import OPTIONS
 
+# The kernels' own functions can be called by compiled code alone: these are compiled of the same source to be called from here.
+excluded, first_root, horner, newton, to_bernstein, variations = (
+    numba.njit(**OPTIONS)(getattr(compiled, name).py_func)
+    for name in ("excluded", "first_root", "horner", "newton", "to_bernstein", "variations")
+)
 EPS = 2.0**-52
 DEGREES = st.integers(2, 23)
 

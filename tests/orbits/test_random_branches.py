@@ -7,7 +7,7 @@ import pytest
 from random_branches import FREQUENCY, MODELS, random_branch
 from shared_systems import forced
 
-from saltus import ParameterError, continue_orbit, find_orbit
+from saltus import ParameterError, continue_orbit, find_orbit, switch_branch
 from saltus.continuation import CurveEnd
 from saltus.orbits import OrbitEnd, RestingOrbit, SpecialKind
 
@@ -98,6 +98,26 @@ def test_a_doubled_orbit_without_impacts_ends_where_it_is_born():
     born = [s.parameter for s in parent.special if s.kind == SpecialKind.PD]
     for end in doubled.ends:
         assert min(abs(value - end.parameter) for value in born) < 1e-9
+
+
+def is_solved_up_to_its_image(branch, period):
+    """Between an end at its own image and the point before it a branch has orbits of its own period, by direct simulation."""
+    assert {orbit.period for orbit in branch.orbits} == {period}
+    for end, before in zip(branch.ends, (0, len(branch.points) - 2), strict=True):
+        if end.reason is OrbitEnd.IMAGE:
+            (between,) = branch.solved_between(before, float(branch.parameters[before : before + 2].mean()))
+            assert between.orbit.defect < 1e-9
+
+
+def test_branches_have_orbits_up_to_where_they_meet_their_images():
+    """A doubled family without impacts, and one that has lost its symmetry between two points of the main branch."""
+    is_solved_up_to_its_image(followed(418, STEP), 2)
+    orbit = find_orbit(forced(0.2), theta=0.3, parameters=(FREQUENCY,))
+    main = continue_orbit(orbit, FREQUENCY, (0.1, 1.0))
+    born = next(special for special in main.special if special.kind == SpecialKind.BPC and special.parameter > 0.12)
+    branch = switch_branch(born, (0.1, 0.15))[0]
+    assert branch.ends[1].reason is OrbitEnd.IMAGE
+    is_solved_up_to_its_image(branch, 1)
 
 
 def test_three_pairs_of_special_points_that_lie_within_one_step_each():

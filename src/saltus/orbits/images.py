@@ -38,6 +38,31 @@ def halves_of(unknowns: np.ndarray, signature: Signature) -> np.ndarray:
     return halves
 
 
+def on_family(point: OrbitPoint, parent: OrbitPoint) -> OrbitPoint | None:
+    """The parent's orbit at which a family ends, as a solution of the family's own equations: both halves of it are alike.
+
+    There the family turns back along its images: its tangent leads from a `point` beside to the image of that.
+
+    Returns
+    -------
+    OrbitPoint | None
+        The last point of the family's branch; None where the motion cannot be followed.
+    """
+    signature, difference = point.orbit.signature, asymmetry(point)
+    assert difference is not None
+    unknowns, tangent = parent.solution.unknowns, difference
+    if signature.sides:
+        half = unknowns.reshape(-1, 2)
+        unknowns = np.concatenate([half, half + np.array([np.pi * signature.period, 0.0])]).ravel()
+        tangent = np.concatenate([difference, -difference])
+    found = point.curve.known(unknowns, parent.solution.values)
+    if found is None:
+        return None
+    tangent = np.append(tangent, np.zeros(len(parent.solution.values)))
+    last: OrbitPoint = point.curve.point_at(found, tangent / point.curve.norm(tangent))
+    return last
+
+
 def passes_image(a: OrbitPoint, b: OrbitPoint) -> bool:
     """Whether a step goes through an orbit that is its own image."""
     before, after = asymmetry(a), asymmetry(b)

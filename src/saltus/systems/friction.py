@@ -41,9 +41,9 @@ class Friction:
 
     name: str
     coordinate: str
-    kinetic: Any
-    static: Any = None
-    ground_speed: Any = 0.0
+    kinetic: float
+    static: float | None = None
+    ground_speed: float = 0.0
 
     @property
     def limit(self) -> str:

@@ -23,7 +23,9 @@ def within(spectrum: Any, branch: Any) -> np.ndarray:
 
 def main_branch(spectrum: Any) -> Any:
     """The period-1 branch that covers most of the range."""
-    return max((b for _, b in branches_of(spectrum) if int(b["period"][0]) == 1), key=lambda b: np.ptp(b["parameter"].values))
+    bounds = spectrum.attrs["bounds"]
+    branches = [branch for _, branch in branches_of(spectrum) if int(branch["period"][0]) == 1]
+    return max(branches, key=lambda branch: np.ptp(np.clip(branch["parameter"].values, *bounds)))
 
 
 def detached(spectrum: Any) -> list[tuple[int, Any]]:
