@@ -12,6 +12,7 @@ import saltus
 # A name of an argument by what it takes; `| None` says that it may be left out. "number" is one or an array of them.
 ALIKE = {
     "Numbers": "number",
+    "Number": "number",
     "float": "number",
     "np.ndarray": "number",
     "Iterable[float]": "number",

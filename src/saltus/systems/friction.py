@@ -8,6 +8,8 @@ from typing import Any
 from saltus.errors import ParameterError
 from saltus.public_functions import answering
 
+Number = Any  # a float, or a parameter of the model while its equations are traced
+
 MOST_FRICTIONS = 6  # Which of them stick, and which way the others slide, is found by trying, 3^n choices at worst.
 
 
@@ -41,9 +43,9 @@ class Friction:
 
     name: str
     coordinate: str
-    kinetic: float
-    static: float | None = None
-    ground_speed: float = 0.0
+    kinetic: Number
+    static: Number | None = None
+    ground_speed: Number = 0.0
 
     @property
     def limit(self) -> str:
