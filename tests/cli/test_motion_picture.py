@@ -76,3 +76,8 @@ def test_every_coordinate_of_a_chain_is_drawn_with_a_line_of_its_own():
     ]
     lines = [line for line in figure.axes[0].lines if line.get_label().startswith("$")]
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 8
+
+
+def test_what_slides_is_no_coordinate():
+    motion = saltus.simulate(saltus.System(model=saltus.BeltOscillator()), x=0.0, velocity=0.1, duration=20.0)
+    assert coordinates(motion.to_xarray()) == ["x"]

@@ -55,8 +55,9 @@ def draw_motion(dataset: xarray.Dataset, *, ax: Axes | None = None, figure: Figu
 
 
 def coordinates(dataset: xarray.Dataset) -> list[str]:
-    """The names of the coordinates in a motion's dataset."""
-    return [str(name) for name in dataset.data_vars if rate_of(dataset, str(name)) in dataset and name != "side"]
+    """The names of the coordinates in a motion's dataset: its whole numbers are the side, and what is closed or slides."""
+    names = [str(name) for name, values in dataset.data_vars.items() if values.dtype.kind == "f"]
+    return [name for name in names if rate_of(dataset, name) in dataset]
 
 
 def rate_of(dataset: xarray.Dataset, name: str) -> str:
