@@ -7,6 +7,7 @@ import pytest
 import xarray
 from matplotlib.colors import same_color
 
+from saltus import ParameterError
 from saltus.branch_tables import branch_tables
 from saltus.plots import figure_of
 from saltus.plots.attractors import draw_attractors
@@ -201,3 +202,18 @@ def test_starts_have_the_colour_of_the_attractor_that_they_lead_to():
     starts = next(line for line in figure_lines if list(line.get_xdata()) == [0.2, 0.3])
     assert same_color(cycle.get_markerfacecolor(), starts.get_markerfacecolor())
     assert not same_color(starts.get_markerfacecolor(), UNSTABLE)
+
+
+def test_where_the_amplitude_is_flat_the_lowest_values_can_be_drawn():
+    tree = diagram((0.5, 1.0), (0.7,))
+    for table in ("points", "attractors", "special"):
+        name = "special_lowest" if table == "special" else "lowest"
+        other = name.replace("lowest", "amplitude")
+        if other in tree[table]:
+            tree[table][name] = -2.0 * tree[table][other]
+    axes = draw_diagram(tree, "lowest")[0]
+    assert axes.get_ylabel().startswith(r"$\min_\tau")
+    assert axes.get_ylim()[0] < -2.0
+    assert axes.get_ylim()[1] > -1.0
+    with pytest.raises(ParameterError, match="quantity must be one of amplitude, highest, lowest, got 'speed'"):
+        draw_diagram(tree, "speed")

@@ -24,10 +24,13 @@ def symbol(name: str) -> str:
     return SYMBOLS.get(name, name if len(name) == 1 else rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}")
 
 
-def peak(names: str) -> str:
-    """The amplitude of a coordinate, or of several whose names stand in one text, in mathematical text."""
-    each = [rf"|{symbol(name)}|" for name in names.split()]
-    return r"\max_\tau" + (each[0] if len(each) == 1 else rf"({', '.join(each)})" if len(each) < 4 else r"\,\max_i|q_i|")
+def peak(names: str, quantity: str = "amplitude") -> str:
+    """The amplitude, or the highest or lowest value, of a coordinate or of several in one text, in mathematical text."""
+    found, bar = r"\min" if quantity == "lowest" else r"\max", "|" if quantity == "amplitude" else ""
+    each = [rf"{bar}{symbol(name)}{bar}" for name in names.split()]
+    if len(each) == 1:
+        return rf"{found}_\tau{each[0]}"
+    return rf"{found}_\tau({', '.join(each)})" if len(each) < 4 else rf"{found}_\tau\,{found}_i{bar}q_i{bar}"
 
 
 def unit_in_brackets(variable: Any) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from saltus.errors import ParameterError, shown
 from saltus.plots.axis_names import parameter_name, peak, symbol, unit_in_brackets
 from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure
 from saltus.plots.drawing import drawing
@@ -29,12 +30,18 @@ class StateSettings:
 DRAWN_STATES = StateSettings()
 
 
+QUANTITIES = ("amplitude", "highest", "lowest")  # what branches, special points and simulated motions all have
+
+
 @drawing
-def draw_diagram(tree: Any, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
+def draw_diagram(tree: Any, quantity: str = "amplitude", *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
     """Draw the DataTree of `response_spectrum` or `bifurcation_diagram`; returns its axes, (1 or 2,).
 
-    In a figure the states at phase 0 stand below the branches; into axes that are given the branches alone are drawn.
+    In a figure the states at phase 0 stand below the branches; into axes that are given the branches alone are drawn. The
+    `quantity` is the amplitude, or, where that is flat as at a wall, the highest or the lowest value of a coordinate.
     """
+    if quantity not in QUANTITIES:
+        raise ParameterError(f"quantity must be one of {', '.join(QUANTITIES)}, got {shown(quantity)}", "quantity")
     low, high = (float(x) for x in tree.attrs["bounds"])
     names, unit = tree.attrs["coordinate"], _unit(tree)
     simulated = "stroboscopic" in tree.children and ax is None
@@ -44,11 +51,11 @@ def draw_diagram(tree: Any, *, ax: Axes | None = None, figure: Figure | None = N
     else:
         axes = np.array([ax])
     axes[0].set_xlim(low, high)
-    top = _top(tree, low, high)
-    axes[0].set_ylim(-0.02 * top, 1.08 * top)  # so that marks on the axis are not cut
-    axes[0].set_ylabel(f"${peak(names)}${unit}")
+    bottom, top = _range(tree, quantity, low, high)
+    axes[0].set_ylim(bottom - 0.02 * (top - bottom), top + 0.08 * (top - bottom))  # so that marks on the axis are not cut
+    axes[0].set_ylabel(f"${peak(names, quantity)}${unit}")
     limits = [float(limit) for limit in np.atleast_1d(tree.attrs["limits"])]
-    draw_response(axes[0], tree)
+    draw_response(axes[0], tree, quantity)
     draw_limits(axes[0], limits)
     note_missed(axes[0], tree)
     if simulated:
@@ -56,7 +63,7 @@ def draw_diagram(tree: Any, *, ax: Axes | None = None, figure: Figure | None = N
         axes[1].set_ylabel(f"${symbol(names.split()[0])}$ at phase 0{unit}")
         axes[1].set_title("stroboscopic points of direct simulation", loc="left", pad=3)
     axes[-1].set_xlabel(parameter_name(tree.attrs["path"]))
-    response_legend(figure if ax is None else ax, [tree], limits=min(limits, default=np.inf) < 1.08 * top)
+    response_legend(figure if ax is None else ax, [tree], limits=min(limits, default=np.inf) < axes[0].get_ylim()[1])
     return axes if ax is None else ax
 
 
@@ -66,13 +73,16 @@ def _unit(tree: Any) -> str:
     return unit_in_brackets(points["amplitude"]) if "amplitude" in points else ""
 
 
-def _top(tree: Any, low: float, high: float) -> float:
-    """The largest amplitude within the bounds, or 1 where there is none."""
-    points, found = tree["points"], tree["attractors"]["amplitude"].values
+def _range(tree: Any, quantity: str, low: float, high: float) -> tuple[float, float]:
+    """The least and the largest value of a quantity within the bounds; of amplitudes from 0; up to 1 where there is none."""
+    points, found = tree["points"], tree["attractors"][quantity].values
     if points.sizes["point"]:
         x = points["parameter"].values
-        found = np.append(found, points["amplitude"].values[(x >= low) & (x <= high)])
-    return float(np.max(found[np.isfinite(found)], initial=0.0)) or 1.0
+        found = np.append(found, points[quantity].values[(x >= low) & (x <= high)])
+    found = found[np.isfinite(found)]
+    top = float(np.max(found, initial=0.0 if quantity == "amplitude" or not found.size else -np.inf))
+    bottom = 0.0 if quantity == "amplitude" else float(np.min(found, initial=top))
+    return (bottom, top) if top > bottom else (bottom, bottom + 1.0)
 
 
 def draw_stroboscopic_states(ax: Any, tree: Any) -> None:
