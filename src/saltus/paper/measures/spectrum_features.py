@@ -23,7 +23,7 @@ def within(spectrum: Any, branch: Any) -> np.ndarray:
 
 def main_branch(spectrum: Any) -> Any:
     """The period-1 branch that covers most of the range."""
-    bounds = spectrum.attrs["bounds"]
+    bounds = spectrum.attrs.get("bounds", (-np.inf, np.inf))  # branches alone have none
     branches = [branch for _, branch in branches_of(spectrum) if int(branch["period"][0]) == 1]
     return max(branches, key=lambda branch: np.ptp(np.clip(branch["parameter"].values, *bounds)))
 
