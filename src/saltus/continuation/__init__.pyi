@@ -6,6 +6,7 @@ from .end import CurveEnd, End, EndReason
 from .events import Cut, Events
 from .missed import CurveMissed, Missed, MissedReason
 from .natural_parameter import NaturalCurve, bisected
+from .predictor import between
 from .pseudo_arclength import EquationCurve
 from .step_length import STEPS, StepSettings
 from .test_functions import TestFunction, located
@@ -34,6 +35,7 @@ __all__ = [
     "StepSettings",
     "TestFunction",
     "Zero",
+    "between",
     "bisected",
     "both_ways",
     "located",

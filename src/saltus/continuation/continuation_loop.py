@@ -134,6 +134,11 @@ class Continuation:
             self.points.append(following)
         return following is not None
 
+    def take(self, ahead: Any) -> None:
+        """Take a point ahead on the same equations, with the special points on the way to it."""
+        self._locate(self.trail.examined(self.trail.up_to([], ahead)))
+        self.points.append(ahead)
+
     def _locate(self, samples: list[TrailPoint]) -> None:
         """Locate the special points of a step, in order."""
         found = []

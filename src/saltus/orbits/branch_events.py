@@ -12,7 +12,16 @@ from saltus.continuation import Continuation, Cut, End, Events, Missed, Zero, lo
 from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, complex_pair, grazing, never_torus
 from saltus.orbits.contact_problem import ContactProblem
 from saltus.orbits.grazing import other_side
-from saltus.orbits.images import asymmetry, falls_onto_image, halves_of, nearest, on_family, passes_image, repetition
+from saltus.orbits.images import (
+    asymmetry,
+    beside_image,
+    falls_onto_image,
+    halves_of,
+    nearest,
+    on_family,
+    passes_image,
+    repetition,
+)
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
 from saltus.orbits.switching_contacts import contact_change
@@ -92,7 +101,11 @@ class BranchEvents(OrbitEvents):
         kind = SpecialKind.BPC if point.orbit.period % 2 else SpecialKind.PD
         parent = parent_point(point, ahead)
         if parent is not None:
-            run.points.append(on_family(point, parent.point) or parent.point)
+            last = on_family(point, parent.point)
+            beside = None if last is None else beside_image(point, last)
+            if beside is not None:  # on the way to it the family may have further special points
+                run.take(beside)
+            run.points.append(last or parent.point)
             run.special.append(parent)
         return End(OrbitEnd.IMAGE, ahead.parameter if parent is None else parent.parameter, kind)
 

@@ -6,10 +6,13 @@ import math
 
 import numpy as np
 
+from saltus.continuation import between
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
+
+NEAR_THE_END = (0.99, 0.95, 0.9)  # Shares of the last step: at the end itself the equations are singular.
 
 
 def asymmetry(point: OrbitPoint) -> np.ndarray | None:
@@ -61,6 +64,16 @@ def on_family(point: OrbitPoint, parent: OrbitPoint) -> OrbitPoint | None:
     tangent = np.append(tangent, np.zeros(len(parent.solution.values)))
     last: OrbitPoint = point.curve.point_at(found, tangent / point.curve.norm(tangent))
     return last
+
+
+def beside_image(point: OrbitPoint, last: OrbitPoint) -> OrbitPoint | None:
+    """A point of a family between one and its end at its own image, as near to the end as it can be solved for."""
+    chord = last.place - point.place
+    for share in NEAR_THE_END:
+        beside: OrbitPoint | None = point.curve.solve(between(point, last, share), chord / point.curve.norm(chord))
+        if beside is not None and not falls_onto_image(point, beside):
+            return beside
+    return None
 
 
 def passes_image(a: OrbitPoint, b: OrbitPoint) -> bool:
