@@ -39,6 +39,8 @@ def between_specials(seed):
     """That the number of multipliers outside the unit circle changes at special points only."""
     branch = followed(seed, STEP)
     special = {id(zero.point.place) for zero in branch.special}  # the points may be turned the other way
+    ends = zip(branch.ends, (branch.points[0], branch.points[-1]), strict=True)
+    special |= {id(point.place) for end, point in ends if end.reason is OrbitEnd.IMAGE}  # the parent's PD or BPC
     count = None
     for point in branch.points:
         if id(point.place) in special or point.orbit.grazes:
