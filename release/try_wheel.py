@@ -118,7 +118,7 @@ def main() -> None:
     print("| environment | Python | numba | NumPy | SciPy | xarray | Zarr | Matplotlib | tests |")
     print("|---|---|---|---|---|---|---|---|---|")
     for python in there:
-        for lowest in (False, True) if python == there[0] else (False,):
+        for lowest in (False, True) if python == PYTHONS[0] else (False,):
             with tempfile.TemporaryDirectory() as folder:
                 print(Trial(python, lowest).run(wheel, Path(folder), options.tests), flush=True)
     missing = [python for python in PYTHONS if python not in there]
