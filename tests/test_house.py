@@ -29,6 +29,7 @@ SHARED = {
     "files",
     "progress",
     "provenance",
+    "window",
     "public_functions",
     "branch_lines",
     "branch_tables",

@@ -17,7 +17,7 @@ import numpy as np
 from saltus.errors import ParameterError, shown
 
 if TYPE_CHECKING:
-    from saltus.systems import System
+    pass
 
 RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
 
@@ -35,14 +35,12 @@ class Limits:
     motion: int = 2048  # Bytes that a motion of an ensemble takes; 1000 were measured, and samples come to it.
     dense: int = 6000  # Bytes that a forcing period of one motion takes which is kept whole; 5400 were measured.
     work: float = 1e12  # Motions times forcing periods: four days of one core, at three million in a second.
-    operations: int = (
-        600  # Loops over Taylor coefficients in a model's equations: a minute of compiling; saltus's own have 92 at most.
-    )
+    # Loops over Taylor coefficients in a model's equations: a minute of compiling; saltus's own have 92 at most.
+    operations: int = 600
     nodes: int = 100_000  # Operations of any kind in them, which take a minute too.
     lanes: float = 3.0  # So many times as long vector lanes of them are compiled; 2.7 were measured.
-    derivatives: float = (
-        0.25  # With its derivatives a system of as many operations, theirs included, takes this share of the time.
-    )
+    # With its derivatives a system of as many operations, theirs included, takes this share of the time.
+    derivatives: float = 0.25
     compiling: float = 5.0  # Minutes for lanes or derivatives: those of four cells need some of them.
     memory: float = 0.8  # The share of the free memory that one request may take: the rest keeps the machine usable.
 
@@ -50,7 +48,6 @@ class Limits:
 LIMITS = Limits()
 MOST = dict.fromkeys(("periods", "transient", "settle"), LIMITS.periods)
 MOST |= {"seed": LIMITS.seed, "threads": LIMITS.threads, "workers": LIMITS.threads, "order": LIMITS.order}
-HALF_WIDTH = 1.5  # of the window that is taken where none is given: about the size of the motions that the paper shows
 
 
 def check_number(name: str, value: Any, **bounds: Any) -> None:
@@ -295,77 +292,6 @@ def check_along(system: Any, path: str, values: Iterable[float], name: str) -> N
             system.with_({path: float(value)})
         except ParameterError as error:
             raise ParameterError(f"{name} reach beyond what the system allows: {error}", name) from None
-
-
-Box = tuple[tuple[float, float], ...]  # bounds of each coordinate, then of each velocity
-
-
-class Window(Box):
-    """A box of the state space by the bounds of each coordinate, then of each velocity; of one coordinate it is a rectangle."""
-
-    __slots__ = ()
-
-    @property
-    def centre(self) -> np.ndarray:
-        """Its middle, (d,) for d state variables."""
-        return np.asarray(np.asarray(self).mean(axis=1))
-
-    @property
-    def half(self) -> np.ndarray:
-        """Its half widths, (d,)."""
-        return 0.5 * np.diff(np.asarray(self), axis=1)[:, 0]
-
-    def scaled(self, states: np.ndarray) -> np.ndarray:
-        """States (..., d) in half widths from the middle."""
-        return np.asarray((states - self.centre) / self.half)
-
-
-def check_window(window: Any, system: System) -> Window:
-    """A window of the states; for None that of half widths 1.5 around the contact, or around 0 without one.
-
-    With several contacts that is as much of it as the contacts leave. Of several coordinates bounds may be equal: that state
-    variable then has one value.
-
-    Raises
-    ------
-    ParameterError
-        What is no pair of bounds for each coordinate and each velocity, or lies beyond the contacts.
-    """
-    names = system.model.coordinates
-    if window is None:
-        return _default_window(system)
-    bounds = as_numbers(window)
-    single = len(names) == 1
-    sound = bounds.shape == (2 * len(names), 2) and (np.abs(bounds) <= LIMITS.value).all()
-    if not sound or not ((bounds[:, 0] < bounds[:, 1]) if single else (bounds[:, 0] <= bounds[:, 1])).all():
-        meant = "((least, largest coordinate), (least, largest velocity))"
-        if not single:
-            meant = f"{2 * len(names)} pairs (least, largest), of {', '.join(names)}, then of their velocities,"
-        raise ParameterError(f"window must be {meant}, got {shown(window)}", "window")
-    for contact in system.model.contacts:
-        low, high = bounds[names.index(contact.coordinate)]
-        if max(contact.gap(low), contact.gap(high)) < 0.0:
-            raise ParameterError(
-                f"window must reach to where {contact.coordinate} can be, and all of ({low:g}, {high:g}) is beyond the contact "
-                f"{contact.name} at {contact.position:g}",
-                "window",
-            )
-    return Window(map(tuple, bounds.tolist()))
-
-
-def _default_window(system: System) -> Window:
-    """Half widths 1.5 around the contact, or around 0 without one, as far as contacts leave room."""
-    model = system.model
-    if model.sides:
-        middle = float(model.contact)
-        return Window(((middle - HALF_WIDTH, middle + HALF_WIDTH), (-HALF_WIDTH, HALF_WIDTH)))
-    bounds = {name: [-HALF_WIDTH, HALF_WIDTH] for name in model.coordinates}
-    for contact in model.contacts:
-        at, pair = float(contact.position), bounds[contact.coordinate]
-        alone = sum(other.coordinate == contact.coordinate for other in model.contacts) == 1
-        pair[:] = sorted((at, at + contact.sign * HALF_WIDTH)) if alone else pair
-        pair[contact.sign < 0] = at
-    return Window([*((low, high) for low, high in bounds.values()), *[(-HALF_WIDTH, HALF_WIDTH)] * len(bounds)])
 
 
 def check_names(name: str, values: Any, meaning: str) -> tuple[str, ...]:

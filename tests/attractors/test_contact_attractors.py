@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from saltus.attractors import attractors_along, basins_of_attraction, find_attractors
-from saltus.checks import check_window
 from saltus.errors import ParameterError
 from saltus.orbits import initial_states
 from saltus.systems import (
@@ -20,6 +19,7 @@ from saltus.systems import (
     TwoStops,
     VelocityReduction,
 )
+from saltus.window import check_window
 
 BETA80 = math.radians(80)
 

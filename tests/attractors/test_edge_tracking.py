@@ -11,7 +11,7 @@ from saltus.attractors.basins.boundaries import clipped, edge_saddles, edges
 from saltus.attractors.basins.grid import basins_of_attraction
 from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.find import Attractors, find_attractors
-from saltus.checks import Window
+from saltus.window import Window
 
 SYSTEM = forced(W=0.88)
 GRID = np.linspace(-2.5, 2.5, 31)

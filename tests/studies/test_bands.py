@@ -8,7 +8,6 @@ from shared_systems import forced
 
 from saltus import ParameterError, WallOscillator
 from saltus.attractors import Unsettled
-from saltus.checks import check_window
 from saltus.flow import Outcome, find_recurrence
 from saltus.studies import chaotic_bands
 from saltus.studies.diagram.bands import Band, Edge, EdgeKind, band_dataset
@@ -17,6 +16,7 @@ from saltus.studies.diagram.chaos_settings import SETTINGS
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.simulated import simulate_from, starts_at
 from saltus.systems import Harmonic, Load, System
+from saltus.window import check_window
 
 WINDOW = ((-4.0, 4.0), (-4.0, 4.0))
 AMPLITUDE, FREQUENCY = "load.horizontal.amplitude", "load.frequency"

@@ -7,7 +7,6 @@ import pytest
 import xarray as xr
 from shared_systems import forced
 
-from saltus.checks import check_window
 from saltus.errors import ParameterError
 from saltus.orbits import find_orbit, search_orbits
 from saltus.studies import bordered_chart, stability_chart
@@ -16,6 +15,7 @@ from saltus.studies.chart.changes import monostable
 from saltus.studies.chart.motions import MOTION, distinct, has_alike
 from saltus.systems import Harmonic, Load, Metainterface, System, TwoLayer, VelocityReduction
 from saltus.theory import equilibria, unloaded_fold
+from saltus.window import check_window
 
 H, V = "load.horizontal.amplitude", "load.vertical"
 ONSET = 0.0219879514  # Hhat of the fold at V = -0.5, Omega = 1 (issue 5)

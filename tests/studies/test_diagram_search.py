@@ -8,7 +8,6 @@ from shared_systems import forced, under
 from study_cases import FREQUENCY
 
 from saltus.branch_tables import branches_of
-from saltus.checks import check_window
 from saltus.flow import find_recurrence
 from saltus.orbits import continue_orbit, orbits_of, search_orbits
 from saltus.orbits.newton import solve
@@ -16,6 +15,7 @@ from saltus.studies import response_spectrum
 from saltus.studies.diagram.diagram_search import MissedShare
 from saltus.studies.diagram.simulated import starts_at
 from saltus.systems import Harmonic
+from saltus.window import check_window
 
 WINDOW = ((-4.0, 4.0), (-4.0, 4.0))
 SYSTEM = forced(1.0)

@@ -3,10 +3,13 @@
 import json
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
+import threading
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numba
@@ -15,6 +18,7 @@ import pytest
 import saltus
 from saltus.flow.compiled import kernel_module, load_kernel
 from saltus.taylor.cache import cache_directory, load_module
+from saltus.taylor.private_numba import CONTEXT, LIBRARY
 
 SOURCE = Path(saltus.__file__).parents[1]
 SYSTEM = """
@@ -89,6 +93,21 @@ def test_machine_code_is_made_only_of_what_is_called_from_outside(tmp_path, monk
     assert engine.is_symbol_defined(outer.fndesc.llvm_cpython_wrapper_name)
     assert not engine.is_symbol_defined(inner.fndesc.llvm_cpython_wrapper_name)
     assert numba.njit(lambda x: 3.0 * x)(2.0) == 6.0  # what others compile later is theirs to call
+
+
+def test_two_threads_that_compile_leave_numba_as_it_was(tmp_path):
+    methods = [(CONTEXT, "get_executable"), (LIBRARY, "_optimize_final_module"), (LIBRARY, "_finalize_final_module")]
+    before = [getattr(*method) for method in methods]
+    both_ready = threading.Barrier(2)
+
+    def compiled(name):
+        (tmp_path / f"{name}.py").write_text(WITHIN)
+        both_ready.wait()
+        return runpy.run_path(str(tmp_path / f"{name}.py"))["eight_times"](1.5)
+
+    with ThreadPoolExecutor(2) as threads:
+        assert list(threads.map(compiled, ["first", "second"])) == [12.0, 12.0]
+    assert [getattr(*method) for method in methods] == before
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,11 @@ from saltus.attractors.attractor import REST, Attractor, Attractors, Target
 from saltus.attractors.attractors_dataset import about, attractor_columns, variable
 from saltus.attractors.find import find_attractors
 from saltus.attractors.kind import AttractorKind
-from saltus.checks import Box, as_numbers, check_along, check_number, check_path
+from saltus.checks import as_numbers, check_along, check_number, check_path
 from saltus.errors import ParameterError
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
+from saltus.window import Box
 
 if TYPE_CHECKING:
     import xarray

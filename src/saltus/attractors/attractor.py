@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors.kind import AttractorKind
-from saltus.checks import Window
 from saltus.orbits import PeriodicOrbit
 from saltus.result import Result
 from saltus.systems import System
+from saltus.window import Window
 
 if TYPE_CHECKING:
     import xarray

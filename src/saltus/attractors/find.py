@@ -13,13 +13,14 @@ from saltus.attractors.attractor import REST, UNDECIDED, Attractor, Attractors
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.registry import NoLabel, Registry
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.checks import Box, check_count, check_number, check_starts, check_states, check_window
+from saltus.checks import check_count, check_number, check_starts, check_states
 from saltus.errors import ParameterError
 from saltus.flow import RECURRENCE, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, initial_states
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.systems import System
+from saltus.window import Box, check_window
 
 
 @dataclass(frozen=True)

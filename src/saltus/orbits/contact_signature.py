@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow import EventKind, Motion, Stop, modes_of, simulate
+from saltus.flow import EventKind, Motion, Stop, simulate
 from saltus.orbits.contact_problem import ContactProblem, problem_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
@@ -38,22 +38,22 @@ def solved_from(base: Problem, state: dict[str, Any], periods: int, iterations: 
     motion = simulate(base.system, **state, periods=2 * periods, tol=SETTINGS.tol)
     if motion.limit is not None:
         return None
-    whole = _is_whole(base, motion)
-    problem, unknowns = _as_a_whole(base, motion, periods) if whole else read_signature(base, motion, periods)
+    followed = _is_followed(base, motion)
+    problem, unknowns = _followed(base, motion, periods) if followed else read_signature(base, motion, periods)
     later = motion.events and motion.events[-1].time > 0.5 * (motion.start + motion.time)
-    if not problem.size or (whole and motion.stop is Stop.REST and not later):
+    if not problem.size or (followed and motion.stop is Stop.REST and not later):
         raise MotionError("the motion comes to rest with all coordinates held at contacts for good, which is no orbit to follow")
     return PeriodicOrbit.near(problem, unknowns, problem.values, iterations=iterations)
 
 
-def _is_whole(base: Problem, motion: Motion) -> bool:
-    """Whether there are no equations from event to event: with frictions, or where impacts die away."""
+def _is_followed(base: Problem, motion: Motion) -> bool:
+    """Whether the orbit is followed through its events, as equations between them lack: with frictions, or dying impacts."""
     return bool(base.system.model.frictions) or len(motion.events.of(EventKind.HELD)) > 0
 
 
-def _as_a_whole(base: Problem, motion: Motion, periods: int) -> tuple[Problem, np.ndarray]:
+def _followed(base: Problem, motion: Motion, periods: int) -> tuple[Problem, np.ndarray]:
     """The equations x = Phi(x) at the phase farthest from all events at which the fewest contacts are closed, and the state."""
-    period, model = base.system.load.period, base.system.model
+    period = base.system.load.period
     assert period is not None
     end = motion.start + periods * period
     times = [event.time for event in motion.events if motion.start < event.time < end]
@@ -61,8 +61,8 @@ def _as_a_whole(base: Problem, motion: Motion, periods: int) -> tuple[Problem, n
     spans, middles = np.diff(bounds), 0.5 * (bounds[1:] + bounds[:-1])
     if not times and motion.system.model.frictions and 0 in motion.sliding.values():
         raise MotionError("the motion sticks for good, as it may anywhere near, which is no orbit to follow")
-    closed = modes_of(model, motion._states(middles)[2])[0].tolist()
-    chosen = max(range(len(spans)), key=lambda i: (-int(closed[i]).bit_count(), spans[i]))
+    closed = [motion.closed_at(middle) for middle in middles.tolist()]
+    chosen = max(range(len(spans)), key=lambda i: (-closed[i].bit_count(), spans[i]))
     state = np.concatenate([np.atleast_1d(x) for x in motion.at(float(middles[chosen]))])
     phase = float(middles[chosen]) * base.frequency(base.values) % (2.0 * np.pi)
     return problem_of(base.system, Signature((), periods, section=phase), base.paths, base.tol), state

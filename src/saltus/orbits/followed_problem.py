@@ -1,4 +1,4 @@
-"""Orbits that are followed as whole motions, x = Phi(x): those whose impacts die away, and those with dry friction.
+"""Orbits that are followed through all of their events, x = Phi(x): those whose impacts die away, and those with dry friction.
 
 The unknowns are the state at a phase of the load at which nothing happens. Events between are those of the motion, whatever
 they are; their derivatives are those of `sensitivities`. An accumulation of impacts is a map of its own there, with the

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Box, Window, check_count, check_path, check_starts, check_window
+from saltus.checks import check_count, check_path, check_starts
 from saltus.errors import ParameterError
 from saltus.flow import Recurrence, find_recurrence
 from saltus.orbits.near_returns import orbits_near_returns, solved_near
@@ -18,6 +18,7 @@ from saltus.orbits.verify import same_orbit
 from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset
 from saltus.systems import System, check_system
+from saltus.window import Box, Window, check_window
 
 if TYPE_CHECKING:
     import xarray

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import Window
 from saltus.systems import System
+from saltus.window import Window
 
 CLOSED_BELOW = 1e-13  # A gap that is open, and moves, by less than this is closed but for rounding.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import Equilibrium, Separatrix, equilibria, separatrices
-from saltus.checks import Box, check_count, check_number, check_states, check_window
+from saltus.checks import check_count, check_number, check_states
 from saltus.errors import ParameterError
 from saltus.flow import simulate
 from saltus.orbits import even_steps
@@ -17,6 +17,7 @@ from saltus.progress import Progress, silent
 from saltus.provenance import provenance
 from saltus.public_functions import checked_by
 from saltus.systems import System, VelocityReduction
+from saltus.window import Box, check_window
 
 if TYPE_CHECKING:
     import xarray

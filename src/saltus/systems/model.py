@@ -148,7 +148,7 @@ class Model:
         return bool(self.contacts or self.frictions)
 
     def normal_forces(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[Any, ...]:
-        """N of each friction, which must stay positive: the motion ends where one does not.
+        """N of each friction, which must stay positive: the motion ends where one does not. By default 1: mu N is then mu.
 
         Parameters
         ----------

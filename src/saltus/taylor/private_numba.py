@@ -57,11 +57,13 @@ ADDRESS_PROTOCOL = _private("numba.core.types", "WrapperAddressProtocol")
 EXPERIMENTAL = _private("numba.core.errors", "NumbaExperimentalFeatureWarning")
 
 DIGEST = hashlib.sha256().digest_size  # bytes
+COMPILING = threading.RLock()  # held while numba's own methods are exchanged: two threads would put back each other's
 
 log = logging.getLogger("saltus.cache")
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
-# For functions that only compiled code may call: numba writes no wrappers. Where they make no array either, it counts no
+# For functions that only compiled code may call, and that end the process if Python calls them: numba writes no wrappers. (Tests
+# of such a function compile its `py_func` for themselves.) Where they make no array either, it counts no
 # references, which would cost more than the work between two calls.
 WITHIN: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 LEAN: dict[str, Any] = {"_nrt": False} | WITHIN
@@ -155,7 +157,7 @@ def _compiled(signature: Any, **options: Any) -> Callable[[Any], Any]:
             dispatcher.enable_caching()
         else:
             dispatcher._cache = kept
-        with _machine_code_of(function):
+        with COMPILING, _machine_code_of(function):
             dispatcher.compile(signature)
         dispatcher.disable_compile()
         return dispatcher

@@ -17,9 +17,9 @@ from saltus.attractors.manifolds.phase_plane import separatrices
 from saltus.attractors.manifolds.saddle_manifolds import is_saddle, stable_manifold
 from saltus.attractors.orbit_certificate import solved_orbit
 from saltus.attractors.stroboscopic_section import is_constant, section_states
-from saltus.checks import Window, check_window
 from saltus.orbits import PeriodicOrbit, is_symmetric, same_orbit
 from saltus.systems import System
+from saltus.window import Window, check_window
 
 
 @dataclass(frozen=True)

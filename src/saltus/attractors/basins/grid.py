@@ -19,12 +19,10 @@ from saltus.attractors.find import find_attractors
 from saltus.attractors.stroboscopic_section import with_clock
 from saltus.checks import (
     LIMITS,
-    Window,
     check_axis,
     check_count,
     check_memory,
     check_number,
-    check_window,
     check_work,
 )
 from saltus.errors import ParameterError
@@ -33,6 +31,7 @@ from saltus.orbits import rest_state
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.systems import System, check_system, reversed_system
+from saltus.window import Window, check_window
 
 if TYPE_CHECKING:
     import xarray

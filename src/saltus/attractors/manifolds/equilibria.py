@@ -14,9 +14,9 @@ import numpy as np
 
 from saltus.attractors.manifolds.saddle_manifolds import PLANE
 from saltus.attractors.stroboscopic_section import check_periodic
-from saltus.checks import Box, check_window
 from saltus.errors import ParameterError
 from saltus.systems import Constant, System, check_system
+from saltus.window import Box, check_window
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from saltus.checks import Window
+from saltus.window import Window
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,11 @@ import numpy as np
 from saltus.attractors.manifolds.equilibria import Equilibrium, equilibria
 from saltus.attractors.manifolds.manifold_growth import has_left
 from saltus.attractors.manifolds.saddle_manifolds import PLANE
-from saltus.checks import Box, Window, check_number, check_window
+from saltus.checks import check_number
 from saltus.flow import Motion, simulate
 from saltus.result import Result, result_dataset
 from saltus.systems import System, VelocityReduction, reversed_system
+from saltus.window import Box, Window, check_window
 
 if TYPE_CHECKING:
     import xarray

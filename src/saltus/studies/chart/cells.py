@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import Window
 from saltus.flow import approached, find_recurrence
 from saltus.orbits import initial_states, rest_state
 from saltus.studies.chart.cell_outcomes import outcomes
@@ -22,6 +21,7 @@ from saltus.studies.chart.motions import ALIKE, SIDES, distinct, has_alike, is_a
 from saltus.studies.chart.request import ChartRequest
 from saltus.systems import System
 from saltus.theory import amplitude_limits
+from saltus.window import Window
 
 
 @dataclass(frozen=True)

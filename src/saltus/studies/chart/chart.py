@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Box, check_count
+from saltus.checks import check_count
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.chart.borders import with_borders
@@ -17,6 +17,7 @@ from saltus.studies.chart.disagreements import disagreements
 from saltus.studies.chart.request import ChartRequest
 from saltus.systems import System, check_system
 from saltus.theory import quasi_static_border
+from saltus.window import Box
 
 if TYPE_CHECKING:
     import xarray

@@ -19,7 +19,6 @@ from saltus.checks import (
     check_number,
     check_path,
     check_starts,
-    check_window,
     check_work,
 )
 from saltus.errors import ParameterError, shown
@@ -29,6 +28,7 @@ from saltus.studies.chart.cell_outcomes import CellOutcome, flags
 from saltus.studies.chart.motions import KEPT
 from saltus.systems import System, check_system
 from saltus.theory import amplitude_limits
+from saltus.window import check_window
 
 if TYPE_CHECKING:
     from saltus.sweep import Plan, Variable

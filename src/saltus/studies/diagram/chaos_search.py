@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from saltus.attractors import Judged, SettledLater, Unsettled
-from saltus.checks import Box, check_count, check_window
+from saltus.checks import check_count
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.checks import check_diagram
@@ -20,6 +20,7 @@ from saltus.studies.diagram.chaos_settings import SETTINGS, ChaosSettings
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
+from saltus.window import Box, check_window
 
 
 class Seed(NamedTuple):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Box, as_numbers, check_bounds, check_count, check_step, check_window
+from saltus.checks import as_numbers, check_bounds, check_count, check_step
 from saltus.errors import ParameterError
 from saltus.orbits import STEP
 from saltus.progress import Progress, part_of, silent
@@ -22,6 +22,7 @@ from saltus.studies.diagram.diagram_search import DiagramSearch
 from saltus.studies.diagram.diagram_work import diagram_plan, diagram_work
 from saltus.studies.diagram.effort import EFFORTS, read_effort
 from saltus.systems import System
+from saltus.window import Box, check_window
 
 if TYPE_CHECKING:
     import xarray

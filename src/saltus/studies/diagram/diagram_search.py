@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors import share_interval
-from saltus.checks import Window
 from saltus.flow import motions_from, stroboscopic
 from saltus.orbits import PeriodicOrbit, keeps_symmetry, orbits_near_returns, solved_near, within_window
 from saltus.progress import Progress, silent
@@ -23,6 +22,7 @@ from saltus.studies.diagram.effort import EffortSettings
 from saltus.studies.diagram.placement import PlacedBranch, placed, stable_motions
 from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
+from saltus.window import Window
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import Window
 from saltus.flow import Outcome, Recurrence, find_recurrence, return_distances
 from saltus.orbits import even_steps, is_still, within_window
 from saltus.progress import Progress, silent
 from saltus.systems import System
+from saltus.window import Window
 
 
 @dataclass(frozen=True)
