@@ -3,8 +3,11 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+TEST_READY := $(VENV)/.ready-test
 BENCH_READY := $(VENV)/.ready-bench
 DOCS_READY := $(VENV)/.ready-docs
+# Python compiles what it imports, when it does; compiling all packages took longer than installing them.
+INSTALL := $(PYTHON) -m pip --python $(BIN)/python install --quiet --no-compile
 
 .PHONY: help reproduce test thorough release-check lint bench docs dist lock clean
 
@@ -23,17 +26,17 @@ reproduce: $(READY)
 	$(BIN)/saltus reproduce
 
 # On a new machine the compiler and the type checker, of one core each, work beside one another.
-test: $(READY)
+test: $(TEST_READY)
 	@$(BIN)/python tests/compile_first.py & $(MAKE) --no-print-directory lint; passed=$$?; wait; exit $$passed
 	$(BIN)/python -m pytest
 
-thorough: $(READY)
+thorough: $(TEST_READY)
 	$(BIN)/python -m pytest -m thorough
 
-release-check: $(READY)
+release-check: $(TEST_READY)
 	$(BIN)/python -m saltus.paper.release_check
 
-lint: $(READY)
+lint: $(TEST_READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -48,7 +51,7 @@ docs: $(DOCS_READY)
 
 # DIST passes options on: make dist DIST=--tests
 dist: $(READY)
-	$(PYTHON) -m pip --python $(BIN)/python install --quiet uv
+	$(INSTALL) uv
 	$(BIN)/python release/try_wheel.py $(DIST)
 
 # Debian splits ensurepip off into python3-venv; pip can fill a bare environment from outside.
@@ -56,26 +59,32 @@ $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "saltus needs Python 3.11 or newer; try: make PYTHON=python3.12 ..." >&2; exit 2; }
 	@$(PYTHON) -m venv $(VENV) >/dev/null 2>&1 || $(PYTHON) -m venv --clear --without-pip $(VENV)
-	$(PYTHON) -m pip --python $(BIN)/python install --quiet --require-hashes -r requirements.lock
-	$(PYTHON) -m pip --python $(BIN)/python install --quiet --no-deps --no-build-isolation -e .
+	$(INSTALL) --require-hashes -r requirements.lock
+	$(INSTALL) --no-deps --no-build-isolation -e .
+	@touch $@
+
+# What only the tests need.
+$(TEST_READY): $(READY) requirements-test.lock
+	$(INSTALL) --require-hashes -r requirements-test.lock
 	@touch $@
 
 # What only the benchmarks need: the peers.
 $(BENCH_READY): $(READY) requirements-bench.lock
-	$(PYTHON) -m pip --python $(BIN)/python install --quiet --require-hashes -r requirements-bench.lock
+	$(INSTALL) --require-hashes -r requirements-bench.lock
 	@{ test "$$(id -u)" = 0 && apt-get install -qq --no-install-recommends python3-siconos gcc >/dev/null; } 2>/dev/null || \
 		echo "Siconos is not installed here (as root: apt-get install python3-siconos gcc); without it its comparison is left out"
 	@touch $@
 
 $(DOCS_READY): $(READY) requirements-docs.lock
-	$(PYTHON) -m pip --python $(BIN)/python install --quiet --require-hashes -r requirements-docs.lock
+	$(INSTALL) --require-hashes -r requirements-docs.lock
 	@touch $@
 
 lock:
 	$(PYTHON) -m venv $(VENV)/lock && $(VENV)/lock/bin/pip install --quiet uv
-	$(VENV)/lock/bin/uv export --quiet --extra test --no-emit-project --no-header --format requirements.txt -o requirements.lock
-	$(VENV)/lock/bin/uv export --quiet --extra bench --no-emit-project --no-header --format requirements.txt -o requirements-bench.lock
-	$(VENV)/lock/bin/uv export --quiet --extra docs --no-emit-project --no-header --format requirements.txt -o requirements-docs.lock
+	for extra in editable test bench docs; do \
+		$(VENV)/lock/bin/uv export --quiet --extra $$extra --no-emit-project --no-header --format requirements.txt -o requirements-$$extra.lock || exit; \
+	done
+	mv requirements-editable.lock requirements.lock
 	rm -rf $(VENV)/lock uv.lock
 
 clean:
