@@ -43,6 +43,7 @@ class Limits:
     derivatives: float = 0.25
     compiling: float = 5.0  # Minutes for lanes or derivatives: those of four cells need some of them.
     memory: float = 0.8  # The share of the free memory that one request may take: the rest keeps the machine usable.
+    any_machine: float = 1e8  # Bytes that are always there: what needs less is not compared with what is free, which takes time.
 
 
 LIMITS = Limits()
@@ -144,7 +145,7 @@ def check_memory(name: str, size: float, what: str) -> None:
     ParameterError
         With the estimate and what is free.
     """
-    free = free_memory()
+    free = free_memory() if size > LIMITS.any_machine else math.inf
     if size > LIMITS.memory * free:
         raise ParameterError(
             f"{name} is too large: {what} need about {size / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free", name
