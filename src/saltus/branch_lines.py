@@ -111,8 +111,9 @@ def _smoothed(line: np.ndarray) -> np.ndarray:
 def _place_of_change(branch: Any, quantity: str, cut: int, kinds: tuple[str, ...]) -> np.ndarray:
     """Where something changes between the points cut - 1 and cut: at the special point of such kinds there, or in the middle."""
     names = ("parameter", quantity)
-    a, b = (np.array([float(branch[name][k]) for name in names]) for k in (cut - 1, cut))
-    size = np.array([np.ptp(branch[name].values) or 1.0 for name in names])
+    columns = [branch[name].values for name in names]
+    a, b = (np.array([float(column[k]) for column in columns]) for k in (cut - 1, cut))
+    size = np.array([np.ptp(column) or 1.0 for column in columns])
     middle = (a + b) / 2
     known = np.isin(branch["kind"].values, kinds)
     places = np.stack([branch[f"special_{name}"].values[known] for name in names], axis=1)

@@ -94,9 +94,17 @@ def write_dataset(path: Path | str, dataset: Any) -> Path:
 
 
 def write_figure(stem: Path | str, figure: Any, title: str | None = None) -> list[Path]:
-    """Write a matplotlib Figure as `stem`.png and `stem`.pdf, the same bytes for the same figure; `title` is that of the PDF."""
-    kinds: dict[str, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": None, "Title": title}}
-    return [_write_picture(Path(f"{stem}.{kind}"), figure, kind, about) for kind, about in kinds.items()]
+    """Write a matplotlib Figure as `stem`.png and `stem`.pdf, the same bytes for the same figure; `title` is that of the PDF.
+
+    The PDF has the layout of the PNG: to find one takes a third of the time of both.
+    """
+    png = _write_picture(Path(f"{stem}.png"), figure, "png", {})
+    layout = figure.get_layout_engine()
+    figure.set_layout_engine("none")
+    try:
+        return [png, _write_picture(Path(f"{stem}.pdf"), figure, "pdf", {"CreationDate": None, "Title": title})]
+    finally:
+        figure.set_layout_engine(layout)
 
 
 def _write_picture(path: Path, figure: Any, kind: str, metadata: dict[str, Any]) -> Path:

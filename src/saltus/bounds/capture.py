@@ -11,8 +11,8 @@ import numpy as np
 
 from saltus.bounds.adiabatic_invariant import budget, first_guess, largest_start, normal_form
 from saltus.bounds.energy_barrier import CLIMB, climb
-from saltus.bounds.gap_equation import SPEED, Leaves, Opening, reads
-from saltus.bounds.intervals import SLACK, Interval, enclose
+from saltus.bounds.gap_equation import OPENING, SPEED, Leaves, Opening, reads
+from saltus.bounds.intervals import SLACK, Interval, enclose, enclosed_along
 from saltus.systems import System, broadcast_arrays, check_parameters, check_system, finite_array, parameter_table
 from saltus.taylor import Expr, Trace, differentiate, number, record_tables, structure_key, substitute, trace
 
@@ -259,8 +259,8 @@ class _Law:
         """The speed up to which flights on one side, with the impact after, lose energy."""
         a, a_w, a_u = (getattr(self.sides[side], name) for name in ("a", "a_w", "a_u"))
         allowed = np.where(steady, np.inf, np.exp(2 * loss) * (1 - SLACK))
-        pull, slope = (lambda w, e=e: -enclose([e], replace(leaves, opening=w))[0] for e in (a, a_w))
-        turning, lo, hi = climb(pull, slope, allowed)
+        rise, bend = (enclosed_along(e, leaves, OPENING) for e in (a, a_w))
+        turning, lo, hi = climb(lambda w: -rise(w), lambda w: -bend(w), allowed)
         top = np.sqrt(2 * hi)
         (growth,) = enclose([a_u], replace(leaves, opening=Interval(0 * turning, turning), speed=Interval(-top, top)))
         falls = (lo > 0) & ((growth.hi < 0) | ((growth.hi <= 0) & (loss > 0)))

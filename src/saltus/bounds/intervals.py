@@ -8,7 +8,8 @@ accounted for.) Where an operation leaves its domain the bounds are NaN, and no 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -96,14 +97,48 @@ def enclose(roots: list[Expr], leaf: Callable[[Expr], Interval]) -> list[Interva
     """Bounds of expressions for all values of their leaves (time, coordinate, parameter, ...) in the ranges that `leaf` gives."""
     values: dict[int, Interval] = {}
     with np.errstate(all="ignore"):
-        for node in ordered(roots):
-            if node.op == "number":
-                values[id(node)] = Interval(node.value)
-            elif not node.args:
-                values[id(node)] = leaf(node)
-            else:
-                values[id(node)] = _apply(node, [values[id(a)] for a in node.args])
+        _fill(values, _in_order(*roots), leaf)
     return [values[id(root)] for root in roots]
+
+
+def enclosed_along(root: Expr, leaf: Callable[[Expr], Interval], varied: Expr) -> Callable[[Interval], Interval]:
+    """`enclose` of an expression as a function of the range of one leaf; what does not depend on that is bounded once."""
+    depends = {id(varied)}
+    fixed, others = [], []
+    for node in _in_order(root):
+        if node is varied or any(id(a) in depends for a in node.args):
+            depends.add(id(node))
+            others.append(node)
+        else:
+            fixed.append(node)
+    values: dict[int, Interval] = {}
+    with np.errstate(all="ignore"):
+        _fill(values, fixed, leaf)
+
+    def bounds(given: Interval) -> Interval:
+        here = values.copy()
+        with np.errstate(all="ignore"):
+            _fill(here, others, lambda _: given)
+        return here[id(root)]
+
+    return bounds
+
+
+@lru_cache(maxsize=256)
+def _in_order(*roots: Expr) -> tuple[Expr, ...]:
+    """The nodes below some roots, operands first: the same few roots are bounded again and again."""
+    return tuple(ordered(list(roots)))
+
+
+def _fill(values: dict[int, Interval], nodes: Iterable[Expr], leaf: Callable[[Expr], Interval]) -> None:
+    """Add the bounds of nodes, operands before what is made of them, to those that are known."""
+    for node in nodes:
+        if node.op == "number":
+            values[id(node)] = Interval(node.value)
+        elif not node.args:
+            values[id(node)] = leaf(node)
+        else:
+            values[id(node)] = _apply(node, [values[id(a)] for a in node.args])
 
 
 def _apply(node: Expr, x: list[Interval]) -> Interval:

@@ -42,7 +42,7 @@ def reproduce(
     ParameterError
         An unknown name, with the near ones; an output folder that cannot be written to.
     """
-    from saltus.paper.parts import FIGURES, LONGEST
+    from saltus.paper.parts import FIGURES, ORDER
 
     for name in names:
         if name not in FIGURES:
@@ -51,8 +51,7 @@ def reproduce(
     check_writable(output)
     chosen = [figure for name, figure in FIGURES.items() if not names or name in names]
     stale = {figure.name: figure for figure in chosen if force or not state.up_to_date(figure, output)}
-    longest = [name for name in LONGEST if name in stale]
-    seconds = _make({name: stale[name] for name in (*longest, *stale)}, output, progress)
+    seconds = _make({name: stale[name] for name in dict.fromkeys((*ORDER, *stale)) if name in stale}, output, progress)
     progress(1.0, "writing the report")
     results = [_result(figure, output, seconds) for figure in chosen]
     write_report(FIGURES.values(), output, {result.name: result.claims for result in results})

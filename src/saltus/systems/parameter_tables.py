@@ -11,7 +11,8 @@ from saltus.errors import ParameterError, near
 from saltus.systems.parameters import numbers
 from saltus.systems.system import System
 
-MOST_CHECKED = 200  # rows of parameters; of more, those with a least or largest value and as many more, evenly
+# Rows of parameters, of which each makes a system; of more, those with a least or largest value and as many more, evenly.
+MOST_CHECKED = 32
 
 
 def parameter_table(system: System, parameters: Any) -> dict[str, Any]:

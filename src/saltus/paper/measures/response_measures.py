@@ -25,6 +25,7 @@ from saltus.paper.measures.spectrum_features import (
     main_branch,
     passing,
     range_counts,
+    steps_of,
     superharmonic,
 )
 from saltus.systems import System
@@ -67,14 +68,13 @@ def confirmed(spectra: Iterable[Any]) -> Measured:
             stable = branch["stable"].values.astype(bool)
             kept = max(kept, float(np.max(branch["kept"].values[stable], initial=0.0)))
             orbits += int(stable.sum())
-        places, lines = spectrum["attractors"], [line for _, branch in branches_of(spectrum) for line in smooth_lines(branch)]
+        lines = (line for _, branch in branches_of(spectrum) for line in smooth_lines(branch))
+        places, steps = spectrum["attractors"], steps_of(lines, stable=True)
         placed = places["placed"].values == 1
         unplaced += int((~placed).sum())
         for value, amplitude in zip(places["parameter"].values[placed], places["amplitude"].values[placed], strict=True):
             # on both sides: a branch found at this very value may begin, or close, exactly there
-            known = np.concatenate(
-                [passing(lines, float(value) * (1 + side), stable=True) for side in (-CRITERIA.beside, CRITERIA.beside)]
-            )
+            known = np.concatenate([passing(steps, value * (1 + side)) for side in (-CRITERIA.beside, CRITERIA.beside)])
             off, attractors = max(off, float(np.abs(known - amplitude).min(initial=np.inf))), attractors + 1
     holds = orbits > 0 and attractors > 0 and kept < CRITERIA.confirmed and off < CRITERIA.on_branch
     return measured(holds, orbits=orbits, kept=kept, attractors=attractors, off=off, unplaced=unplaced)
@@ -162,9 +162,9 @@ def loops(panels: Panels) -> Measured:
 
 def _rises_above(branch: Any, main: Any, bounds: Any) -> bool:
     """Whether somewhere within the bounds a branch is plainly larger than all of the main one there."""
-    lines = list(smooth_lines(main))
+    steps = steps_of(smooth_lines(main))
     return any(
-        amplitude - np.max(passing(lines, value), initial=0.0) >= CRITERIA.apart
+        amplitude - np.max(passing(steps, value), initial=0.0) >= CRITERIA.apart
         for value, amplitude in zip(branch["parameter"].values, branch["amplitude"].values, strict=True)
         if bounds[0] <= value <= bounds[1]
     )
@@ -283,8 +283,8 @@ def _along_the_first_path(main: Any, critical: float) -> tuple[np.ndarray, np.nd
 
 
 def _largest(main: Any, values: np.ndarray) -> np.ndarray:
-    lines = list(smooth_lines(main))
-    return np.array([np.max(passing(lines, value, stable=True), initial=0.0) for value in values])
+    steps = steps_of(smooth_lines(main), stable=True)
+    return np.array([np.max(passing(steps, value), initial=0.0) for value in values])
 
 
 def _rises(sizes: np.ndarray) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any
 
@@ -58,30 +59,26 @@ def superharmonic(branch: Any, share: float = PROMINENT) -> np.ndarray:
 
 def amplitudes_at(branch: Any, value: float, stable: bool | None = None) -> np.ndarray:
     """The amplitudes with which the line of a branch passes a value of the parameter; given `stable`, of such motions only."""
-    return passing(list(smooth_lines(branch)), value, stable)
+    return passing(steps_of(smooth_lines(branch), stable), value)
 
 
-def passing(lines: list[BranchLine], value: float, stable: bool | None = None) -> np.ndarray:
-    """The same amplitudes for the lines of one or more branches, as `smooth_lines` gives them."""
-    found = [np.empty(0)]
-    for line in lines:
-        if stable in (None, line.stable):
-            x, y = line.places.T
-            i = np.flatnonzero(_passes(x, value))
-            found.append(y[i] + (value - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i]))
-    return np.concatenate(found)
+def steps_of(lines: Iterable[BranchLine], stable: bool | None = None) -> np.ndarray:
+    """The steps of lines, as `smooth_lines` gives them, from place to place: parameter and amplitude at both ends, (n, 4)."""
+    chosen = [line.places for line in lines if stable in (None, line.stable)]
+    return np.concatenate([np.empty((0, 4)), *(np.hstack([places[:-1], places[1:]]) for places in chosen)])
 
 
-def _passes(x: np.ndarray, value: float) -> np.ndarray:
-    """Which steps from x[i] to x[i + 1] contain a value, their lower ends counted in."""
-    return np.asarray((np.minimum(x[:-1], x[1:]) <= value) & (value < np.maximum(x[:-1], x[1:])))
+def passing(steps: np.ndarray, value: float) -> np.ndarray:
+    """The amplitudes with which steps (n, 4) pass a value of the parameter, their lower ends counted in."""
+    x, y, later, there = steps[(np.minimum(steps[:, 0], steps[:, 2]) <= value) & (value < np.maximum(steps[:, 0], steps[:, 2]))].T
+    return np.asarray(y + (value - x) / (later - x) * (there - y))
 
 
 def stable_motions(spectrum: Any, values: np.ndarray) -> np.ndarray:
     """How many stable periodic motions coexist at values of the parameter (n,), mirror images counted once, (n,)."""
     lines = [line.places[:, 0] for _, branch in branches_of(spectrum) for line in smooth_lines(branch) if line.stable]
     steps = np.concatenate([np.empty((0, 2)), *(np.stack([x[:-1], x[1:]], axis=1) for x in lines)])
-    # A step is passed at its lower end already and at its upper end no more, as in `_passes`.
+    # A step is passed at its lower end already and at its upper end no more, as in `passing`.
     begun, over = (np.searchsorted(np.sort(ends), values, side="right") for ends in (steps.min(axis=1), steps.max(axis=1)))
     return np.asarray(begun - over)
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from saltus.files import read_dataset
+from saltus.flow import available_cores
 from saltus.paper import up_to_date as state
 from saltus.paper.claims.claim import Claim, with_summaries
 from saltus.paper.claims.claim_tables import section_titles
@@ -102,7 +104,11 @@ def report_content(all_figures: Iterable[PaperFigure], present: Mapping[PaperFig
         A data file that is damaged.
     """
     claims = with_summaries(claim for group in present.values() for claim in group)
-    parts = [_part(figure, here, folder) for figure, here in present.items()]
+    with ThreadPoolExecutor(available_cores()) as pool:  # packing a picture leaves Python's lock
+        drawn = {figure: pool.submit(embedded, folder / f"{figure.name}.png") for figure in present if figure.draw is not None}
+        parts = [
+            _part(figure, here, folder, drawn[figure].result() if figure in drawn else None) for figure, here in present.items()
+        ]
     shown = {claim.id for part in parts if part.figure.section for claim in part.claims}
     numbers = [*section_titles(), ""]
     sections = [
@@ -129,7 +135,7 @@ def report_content(all_figures: Iterable[PaperFigure], present: Mapping[PaperFig
     )
 
 
-def _part(figure: PaperFigure, claims: list[Claim], folder: Path) -> ReportPart:
+def _part(figure: PaperFigure, claims: list[Claim], folder: Path, picture: EmbeddedPicture | None) -> ReportPart:
     record = state.read(figure, folder) or {}
     checksums, versions = record["files"], record["versions"]
     links = [FileLink(name=n, size=_size(folder / n), checksum=str(checksums.get(n, ""))) for n in figure.files()]
@@ -141,7 +147,7 @@ def _part(figure: PaperFigure, claims: list[Claim], folder: Path) -> ReportPart:
         versions=", ".join(f"{name} {number}" for name, number in versions.items()),
         stale=record.get("key") != state.key(figure),
         data=data_tables(folder / f"{figure.name}.nc"),
-        picture=embedded(folder / f"{figure.name}.png") if figure.draw is not None else None,
+        picture=picture,
         table=_markdown_rows((folder / f"{figure.name}.md").read_text(encoding="utf-8", errors="replace"))
         if figure.table is not None
         else [],
