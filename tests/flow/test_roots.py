@@ -9,14 +9,16 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from saltus.flow import roots as compiled
+from saltus.flow import roots
+from saltus.flow.kernel_layout import ZERO
 from saltus.flow.roots import NEVER, NONE, SIMPLE
+from saltus.taylor import compiled_part
 from saltus.taylor.private_numba import OPTIONS
 
-# The kernels' own functions can be called by compiled code alone: these are compiled of the same source to be called from here.
+_kernel = {"np": np, "ZERO": ZERO} | dict.fromkeys(("jit", "lean_jit"), numba.njit(**OPTIONS))
+exec(compiled_part(roots), _kernel)
 excluded, first_root, horner, newton, to_bernstein, variations = (
-    numba.njit(**OPTIONS)(getattr(compiled, name).py_func)
-    for name in ("excluded", "first_root", "horner", "newton", "to_bernstein", "variations")
+    _kernel[name] for name in ("excluded", "first_root", "horner", "newton", "to_bernstein", "variations")
 )
 EPS = 2.0**-52
 DEGREES = st.integers(2, 23)

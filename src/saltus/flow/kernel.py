@@ -49,8 +49,7 @@ from saltus.flow.steps import (
     step_size,
     work_arrays,
 )
-from saltus.taylor import lean_jit
-from saltus.taylor import not_here as cached_jit
+from saltus.taylor import cached_jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

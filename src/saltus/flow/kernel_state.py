@@ -90,7 +90,7 @@ def _mode_and_side(request: MotionRequest, run: Program) -> tuple[int, int]:
     position, speed = float(request.position[0]), float(request.speeds[0])
     if model.held:
         return Mode.CONTACT, 0
-    mode, side = side_of_state.py_func(len(model.sides), position, speed, run.model[ModelPart.GEOMETRY])
+    mode, side = side_of_state(len(model.sides), position, speed, run.model[ModelPart.GEOMETRY])
     if mode == Mode.BEYOND:
         name = model.coordinates[0]
         raise ParameterError(f"{name} = {position:g} lies beyond the contact at {name} = {float(model.contact):g}", name)

@@ -19,8 +19,7 @@ from saltus.flow.kernel_layout import ROUGHER, Geometry, ModelPart, Setting, Whe
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.roots import NOISE, SIMPLE, contact_root, horner, roots_within, scale_gap
 from saltus.flow.steps import column_step, expand, leaps, move, step_size, work_arrays
-from saltus.taylor import lean_jit
-from saltus.taylor import not_here as cached_jit
+from saltus.taylor import cached_jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

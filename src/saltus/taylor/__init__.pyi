@@ -5,6 +5,7 @@ from .equations import equations_of
 from .exact_algebra import Form, NoNormalForm, constant, constant_value, normal_form
 from .generated import Case, function_text, generated_header
 from .graph import RECORD_WIDTH, Expr, differentiate, is_steep, number, ordered, substitute
+from .kernel_functions import cached_jit, inline_jit, jit, lean_jit
 from .lane_vectors import (
     ALL,
     absolute,
@@ -31,7 +32,7 @@ from .lane_vectors import (
 )
 from .load_tables import record_table, record_tables
 from .memory import Places
-from .private_numba import entry_point, inline_jit, jit, lean_jit, not_here, pointer, pointers
+from .private_numba import entry_point, pointer, pointers
 from .records import anchor, expand_record, own_records
 from .rules import FUNCTIONS
 from .series import Rows
@@ -59,6 +60,7 @@ __all__ = [
     "anchor",
     "bits",
     "cache_directory",
+    "cached_jit",
     "check_size",
     "compiled_part",
     "constant",
@@ -87,7 +89,6 @@ __all__ = [
     "minimum",
     "module_name",
     "normal_form",
-    "not_here",
     "number",
     "ordered",
     "own_records",

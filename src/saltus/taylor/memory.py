@@ -84,7 +84,7 @@ class Memory:
         if not self._in_table:
             return coefficients
         result = np.empty(RECORD_WIDTH, dtype=object)
-        expand_record.py_func(coefficients, 0.0, self._since(), result)
+        expand_record(coefficients, 0.0, self._since(), result)
         return result
 
     @property

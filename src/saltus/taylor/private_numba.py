@@ -62,8 +62,7 @@ COMPILING = threading.RLock()  # held while numba's own methods are exchanged: t
 log = logging.getLogger("saltus.cache")
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
-# For functions that only compiled code may call, and that end the process if Python calls them: numba writes no wrappers. (Tests
-# of such a function compile its `py_func` for themselves.) Where they make no array either, it counts no
+# For functions that only compiled code may call: numba writes no wrappers. Where they make no array either, it counts no
 # references, which would cost more than the work between two calls.
 WITHIN: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 LEAN: dict[str, Any] = {"_nrt": False} | WITHIN
@@ -218,11 +217,6 @@ def cached_jit(signature: Any, nogil: bool = False) -> Callable[[Any], Any]:
 def pointed_jit(signature: Any, python: bool = False) -> Callable[[Any], Any]:
     """The same for a function that makes no array and is called through pointers, or, if asked, from Python too."""
     return _compiled(signature, _nrt=False, no_cpython_wrapper=not python)
-
-
-def not_here(signature: Any, **options: Any) -> Callable[[Any], Any]:
-    """Stands for `cached_jit` where a file is only read or imported for its constants, and compiled elsewhere."""
-    return lambda function: function
 
 
 # --- calls -----------------------------------------------------------------------------------------------------------------

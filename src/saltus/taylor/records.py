@@ -5,7 +5,7 @@ This part is compiled together with the lanes; `memory.py` runs the same functio
 
 from __future__ import annotations
 
-from saltus.taylor.private_numba import jit
+from saltus.taylor.kernel_functions import jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

@@ -32,8 +32,7 @@ from saltus.flow.kernel_layout import Where, Work
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.roots import NOISE, horner, roots_within, scale_gap
 from saltus.flow.steps import expand, move, work_arrays
-from saltus.taylor import lean_jit
-from saltus.taylor import not_here as cached_jit
+from saltus.taylor import cached_jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

@@ -54,8 +54,7 @@ from saltus.flow.kernel_layout import BATCH, SHORTEST, ZERO, Mode, Setting, Stat
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.roots import NEVER, SIMPLE, contact_root, horner, horner_slope, margin_root
 from saltus.flow.steps import expand, forget, move, next_target, record_step, work_arrays
-from saltus.taylor import lean_jit
-from saltus.taylor import not_here as cached_jit
+from saltus.taylor import cached_jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

@@ -42,6 +42,7 @@ from saltus.taylor import (
     WIDTH,
     anchor,
     bits,
+    cached_jit,
     expand_record,
     first_lane,
     get,
@@ -54,7 +55,6 @@ from saltus.taylor import (
     put,
     replace,
 )
-from saltus.taylor import not_here as cached_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 from saltus.flow.ensemble.function_types import LANE_ROOT, TURNING_RANGE
 from saltus.flow.ensemble.lane_layout import NO_ROOT, TOUCH
 from saltus.flow.roots import SIMPLE, first_root, horner, scale_gap
-from saltus.taylor import get, lean_jit
-from saltus.taylor import not_here as cached_jit
+from saltus.taylor import cached_jit, get, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

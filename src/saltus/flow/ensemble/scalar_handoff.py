@@ -12,8 +12,7 @@ from saltus.flow.ensemble.lane_layout import LaneArray, LaneLabel, Slot
 from saltus.flow.ensemble.lane_state import BUFFER_LENGTH, put_state, record_extrema, scalar_state
 from saltus.flow.kernel_layout import Geometry, Mode, Status, Where
 from saltus.flow.memory_layout import EventCode, State
-from saltus.taylor import get, lean_jit, own_records, put
-from saltus.taylor import not_here as cached_jit
+from saltus.taylor import cached_jit, get, lean_jit, own_records, put
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
