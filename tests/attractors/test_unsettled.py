@@ -1,15 +1,18 @@
 """Motions that have not settled: chaos, transients with their lives, and slow or long periodic motions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shared_systems import forced
 
 from saltus import WallOscillator, simulate_many
-from saltus.attractors import Doubt, JudgementSettings, Unsettled, judge_unsettled
+from saltus.attractors import Doubt, Earlier, JudgementSettings, Unsettled, judge_unsettled
 from saltus.flow import Outcome, find_recurrence
 from saltus.systems import Harmonic, Load, System
 
 FREQUENCY, AMPLITUDE = "load.frequency", "load.horizontal.amplitude"
+BRIEF = JudgementSettings(companions=8, exposure=2000, round_periods=1000, rounds=2)
 
 
 def unsettled_states(system, path, value, periods=300, starts=6, kept=16):
@@ -94,3 +97,23 @@ def test_a_question_is_answered_the_same_alone_and_among_others():
     one = judge_unsettled(system, states[1:2], {FREQUENCY: values[1:2]})
     assert (many.verdict[1], many.exponent[1], many.error[1]) == (one.verdict[0], one.exponent[0], one.error[0])
     assert np.array_equal(many.states[1], one.states[0])
+
+
+def test_chaos_that_was_judged_before_is_judged_on_from_there():
+    """What an earlier judgement has shown counts: its exponent stays, and fewer forcing periods exclude the same life."""
+    system, value = forced(0.2), np.array([0.38])
+    first = judge_unsettled(system, unsettled_states(system, FREQUENCY, 0.38)[:, :16], {FREQUENCY: value}, settings=BRIEF)
+    known = Earlier(first.exponent, first.error, 3.0 * first.life)
+    careful = replace(BRIEF, exposure=20_000, rounds=3)
+    found = judge_unsettled(system, first.states, {FREQUENCY: value}, settings=careful, earlier=known)
+    assert first.verdict.tolist() == found.verdict.tolist() == [Unsettled.CHAOTIC]
+    assert found.exponent[0] == first.exponent[0]
+    assert 3.0 * first.life[0] >= BRIEF.exposure
+    assert 20_000 <= 3.0 * found.life[0] < 20_000 + BRIEF.companions * BRIEF.round_periods
+
+
+def test_an_earlier_judgement_that_was_wrong_is_corrected():
+    system = forced(7.2, 4.0)
+    wrong = Earlier(np.array([0.1]), np.array([0.01]), np.array([2000.0]))
+    states = unsettled_states(system, AMPLITUDE, 7.2, starts=24)
+    assert judge_unsettled(system, states, {AMPLITUDE: np.array([7.2])}, earlier=wrong).verdict.tolist() == [Unsettled.TRANSIENT]

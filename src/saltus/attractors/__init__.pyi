@@ -12,7 +12,7 @@ from .manifolds.saddle_manifolds import Manifold, stable_manifold, unstable_mani
 from .sampled_share import share_interval
 from .verdict.classification import classify
 from .verdict.tori import excludes_tori
-from .verdict.unsettled import JUDGEMENT, Doubt, Judged, JudgementSettings, SettledLater, Unsettled, judge_unsettled
+from .verdict.unsettled import JUDGEMENT, Doubt, Earlier, Judged, JudgementSettings, SettledLater, Unsettled, judge_unsettled
 from .verdict.verdict import Verdict
 from .verdict.zero_one_test import ZeroOne, zero_one_test
 
@@ -22,6 +22,7 @@ __all__ = [
     "Attractors",
     "BasinEntropy",
     "Doubt",
+    "Earlier",
     "Equilibrium",
     "Exponents",
     "Judged",

@@ -34,8 +34,8 @@ class ContactEquations(Equations):
     seen: np.ndarray  # (n, ...): what is seen along each segment, by `SegmentExtremes`; empty if not asked for
     state_count: int  # of the unknowns those that are a state
 
-    def jacobian(self, closing: float = 1.0) -> np.ndarray:
-        return np.asarray(self.here + closing * self.there)
+    def _fill(self, matrix: np.ndarray, closing: float) -> None:
+        matrix[:, : len(matrix)] = self.here + closing * self.there
 
     def monodromy(self) -> np.ndarray:
         """The map of the state after the first event, and of its phase, to those a period later; inf at a grazing."""

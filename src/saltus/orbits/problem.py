@@ -45,27 +45,29 @@ class Equations:
     ends: np.ndarray
     extremes: np.ndarray  # (n, 4 + margins): extrema within each segment, by `HUMP`, ... of `segments.py`; empty if not asked for
 
-    @cached_property
-    def _open(self) -> np.ndarray:
-        """The derivatives to the unknowns, without how the last segment depends on the first unknowns."""
-        n, d, _ = self.here.shape
-        matrix = np.zeros((n, d, n, d))
-        rows = np.arange(n)
-        matrix[rows, :, rows, :] = self.here
-        matrix[rows[:-1], :, rows[1:], :] = self.there[:-1]
-        return matrix.reshape(n * d, n * d)
-
     def jacobian(self, closing: float = 1.0) -> np.ndarray:
         """The derivatives to the unknowns; with `closing` -1 of the problem whose perturbations change their sign each time."""
-        d, matrix = self.there.shape[1], self._open.copy()
-        matrix[-d:, :d] += closing * self.there[-1]
+        matrix = np.zeros((len(self.residual), len(self.residual)))
+        self._fill(matrix, closing)
         return matrix
+
+    def _fill(self, matrix: np.ndarray, closing: float) -> None:
+        """Write the derivatives to the unknowns, along the diagonals of the blocks, into the first columns of a matrix of zeros."""
+        n, d, _ = self.here.shape
+        width = matrix.shape[1]
+        flat, step = matrix.reshape(-1), d * (width + 1)
+        for i in range(d):
+            for j in range(d):
+                flat[i * width + j :: step][:n] = self.here[:, i, j]
+                flat[i * width + j + d :: step][: n - 1] = self.there[:-1, i, j]
+        matrix[-d:, :d] += closing * self.there[-1]
 
     @cached_property
     def _all(self) -> np.ndarray:
         size, count = self.parameters.shape
-        matrix = np.empty((size, size + count))
-        matrix[:, :size], matrix[:, size:] = self.jacobian(), self.parameters
+        matrix = np.zeros((size, size + count))
+        self._fill(matrix, 1.0)
+        matrix[:, size:] = self.parameters
         return matrix
 
     def derivatives(self) -> np.ndarray:

@@ -63,9 +63,19 @@ class JudgementSettings:
     longest_period: int = 128  # The longest period looked for in a regular motion that has not settled, in forcing periods.
     patience: int = 4000  # Forcing periods for which such a motion is followed, so that multipliers up to 0.99 may settle.
     tol: float = 1e-10  # The error of a step.
+    measured_tol: float = 1e-8  # The same where exponents are measured: their own error is that of samples, hundreds of times it.
 
 
 JUDGEMENT = JudgementSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class Earlier:
+    """What a less careful judgement has shown of chaos from whose states a further one starts, an entry for each question."""
+
+    exponent: np.ndarray  # (n,): which is surely above 0
+    error: np.ndarray  # (n,): half width of its 95 % interval
+    quiet: np.ndarray  # (n,): forcing periods of companions, in all, in which none has settled
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +117,7 @@ def judge_unsettled(
     parameters: Mapping[str, np.ndarray],
     *,
     settings: JudgementSettings = JUDGEMENT,
+    earlier: Earlier | None = None,
     progress: Progress = silent,
 ) -> Judged:
     """Whether motions that have not settled are chaotic, transient, or periodic after all.
@@ -128,12 +139,18 @@ def judge_unsettled(
         Numbers by dotted path, (n,) each, in place of the system's.
     settings
         How long is looked, and how surely.
+    earlier
+        What is known already, if the states are those of a judgement that has found chaos: its exponent is not measured again,
+        and the time in which none has settled counts.
     progress
         Called with the fraction done.
     """
     run = _Judgement.begin(system, states, parameters, settings)
-    run.follow(settings.first_periods, part_of(progress, 0.0, 0.2, "judging"))
-    run.measure()
+    if earlier is None:
+        run.follow(settings.first_periods, part_of(progress, 0.0, 0.2, "judging"))
+        run.measure()
+    else:
+        run.take(earlier)
     for i in range(settings.rounds):
         open_chaos = run.positive & ~run.lasts & run.may_last(settings.rounds - i)
         run.open &= open_chaos | (~run.positive & ~run.negative & (run.gone > 0))
@@ -182,6 +199,11 @@ class _Judgement:
             system, columns, settings, chosen, np.ones(n, dtype=bool), positive, negative, empty[0], empty[1],
             period, gone, exposure, before, all_gone,
         )  # fmt: skip
+
+    def take(self, earlier: Earlier) -> None:
+        """Go on from what a less careful judgement has shown."""
+        self.exponent, self.error, self.exposure = earlier.exponent.copy(), earlier.error.copy(), earlier.quiet.astype(int)
+        self.positive[:] = True
 
     def _ends(self, rows: np.ndarray, states: np.ndarray, periods: int, progress: Progress, **options: Any) -> Recurrence:
         """How motions from states (rows, m, 2) end."""
@@ -247,7 +269,9 @@ class _Judgement:
             if not rows.size:
                 return
             columns = {path: values[rows] for path, values in self.parameters.items()}
-            found = largest_exponents(self.system, self.states[rows][:, chosen], columns, periods=periods, tol=self.settings.tol)
+            found = largest_exponents(
+                self.system, self.states[rows][:, chosen], columns, periods=periods, tol=self.settings.measured_tol
+            )
             for name in ("exponent", "error", "positive", "negative"):
                 getattr(self, name)[rows] = getattr(found, name)
 

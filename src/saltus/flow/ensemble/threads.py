@@ -107,6 +107,7 @@ class Lanes:
             After Ctrl-C, within a step of every lane.
         """
         n, own = len(jobs), self.own
+        threads = max(1, min(threads, math.ceil(n / WIDTH)))  # a thread without lanes takes its time to begin, too
         ends = Ends(
             np.empty((n, jobs.states.shape[1])),
             np.zeros((n, EndNumber.RATES + own + self.program.structure.module.COLUMNS)),

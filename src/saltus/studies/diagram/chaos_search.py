@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from saltus.attractors import Judged, SettledLater, Unsettled
+from saltus.attractors import Earlier, Judged, SettledLater, Unsettled
 from saltus.checks import check_count
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
@@ -156,6 +156,11 @@ class _Place:
         return self.verdict is Unsettled.CHAOTIC
 
     @property
+    def quiet(self) -> float:
+        """Forcing periods in which none of the companions has settled, if none has at all; see `Judged.life`."""
+        return 0.0 if self.settled else 3.0 * self.life
+
+    @property
     def kinds(self) -> set[tuple[int, int]]:
         """Period and impacts of the motions that have settled."""
         return {orbit[:2] for orbit in self.orbits}
@@ -232,9 +237,9 @@ class _BandSearch:
             states[i, : np.count_nonzero(row == i)] = last[row == i]
         self._judge(values, states.reshape(len(values), -1, states.shape[-1]), care)
 
-    def _judge(self, values: np.ndarray, states: np.ndarray, care: int) -> None:
+    def _judge(self, values: np.ndarray, states: np.ndarray, care: int, earlier: Earlier | None = None) -> None:
         """Judge what has not settled at these values, of which states (n, m, d) are given, and follow what then settles."""
-        judged = self.work.judge(values, states, self.settings.judgements[care])
+        judged = self.work.judge(values, states, self.settings.judgements[care], earlier)
         for row, value in enumerate(values):
             self.place(float(value)).judge(judged, row, care)
         found = _some(judged.settled, self.settings.neighbours)
@@ -328,7 +333,8 @@ class _BandSearch:
         doubtful = list({place.value: place for place in places if place.chaotic and place.care < care}.values())
         for size in {len(place.chaos) for place in doubtful}:
             alike = [place for place in doubtful if len(place.chaos) == size]
-            self._judge(np.array([place.value for place in alike]), np.stack([place.chaos for place in alike]), care)
+            known = Earlier(*np.array([(place.exponent, place.error, place.quiet) for place in alike]).T)
+            self._judge(np.array([place.value for place in alike]), np.stack([place.chaos for place in alike]), care, known)
         return [place for place in doubtful if not place.chaotic]
 
     def _runs(self) -> list[list[_Place]]:

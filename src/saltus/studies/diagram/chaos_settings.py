@@ -24,11 +24,12 @@ class ChaosSettings:
     beside: tuple[float, ...] = (-4e-4, -1.5e-4, 1.5e-4, 4e-4)
     # Judgements of rising care. The first one is made at all values, and excludes lives below 660 forcing periods; the second one
     # at edges and at some values between them (6600). The third one is made at those of them beside which companions settled,
-    # and at edges beside which transients are long (33 000).
+    # and at edges beside which transients are long (33 000). With the time in which none has settled before, one round is enough
+    # for the second one and three are for the third one, where none settles.
     judgements: tuple[JudgementSettings, ...] = (
         replace(JUDGEMENT, companions=8, exposure=2000, round_periods=500, rounds=2),
-        replace(JUDGEMENT, companions=16, exposure=20_000),
-        replace(JUDGEMENT, exposure=100_000, rounds=8),
+        replace(JUDGEMENT, companions=16, exposure=20_000, round_periods=1125),
+        replace(JUDGEMENT, exposure=100_000, round_periods=1125, rounds=8),
     )
     every: float = 0.02  # Share of the range in which each band has a value that is judged with care.
     # Number of values with chaos on each side of one that fails a careful judgement that are judged so then; doubled every round.

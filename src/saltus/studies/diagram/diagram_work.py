@@ -10,13 +10,13 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors import JUDGEMENT, Judged, JudgementSettings, SettledLater, judge_unsettled
+from saltus.attractors import JUDGEMENT, Earlier, Judged, JudgementSettings, SettledLater, judge_unsettled
 from saltus.flow import Outcome
 from saltus.orbits import (
     Branch,
@@ -48,6 +48,7 @@ NUMBERS = (
     "slowest",
 )  # of a motion, one each, before its states
 JUDGED = ("verdict", "doubt", "exponent", "error", "gone", "life", "period")  # of a judgement
+EARLIER = tuple(part.name for part in fields(Earlier))
 WHOLE = (*NUMBERS[1:4], "verdict", "doubt", "gone")  # which of these are whole numbers
 COMPANIONS = JUDGEMENT.companions  # the most states that are kept of a judgement
 SETTLED, ALIKE = 32, 4  # the most settled motions, and such of one period, that are kept of a judgement
@@ -118,14 +119,19 @@ class DiagramWork:
         if row[1] in (Outcome.REST, Outcome.PERIODIC, Outcome.ENDED):
             self.ended.setdefault(tuple(given[:-1]), (int(given[-1]), float(row[0])))
 
-    def judge(self, values: np.ndarray, states: np.ndarray, settings: JudgementSettings) -> Judged:
+    def judge(
+        self, values: np.ndarray, states: np.ndarray, settings: JudgementSettings, earlier: Earlier | None = None
+    ) -> Judged:
         """`judge_unsettled` of states (n, m, d) at values (n,) of the parameter."""
         if self.parts is None:
-            found = judge_unsettled(self.system, states, {self.path: values}, settings=settings)
+            found = judge_unsettled(self.system, states, {self.path: values}, settings=settings, earlier=earlier)
             return replace(found, settled=_some(found.settled))
         numbers = asdict(settings)
         given = [of_one[np.isfinite(of_one).all(axis=-1)].tolist() for of_one in states]
         inputs = [{"value": v, "states": s, "settings": numbers} for v, s in zip(values.tolist(), given, strict=True)]
+        if earlier is not None:
+            for one, row in zip(inputs, np.stack([getattr(earlier, name) for name in EARLIER], axis=1).tolist(), strict=True):
+                one["earlier"] = row
         return _judged(np.array(self.parts.rows(self._kinds["judgements"], inputs)), settings.companions, self.system.dimension)
 
     def follow(self, requests: Sequence[Request]) -> list[list[Branch]]:
@@ -253,7 +259,7 @@ def _motions(values: np.ndarray, rows: np.ndarray, d: int) -> SimulatedMotions:
 
 
 def judgements(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """The judgements of what has not settled at values of the parameter, all by the same settings."""
+    """The judgements of what has not settled at values of the parameter, all by the same settings, as all are from one call."""
     system, inputs = _given(arguments, block)
     d = system.dimension
     result = np.full((len(inputs), len(JUDGED) + d * COMPANIONS + (d + 1) * SETTLED), np.nan)
@@ -263,7 +269,9 @@ def judgements(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[s
     states = np.full((len(inputs), max(len(given["states"]) for given in inputs), d), np.nan)
     for to_fill, given in zip(states, inputs, strict=True):
         to_fill[: len(given["states"])] = given["states"]
-    found = judge_unsettled(system, states, {arguments["path"]: np.array([g["value"] for g in inputs])}, settings=settings)
+    earlier = Earlier(*np.array([given["earlier"] for given in inputs]).T) if "earlier" in inputs[0] else None
+    values = np.array([given["value"] for given in inputs])
+    found = judge_unsettled(system, states, {arguments["path"]: values}, settings=settings, earlier=earlier)
     n, later = len(JUDGED), _some(found.settled)
     result[:, :n] = np.stack([getattr(found, name) for name in JUDGED], axis=1)
     result[:, n : n + d * settings.companions] = found.states.reshape(len(inputs), -1)
