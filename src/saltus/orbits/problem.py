@@ -52,7 +52,7 @@ class Equations:
         return matrix
 
     def _fill(self, matrix: np.ndarray, closing: float) -> None:
-        """Write the derivatives to the unknowns, along the diagonals of the blocks, into the first columns of a matrix of zeros."""
+        """Write the derivatives to the unknowns, block by block, into the first columns of a matrix of zeros."""
         n, d, _ = self.here.shape
         width = matrix.shape[1]
         flat, step = matrix.reshape(-1), d * (width + 1)
