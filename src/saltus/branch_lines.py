@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 STEPS_BETWEEN = 6  # into which the step between two points of a branch is divided where the line is smoothed
-STABILITY_CHANGES = ("LP", "PD", "BPC", "GR", "NS")  # the kinds of special points at which the stability can change
+# The kinds of special points at which the stability can change.
+STABILITY_CHANGES = ("LP", "PD", "BPC", "GR", "NS", "SW", "GS", "CS", "SS", "AS")
 MARGIN = "margin_"  # the names of the variables of a branch that hold the least value of a margin begin so
 
 

@@ -175,7 +175,7 @@ def test_a_step_is_cut_where_the_equations_change_and_goes_on_with_others():
 class Wall(Events):
     """A barrier beyond 1 that cannot be located, as it has no value there."""
 
-    def barrier(self):
+    def barrier(self, point):
         return Function("wall", lambda point: 1.0 if point.parameter <= 1.0 else -math.inf)
 
 

@@ -1,4 +1,4 @@
-from .continuation_loop import Continuation, both_ways
+from .continuation_loop import Bounds, Continuation, both_ways
 from .corrector import NEWTON, Corrected, Evaluation, newton
 from .course import Course
 from .curve import Curve, Point
@@ -15,6 +15,7 @@ from .zero import Evidence, Zero
 __all__ = [
     "NEWTON",
     "STEPS",
+    "Bounds",
     "Continuation",
     "Corrected",
     "Course",

@@ -63,13 +63,13 @@ class Continuation:
         while self.end is None:
             point = self.points[-1]
             ahead, step = self._step(before, point, step)
-            if ahead is None:
-                return
-            if self._accept(point, ahead, born):
-                step = min(self.steps.restart, 0.1 * step)
+            if isinstance(ahead, End):
+                self.end = ahead
+            elif self._cross(ahead) if isinstance(ahead, Cut) else self._accept(point, ahead, born):
+                step = min(self.steps.restart, 0.1 * max(step, self.steps.first))
             before, born = point, False
             if self.end is None and len(self.points) > self.steps.most_points:
-                self.end = End(CurveEnd.MOST_POINTS, ahead.parameter, detail=str(self.steps.most_points))
+                self.end = End(CurveEnd.MOST_POINTS, self.points[-1].parameter, detail=str(self.steps.most_points))
 
     def course(self, start: End) -> Course[Any, Any]:
         """The curve as it was followed, which began with an end for a reason of its own."""
@@ -77,7 +77,7 @@ class Continuation:
         return Course(tuple(self.points), tuple(self.special), (start, self.end), tuple(self.missed))
 
     def _step(self, before: Any, point: Any, step: float) -> tuple[Any, float]:
-        """The next point, and the length of the step after it."""
+        """The next point, or what there is instead of one, and the length of the step after it."""
         curve, length = point.curve, step
         while step > self.steps.least:
             length = min(step, curve.reach(point))
@@ -87,8 +87,7 @@ class Continuation:
                 if turn < self.steps.most and (length < self.steps.restart or self.trail.explains(ahead)):
                     return ahead, self.steps.following(step, turn, ahead.iterations)
             step = self.steps.shrink * length
-        self.end = self.events.stalled(self, point, length)
-        return None, step
+        return self.events.stalled(self, point, length), step
 
     def _accept(self, point: Any, ahead: Any, born: bool) -> bool:
         """Take a step up to the first of its events; returns whether the curve goes on with other equations.

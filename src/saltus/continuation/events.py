@@ -34,13 +34,13 @@ class Events:
         """Whether a step has stayed on its curve."""
         return True
 
-    def barrier(self) -> TestFunction | None:
-        """A function of the points that is below 0 where the equations do not hold; its zeros are special points too."""
+    def barrier(self, point: Any) -> TestFunction | None:
+        """A function that is below 0 where the equations of a point do not hold; its zeros are special points too."""
         return None
 
     def cut(self, point: Any, ahead: Any) -> Cut | End | None:
         """Where a step is cut short, as the equations do not hold beyond: by default at the zero of the barrier."""
-        barrier = self.barrier()
+        barrier = self.barrier(point)
         if barrier is None or barrier.value(ahead) >= 0.0:
             return None
         zero = located(barrier, point, ahead)
@@ -74,8 +74,8 @@ class Events:
         """Where the curve goes on beyond a cut: at another point, or, if None, as it is."""
         return None
 
-    def stalled(self, run: Continuation, point: Any, step: float) -> End:
-        """The end of the curve at a point from which even the shortest step fails."""
+    def stalled(self, run: Continuation, point: Any, step: float) -> Cut | End:
+        """The end of the curve at a point from which even the shortest step fails, or the cut beyond which it goes on."""
         return End(CurveEnd.NO_STEP, point.parameter, detail=self.name)
 
     def nearest(self, point: Any, place: np.ndarray, other: Any) -> np.ndarray | None:

@@ -66,7 +66,8 @@ def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero 
             return None
         known.append(KnownPlace(share, point, value))
         known.sort(key=lambda place: place.share)
-    best = min(known, key=lambda place: abs(place.value))
+    i = _bracket(known, before) if before != 0.0 else 0
+    best = min(known[i : i + 2], key=lambda place: abs(place.value))
     evidence = Evidence(best.point.residual, _brackets(best.point, before, known), before, after, best.value)
     zero: Zero = best.point.zero_type(test.kind, best.point, evidence)
     return zero

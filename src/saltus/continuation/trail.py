@@ -54,7 +54,7 @@ class Trail:
 
     def begin(self, point: Any) -> None:
         """Begin anew at a point, where the equations have changed."""
-        self.barrier = self.events.barrier()
+        self.barrier = self.events.barrier(point)
         self.tests = [*([] if self.barrier is None else [self.barrier]), *self.events.tests(point)]
         self.guides = np.array([test.guides for test in self.tests], dtype=bool)
         self.decisive = np.array([test.decisive for test in self.tests], dtype=bool)

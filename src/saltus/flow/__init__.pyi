@@ -13,6 +13,7 @@ from .ensemble.wanted import Wanted
 from .kernel_layout import STRUCTURE_SIZES, Where
 from .load_release import Release, contact_pull, load_releases, peak_near
 from .memory_layout import EventCode
+from .modes import modes_of
 from .motion import Event, EventKind, Impacts, Motion
 from .motion_dataset import rate_name, state_names
 from .recurrence import (
@@ -76,6 +77,7 @@ __all__ = [
     "load_helpers",
     "load_releases",
     "load_segments",
+    "modes_of",
     "motions_from",
     "nearest_return",
     "peak_near",

@@ -145,6 +145,16 @@ class MotionEvents(Sequence[Event]):
         return self._only(self._labels[:, 1] == EVENT_KINDS.index(kind))
 
     @property
+    def times(self) -> np.ndarray:
+        """When they happen, (n,)."""
+        return self._times
+
+    @property
+    def codes(self) -> np.ndarray:
+        """(n, 2): the number of each kind in the order of `EventKind`, and the side, or the contacts and frictions as bits."""
+        return self._labels[:, 1:3]
+
+    @property
     def details(self) -> np.ndarray:
         """What the kernel noted with each event, see `memory_layout.py`; of a limit, which margin it is."""
         return self._labels[:, 3]

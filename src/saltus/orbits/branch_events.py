@@ -11,6 +11,7 @@ import numpy as np
 from saltus.continuation import Continuation, Cut, End, Events, Missed, Zero, located
 from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, complex_pair, grazing, never_torus
 from saltus.orbits.contact_problem import ContactProblem
+from saltus.orbits.followed_problem import FollowedProblem
 from saltus.orbits.grazing import other_side
 from saltus.orbits.images import (
     asymmetry,
@@ -25,6 +26,7 @@ from saltus.orbits.images import (
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
 from saltus.orbits.switching_contacts import contact_change
+from saltus.orbits.switching_followed import beyond, change_at, events_at, refused_beyond, same_events, stalled_at
 from saltus.orbits.tolerances import TOLERANCES
 
 Run = Continuation
@@ -81,16 +83,22 @@ class BranchEvents(OrbitEvents):
         """Whether a step has not gone over to the orbits that are their own images, nor, from one grazing, beyond the next."""
         begun = point.iterations == 0  # with the signature of the other side of a grazing, where nothing had to be solved
         skipped = begun and grazing(point) <= TOLERANCES.touch and grazing(ahead) < 0.0
+        if isinstance(point.orbit.problem, FollowedProblem) and isinstance(self.cut(point, ahead), End):
+            return False  # the orbits ahead are others, as no way with a change of events leads there
         return not skipped and not falls_onto_image(point, ahead)
 
-    def barrier(self) -> Test:
-        """A grazing, which is gone through."""
-        return GRAZING
+    def barrier(self, point: OrbitPoint) -> Test:
+        """A grazing, or a change of the events that an orbit is followed through, which is gone through."""
+        return same_events(point) if isinstance(point.orbit.problem, FollowedProblem) else GRAZING
 
     def cut(self, point: OrbitPoint, ahead: OrbitPoint) -> Cut | End | None:
         """The cut at a grazing, or where a release or a closing of one of several contacts appears or is lost."""
         found = super().cut(point, ahead)
-        if isinstance(found, Cut) and found.special is not None and isinstance(found.point.orbit.problem, ContactProblem):
+        if not isinstance(found, Cut) or found.special is None:
+            return found
+        if isinstance(found.point.orbit.problem, FollowedProblem):
+            return change_at(found.special, point)
+        if isinstance(found.point.orbit.problem, ContactProblem):
             return Cut(found.point, replace(found.special, kind=contact_change(found.point)))
         return found
 
@@ -147,32 +155,47 @@ class BranchEvents(OrbitEvents):
     def across(self, run: Run, cut: Cut) -> OrbitPoint | End:
         """The point with the signature on the other side of a grazing, or why the branch does not go on."""
         graze = cut.special
-        assert graze is not None
-        if any(_same_place(graze, earlier) for earlier in run.special[:-1]):
+        if graze is not None and any(_same_place(graze, earlier) for earlier in run.special[:-1]):
             run.special.pop()
             return End(OrbitEnd.COMES_BACK, graze.parameter)
-        following = other_side(graze.point)
+        followed = isinstance(cut.point.orbit.problem, FollowedProblem)
+        following = beyond(cut, run.points[-2:][0]) if followed else other_side(cut.point)
         if isinstance(following, End):
             return following
-        count, value = following.orbit.signature.impact_count, following.parameter
+        count, value = _impact_count(following), following.parameter
         if (shorter := repetition(following)) is not None:
             return End(OrbitEnd.GRAZES_ANOTHER, value, detail=shorter)
         if count > SETTINGS.most_impacts:
             return End(OrbitEnd.MANY_IMPACTS, value, detail=str(SETTINGS.most_impacts))
         return End(OrbitEnd.ACCUMULATES, value, detail=str(count)) if _accumulate(run, following) else following
 
-    def stalled(self, run: Run, point: OrbitPoint, step: float) -> End:
-        """The end where even the shortest step fails: the orbit repels too strongly, or the reason is not known."""
+    def stalled(self, run: Run, point: OrbitPoint, step: float) -> Cut | End:
+        """The end where even the shortest step fails: the orbit repels too strongly, or the reason is not known.
+
+        Where the events change that an orbit is followed through the branch may turn round.
+        """
+        if isinstance(point.orbit.problem, FollowedProblem):
+            if (end := refused_beyond(point, step, run.bounds)) is not None:
+                return end
+            if (cut := stalled_at(point, step)) is not None:
+                return cut
         largest = abs(point.orbit.multipliers[0])
         if largest > SETTINGS.steepest and not point.orbit.grazes:
             return End(OrbitEnd.REPELS, point.parameter, detail=f"{largest:.1g}")
         return super().stalled(run, point, step)
 
 
+def _impact_count(point: OrbitPoint) -> int:
+    """Impacts in one period, but for those that die away."""
+    return (
+        events_at(point).impact_count if isinstance(point.curve.problem, FollowedProblem) else point.orbit.signature.impact_count
+    )
+
+
 def _accumulate(run: Run, following: OrbitPoint) -> bool:
     """Whether the last grazings have all added impacts, ever closer to one parameter or on the way to rest."""
     grazings = [s.point for s in run.special if s.kind == SpecialKind.GR][-SETTINGS.accumulating :]
-    counts = [point.orbit.signature.impact_count for point in (*grazings, following)]
+    counts = [_impact_count(point) for point in (*grazings, following)]
     if len(grazings) < SETTINGS.accumulating or not (np.diff(counts) > 0).all():
         return False
     span = float(np.ptp([point.parameter for point in grazings]))

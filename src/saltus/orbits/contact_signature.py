@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow import EventKind, Motion, Stop, simulate
+from saltus.flow import EventKind, Motion, Stop, modes_of, simulate
 from saltus.orbits.contact_problem import ContactProblem, problem_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
@@ -52,20 +52,34 @@ def _is_followed(base: Problem, motion: Motion) -> bool:
 
 
 def _followed(base: Problem, motion: Motion, periods: int) -> tuple[Problem, np.ndarray]:
-    """The equations x = Phi(x) at the phase farthest from all events at which the fewest contacts are closed, and the state."""
+    """The equations x = Phi(x) at a section of a motion that was followed for twice its `periods`, and the state there."""
     period = base.system.load.period
     assert period is not None
-    end = motion.start + periods * period
-    times = [event.time for event in motion.events if motion.start < event.time < end]
-    bounds = np.unique([motion.start, *times, end])
-    spans, middles = np.diff(bounds), 0.5 * (bounds[1:] + bounds[:-1])
-    if not times and motion.system.model.frictions and 0 in motion.sliding.values():
+    within = (motion.start < motion.events.times) & (motion.events.times < motion.start + periods * period)
+    if not within.any() and 0 in motion.sliding.values():
         raise MotionError("the motion sticks for good, as it may anywhere near, which is no orbit to follow")
-    closed = [motion.closed_at(middle) for middle in middles.tolist()]
-    chosen = max(range(len(spans)), key=lambda i: (-closed[i].bit_count(), spans[i]))
-    state = np.concatenate([np.atleast_1d(x) for x in motion.at(float(middles[chosen]))])
-    phase = float(middles[chosen]) * base.frequency(base.values) % (2.0 * np.pi)
+    phase, state = section_of(motion, base.frequency(base.values), duration=periods * period)
     return problem_of(base.system, Signature((), periods, section=phase), base.paths, base.tol), state
+
+
+def section_of(
+    motion: Motion, frequency: float, phase: float | None = None, duration: float | None = None
+) -> tuple[float, np.ndarray]:
+    """The phase farthest from all events at which the fewest coordinates are held, within the first `duration` of a motion, and
+    the state there; or the state at a phase that is given.
+    """
+    assert motion.dense is not None
+    end = motion.time if duration is None else motion.start + duration
+    if phase is None:
+        bounds = np.unique([motion.start, *(event.time for event in motion.events if motion.start < event.time < end), end])
+        spans, middles = np.diff(bounds), 0.5 * (bounds[1:] + bounds[:-1])
+        closed, slides = modes_of(motion.system.model, motion.dense.states(middles)[2])
+        held = sum((closed >> i & 1 for i in range(len(motion.system.model.contacts))), sum(s == 0 for s in slides))
+        time = float(middles[max(range(len(spans)), key=lambda i: (-held[i], spans[i]))])
+    else:
+        time = motion.start + (phase / frequency - motion.start) % (2.0 * np.pi / frequency)
+    state = np.concatenate([np.atleast_1d(x) for x in motion.at(time)])
+    return time * frequency % (2.0 * np.pi), state
 
 
 def read_signature(base: Problem, motion: Motion, periods: int) -> tuple[ContactProblem, np.ndarray]:

@@ -8,21 +8,29 @@ derivatives of its end. What contacts hold at the section has the derivatives 0,
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from saltus.errors import MotionError
+from saltus.errors import SaltusError
 from saltus.flow import Motion, Sensitivities, sensitivities, state_rates
 from saltus.flow import segments as at
+from saltus.orbits.followed_events import FollowedEvents, events_of, impact_speeds
 from saltus.orbits.problem import Equations, Problem
+from saltus.orbits.sampled_motion import SampledMotion
 from saltus.systems import System
 from saltus.taylor import FREQUENCY
 
-SAMPLES = 33  # of each step, between which the least margins are those of parabolas, to the fourth power of the distance
-NEWTON_STEPS = 4  # from the largest sample of a coordinate to its extremum, whose error each of them squares
 DYING = 1e-5  # Slower impacts are not listed: they are of an accumulation.
 CLOSED = 1e-9  # A contact whose gap and rate are smaller at the section is closed there.
+
+
+@dataclass(frozen=True)
+class FollowedEquations(Equations):
+    """The problem at one point, with the events on the way round."""
+
+    followed: FollowedEvents | None  # None if extremes were not asked for
 
 
 class FollowedProblem(Problem):
@@ -40,27 +48,30 @@ class FollowedProblem(Problem):
         return math.inf
 
     def start_state(self, unknowns: np.ndarray, system: System) -> np.ndarray:
-        """The state at the section, with contacts closed that are so but for rounding."""
+        """The state at the section, with contacts closed, and frictions that stick, that are so but for rounding."""
         state, own, names = unknowns.copy(), self.own, system.model.coordinates
         for contact in system.model.contacts:
             place = names.index(contact.coordinate)
             if abs(contact.gap(state[place])) < CLOSED and abs(state[own + place]) < CLOSED:
                 state[place], state[own + place] = float(contact.position), 0.0
+        for friction in system.model.frictions:
+            place, speed = own + names.index(friction.coordinate), float(friction.ground_speed)
+            state[place] = speed if abs(state[place] - speed) < CLOSED else state[place]
         return state
 
     def within(self, unknowns: np.ndarray, equations: Equations, values: np.ndarray) -> tuple[np.ndarray, float]:
         """The state at the section, and its time."""
         return self.start_state(unknowns, self.at(values)), float(self.signature.section or 0.0) / self.frequency(values)
 
-    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False) -> Equations | None:
+    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False) -> FollowedEquations | None:
         frequency = self.frequency(values)
         if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
             return None
-        system, phase = self.at(values), float(self.signature.section or 0.0)
-        state = self.start_state(unknowns, system)
+        phase = float(self.signature.section or 0.0)
         try:
-            found = self._followed(system, state, phase / frequency)
-        except MotionError:
+            system = self.at(values)
+            found = self._followed(system, self.start_state(unknowns, system), phase / frequency)
+        except SaltusError:  # such parameters or such a state are refused, or the motion is
             return None
         motion, parameters = found.motion, found.parameters.copy()
         if motion.limit is not None or found.undefined is not None:
@@ -70,7 +81,10 @@ class FollowedProblem(Problem):
             parameters[:, self.paths.index(FREQUENCY)] -= (rates - found.state @ rates) * phase / frequency**2
         after = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity))
         here, there = found.state[None], -np.eye(len(after))[None]
-        return Equations(after - unknowns, here, there, parameters, self._impacts(motion), self._extremes(motion, with_extremes))
+        sampled = SampledMotion.of(motion) if with_extremes else None
+        events = None if sampled is None else events_of(motion, sampled)
+        residual, impacts = after - unknowns, self._impacts(motion)
+        return FollowedEquations(residual, here, there, parameters, impacts, self._extremes(sampled), events)
 
     def _followed(self, system: System, state: np.ndarray, time: float) -> Sensitivities:
         """The motion over the time that the equations cover, with its derivatives."""
@@ -82,54 +96,15 @@ class FollowedProblem(Problem):
 
     def _impacts(self, motion: Motion) -> np.ndarray:
         """Times and least speeds of the impacts that do not die away, (n, 2)."""
-        impacts, contacts = motion.impacts, motion.system.model.contacts
-        names, rows = motion.system.model.coordinates, []
-        for time, hit, before in zip(impacts.time, impacts.side, impacts.velocity_before, strict=True):
-            speeds = [abs(before[names.index(c.coordinate)]) for i, c in enumerate(contacts) if int(hit) >> i & 1]
-            if min(speeds, default=0.0) > DYING:
-                rows.append((time, min(speeds)))
-        return np.array(rows).reshape(-1, 2)
+        rows = np.column_stack([motion.impacts.time, impact_speeds(motion)])
+        return np.asarray(rows[rows[:, 1] > DYING])
 
-    def _extremes(self, motion: Motion, with_extremes: bool) -> np.ndarray:
+    def _extremes(self, sampled: SampledMotion | None) -> np.ndarray:
         """The extrema of all coordinates and the least values of the margins, in the places of the other orbits'."""
-        extremes = np.full((int(with_extremes), at.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
-        if not with_extremes or motion.dense is None:
-            return extremes
-        extremes[:, at.CROSSINGS] = 0.0
-        dense = motion.dense
-        share = np.linspace(0.0, 1.0, SAMPLES)
-        steps = np.flatnonzero(dense.length > 0.0)
-        tau = dense.length[steps, None] * share
-        series, powers = dense.series[steps], np.arange(dense.series.shape[2])
-        position = np.einsum("sdk,spk->dsp", series, tau[:, :, None] ** powers)
-        velocity = np.einsum("sdk,spk->dsp", series[:, :, 1:] * powers[1:], tau[:, :, None] ** powers[:-1])
-        extremes[0, at.TOP], extremes[0, at.BOTTOM] = -_turning(-series, -position, tau), _turning(series, position, tau)
-        if self.margins:
-            bends = series[:, :, 2:] * (powers[2:] * powers[1:-1])
-            acceleration = np.einsum("sdk,spk->dsp", bends, tau[:, :, None] ** powers[:-2])
-            q, v, a = (x[0] if self.own == 1 else x for x in (position, velocity, acceleration))
-            t, side = dense.start[steps, None] + tau, (*motion.system.model.sides, 1)[0]
-            margins = motion.system.model.margins(t, q, v, a, side, motion.system.load)
-            for j, name in enumerate(self.margins):
-                extremes[0, at.LEAST_MARGIN + j] = _least(np.broadcast_to(margins[name], t.shape))
+        extremes = np.full((int(sampled is not None), at.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
+        if sampled is not None:
+            extremes[:, at.CROSSINGS] = 0.0
+            extremes[0, at.TOP], extremes[0, at.BOTTOM] = sampled.highest(), sampled.lowest()
+            least = sampled.margins() if self.margins else {}
+            extremes[0, at.LEAST_MARGIN : at.LEAST_MARGIN + len(self.margins)] = [least[name] for name in self.margins]
         return extremes
-
-
-def _turning(series: np.ndarray, values: np.ndarray, tau: np.ndarray) -> float:
-    """The least value of series (steps, coordinates, orders), from samples (coordinates, steps, samples) by Newton's method."""
-    coordinate, step, sample = np.unravel_index(int(np.argmin(values)), values.shape)
-    q = np.polynomial.Polynomial(series[step, coordinate])
-    v, a, t = q.deriv(), q.deriv(2), float(tau[step, sample])
-    for _ in range(NEWTON_STEPS):
-        bend = float(a(t))
-        t = float(np.clip(t - v(t) / bend, tau[step, 0], tau[step, -1])) if bend > 0.0 else t
-    return min(float(q(t)), float(values.min()))
-
-
-def _least(values: np.ndarray) -> float:
-    """The least of samples along steps (..., samples), between them as on parabolas."""
-    low, middle, high = values[..., :-2], values[..., 1:-1], values[..., 2:]
-    bend, slope = high - 2.0 * middle + low, 0.5 * (high - low)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turned = np.where((bend > 0.0) & (np.abs(slope) < bend), middle - 0.5 * slope**2 / bend, middle)
-    return float(min(values.min(), turned.min()))

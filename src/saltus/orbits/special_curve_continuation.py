@@ -46,7 +46,7 @@ class CurveEvents(OrbitEvents):
             return End(OrbitEnd.REFUSED, point.parameter, detail=str(refusal))
         return None
 
-    def barrier(self) -> TestFunction:
+    def barrier(self, point: Any) -> TestFunction:
         """Another grazing."""
         return curve_test(SpecialKind[f"{self.kind}_GR"], room)
 

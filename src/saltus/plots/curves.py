@@ -14,6 +14,9 @@ from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new, marks_of, 
 from saltus.plots.drawing import drawing
 from saltus.plots.response import MARK_NAMES, MARKS, line_handles, line_style
 
+RESTS: dict[str, dict[str, Any]] = {"RL": {"marker": "p", "markersize": 3.0}, "CH": {"marker": "h", "markersize": 3.0}}
+REST_NAMES = {"RL": "lost release (RL)", "CH": "end of a rest (CH)"}
+
 
 @drawing
 def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
@@ -22,10 +25,10 @@ def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = 
     for line in smooth_lines(dataset, quantity):
         ax.plot(*line.places.T, **line_style(line.stable, line.validity))
     kinds = dataset["kind"].values
-    for kind, mark in MARKS.items():
+    for kind, mark in (MARKS | RESTS).items():
         if (kinds == kind).any():
             places = (dataset[f"special_{name}"].values[kinds == kind] for name in ("parameter", quantity))
-            ax.plot(*places, ls="none", mfc="white", mec=INK, mew=0.5, zorder=5, label=MARK_NAMES[kind], **mark)
+            ax.plot(*places, ls="none", mfc="white", mec=INK, mew=0.5, zorder=5, label=(MARK_NAMES | REST_NAMES)[kind], **mark)
     handles, labels, handlers = line_handles([dataset])
     named = dict(zip(labels, handles, strict=True)) | marks_of(ax)
     legend = {"handles": [*named.values()], "labels": [*named], "handler_map": handlers, "handlelength": 3.6}

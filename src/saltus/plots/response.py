@@ -57,6 +57,11 @@ MARKS: dict[str, dict[str, Any]] = {
     "BPC": {"marker": "D", "markersize": 2.6},
     "GR": {"marker": "^", "markersize": 3.0},
     "NS": {"marker": "*", "markersize": 3.6},
+    "SW": {"marker": "v", "markersize": 3.0},
+    "GS": {"marker": "<", "markersize": 3.0},
+    "CS": {"marker": "X", "markersize": 3.2},
+    "SS": {"marker": ">", "markersize": 3.0},
+    "AS": {"marker": "P", "markersize": 3.2},
 }
 MARK_NAMES = {
     "LP": "fold (LP)",
@@ -64,6 +69,11 @@ MARK_NAMES = {
     "BPC": "branch point (BPC)",
     "GR": "grazing (GR)",
     "NS": "Neimark–Sacker (NS)",
+    "SW": "switching (SW)",
+    "GS": "grazing-sliding (GS)",
+    "CS": "crossing-sliding (CS)",
+    "SS": "switching-sliding (SS)",
+    "AS": "adding-sliding (AS)",
 }
 
 

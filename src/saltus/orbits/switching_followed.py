@@ -1,0 +1,230 @@
+"""Along orbits that are followed through their events: where an event appears or is lost, and the orbits on the other side.
+
+The map over a period is smooth as long as the events are the same in the same order. Where they change it is continuous, with
+other derivatives on the other side, or with a jump. With dry friction the changes are the four sliding bifurcations
+(M. di Bernardo, P. Kowalczyk, A. Nordmark, Physica D 170, 2002).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from saltus.continuation import Bounds, Corrected, CurveEnd, Cut, End, Evidence, TestFunction, Zero
+from saltus.errors import SaltusError
+from saltus.flow import EventCode
+from saltus.orbits.contact_signature import section_of
+from saltus.orbits.followed_events import SETTINGS as EVENTS
+from saltus.orbits.followed_events import FollowedEvents, OrbitEvent
+from saltus.orbits.followed_problem import FollowedEquations, FollowedProblem
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.orbit_curve import OrbitPoint
+from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
+
+Order = tuple[OrbitEvent, ...]
+TINY = float(np.finfo(float).tiny)  # less than 0 by this is beyond a change, where nothing else tells by how much
+
+
+@dataclass(frozen=True)
+class OtherSideSettings:
+    """How orbits with other events are looked for beside one at which they change."""
+
+    # Distances at which the equations are evaluated to know them on the other side, tried in turn.
+    beside: tuple[float, ...] = (1e-9, 1e-8, 1e-7)
+    # Distances at which an orbit is solved for on the other side: there the next event to change must not come before.
+    probes: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+    # Where the map is continuous its residual so near to an orbit is no larger than this, a square root included.
+    jump: float = 5e-3
+    together: float = 1e-2  # Events of two orbits beside one another that are nearer than this are the same.
+    refused: float = 10.0  # Steps ahead at which parameters are tried, where no step leads on.
+    standing: float = 1e-11  # What moves by less sticks for good: slips grow as the third power of their duration.
+    slow: float = 1e-2  # The largest speed of an impact that has just appeared.
+    along: float = 1e-6  # The distance along a branch over which the section's tangent is carried to another section.
+
+
+SETTINGS = OtherSideSettings()
+
+
+def events_at(point: OrbitPoint) -> FollowedEvents:
+    """The events of an orbit."""
+    equations = point.equations
+    assert isinstance(equations, FollowedEquations)
+    assert equations.followed is not None
+    return equations.followed
+
+
+def same_events(reference: OrbitPoint) -> TestFunction:
+    """How far an orbit is from having other events than a reference, or from an event at its section; below 0 where it has."""
+    order = events_at(reference).order
+
+    def value(point: OrbitPoint) -> float:
+        found = events_at(point)
+        if found.order != order:
+            return -max(found.room, TINY)
+        return float(min(found.room, found.section_room - EVENTS.section_room))
+
+    return TestFunction(SpecialKind.SW, value, 1e-15)
+
+
+def change_at(zero: Zero, reference: OrbitPoint) -> Cut:
+    """The cut at a zero of `same_events`, with the kind of change; without a special point where none happens."""
+    if _stands(zero.point):
+        return Cut(zero.point, SpecialPoint(SpecialKind.AS, zero.point, zero.evidence))
+    if events_at(zero.point).order == events_at(reference).order and _section_is_near(zero.point):
+        return Cut(zero.point, None)
+    order = events_at(reference).order
+    other = next(_beside(zero.point, order), None)
+    if other is None:
+        kind: SpecialKind | None = SpecialKind.SW
+    elif _parts(other):
+        kind = first_change(events_at(zero.point), events_of_equations(other))
+    else:
+        kind = kind_between(events_at(reference), events_of_equations(other))
+    return Cut(zero.point, None if kind is None else SpecialPoint(kind, zero.point, zero.evidence))
+
+
+def refused_beyond(point: OrbitPoint, step: float, bounds: Bounds) -> End | None:
+    """The end at parameters beyond which the system is refused, where that is why no step leads on; it may be a bound."""
+    ahead = point.parameters + SETTINGS.refused * step * point.tangent[-len(point.parameters) :]
+    try:
+        point.curve.problem.at(ahead)
+    except SaltusError as refusal:
+        near = [(name, bound) for name, pair in bounds.items() for bound in pair if np.isclose(bound, point.parameter, rtol=1e-9)]
+        return End(CurveEnd.BOUND, near[0][1]) if near else End(OrbitEnd.REFUSED, point.parameter, detail=str(refusal))
+    return None
+
+
+def stalled_at(point: OrbitPoint, step: float) -> Cut | None:
+    """The cut at a point beyond which no step leads, if events change there: the branch turns round or ends."""
+    order = events_at(point).order
+    beside = next(_beside(point, order), None)
+    if beside is None:
+        return None
+    test, width = same_events(point), step * np.abs(np.array(point.curve.scales))
+    there = -max(events_of_equations(beside).room, TINY)
+    evidence = Evidence(point.residual, tuple(map(float, width)), test.value(point), there, test.value(point))
+    return change_at(SpecialPoint(SpecialKind.SW, point, evidence), point)
+
+
+def _stands(point: OrbitPoint) -> bool:
+    """Whether what may slide does not move but for rounding: it sticks, as it may anywhere near."""
+    orbit = point.orbit
+    return bool(orbit.problem.system.model.frictions) and orbit.highest - orbit.lowest < SETTINGS.standing
+
+
+def beyond(cut: Cut, before: OrbitPoint) -> OrbitPoint | End:
+    """Where a branch goes on beyond a cut: with other events, or from another section."""
+    if _stands(cut.point):
+        return End(OrbitEnd.STICKS, cut.point.parameter)
+    order = events_at(before).order
+    if cut.special is not None and cut.special.kind == SpecialKind.CH:
+        return End(OrbitEnd.REST_VANISHES, cut.point.parameter)
+    if events_at(cut.point).order == order and _section_is_near(cut.point):
+        return _from_another_section(cut.point) or End(OrbitEnd.NO_SECTION, cut.point.parameter)
+    return other_events(cut.point, order)
+
+
+def other_events(point: OrbitPoint, order: Order) -> OrbitPoint | End:
+    """An orbit beside a point that has other events than these, with the direction away from it; or why there is none."""
+    reason, detail = OrbitEnd.NO_OTHER_EVENTS, ""
+    for equations in _beside(point, order):
+        if _parts(equations):
+            reason, detail = OrbitEnd.NOT_CONTINUOUS, f"{np.abs(equations.residual).max():.3g}"
+            continue
+        curve = point.curve.with_problem(point.curve.problem)
+        tangent = curve.along_kernel(Corrected(point.place, equations, 0)).tangent
+        for probe in SETTINGS.probes:
+            for direction in (tangent, -tangent):
+                ahead: OrbitPoint | None = curve.solve(point.place + probe * direction, direction)
+                if ahead is not None and events_at(ahead).order != order and _leads_away(point, ahead, probe):
+                    return ahead
+    return End(reason, point.parameter, detail=detail)
+
+
+def _leads_away(point: OrbitPoint, ahead: OrbitPoint, probe: float) -> bool:
+    """Whether a solution is near where it was looked for, and its tangent leads on."""
+    chord = ahead.place - point.place
+    return point.curve.norm(chord) < 3.0 * probe and float(ahead.tangent @ (point.curve.weights**2 * chord)) > 0.0
+
+
+def _parts(equations: FollowedEquations) -> bool:
+    """Whether a motion all but beside an orbit ends up elsewhere."""
+    return bool(np.abs(equations.residual).max() > SETTINGS.jump)
+
+
+def _beside(point: OrbitPoint, order: Order) -> Iterator[FollowedEquations]:
+    """The equations at places beside a point, not solved, at which the events are others than these or come at other times."""
+    axes = np.eye(len(point.place)) / point.curve.weights
+    for distance in SETTINGS.beside:
+        for direction in (point.tangent, -point.tangent, *axes, *-axes):
+            equations = point.curve.evaluate(point.place + distance * direction, thorough=True)
+            if equations is not None and (events_of_equations(equations).order != order or _parts(equations)):
+                yield equations
+
+
+def events_of_equations(equations: FollowedEquations) -> FollowedEvents:
+    """The events, of equations that were evaluated thoroughly."""
+    assert equations.followed is not None
+    return equations.followed
+
+
+def _section_is_near(point: OrbitPoint) -> bool:
+    return events_at(point).section_room < 2.0 * EVENTS.section_room
+
+
+def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
+    """The same orbit with its state at a phase farther from all events, and the tangent carried there."""
+    problem = point.orbit.problem
+    phase, state = section_of(point.orbit.motion(), point.orbit.frequency)
+    moved = problem.with_signature(replace(problem.signature, section=phase))
+    assert isinstance(moved, FollowedProblem)
+    near = point.beside(SETTINGS.along)
+    first = PeriodicOrbit.near(moved, state, point.parameters)
+    if near is None or first is None:
+        return None
+    guess = section_of(near.orbit.motion(), near.orbit.frequency, phase)[1]
+    second = PeriodicOrbit.near(moved, guess, near.parameters)
+    if second is None:
+        return None
+    solution, apart = first.solution, second.solution.unknowns - first.solution.unknowns
+    found = Corrected(np.append(solution.unknowns, solution.values), solution.equations, solution.iterations)
+    curve = point.curve.with_problem(moved)
+    there: OrbitPoint | None = curve.with_tangent(found, np.append(apart, near.parameters - point.parameters) / SETTINGS.along)
+    return there
+
+
+def kind_between(before: FollowedEvents, after: FollowedEvents) -> SpecialKind | None:
+    """What changes between two orbits beside one another; None where nothing does but the count of impacts that die away."""
+    kinds = [Counter(event.kind for event in found.order) for found in (before, after)]
+    more = {kind: kinds[1][kind] - kinds[0][kind] for kind in {*kinds[0], *kinds[1]} if kinds[1][kind] != kinds[0][kind]}
+    sticks, reversals = more.get(EventCode.STICK, 0), more.get(EventCode.REVERSAL, 0)
+    if reversals:
+        return SpecialKind.CS if sticks * reversals < 0 else SpecialKind.SS
+    if sticks:
+        richer = after if sticks > 0 else before
+        stuck = richer.until_next((EventCode.STICK, EventCode.SLIP))
+        slid = richer.until_next((EventCode.SLIP, EventCode.STICK))
+        return SpecialKind.GS if stuck < slid else SpecialKind.AS
+    rests, impacts = more.get(EventCode.HELD, 0), more.get(EventCode.IMPACT, 0)
+    if rests and rests == more.get(EventCode.RELEASE, 0):
+        return SpecialKind.CH if impacts * rests < 0 else SpecialKind.RL
+    if set(more) != {EventCode.IMPACT}:
+        return SpecialKind.SW
+    return SpecialKind.GR if min(before.room, after.room) < SETTINGS.slow else None
+
+
+def first_change(before: FollowedEvents, after: FollowedEvents) -> SpecialKind:
+    """What changes between two motions from one section that part: by the first event that one has and the other has not."""
+    for i in range(max(len(before.events), len(after.events))):
+        here = [(found.times[i], found.events[i]) for found in (before, after) if i < len(found.events)]
+        if len(here) == 2 and here[0][1] == here[1][1] and abs(here[0][0] - here[1][0]) < SETTINGS.together:
+            continue
+        kinds = {event.kind for time, event in here if time - min(here)[0] < SETTINGS.together}
+        if EventCode.REVERSAL in kinds:
+            return SpecialKind.CS
+        names = {EventCode.STICK: SpecialKind.GS, EventCode.SLIP: SpecialKind.AS, EventCode.IMPACT: SpecialKind.GR}
+        return names.get(EventCode(min(here)[1].kind), SpecialKind.SW)
+    return SpecialKind.SW
