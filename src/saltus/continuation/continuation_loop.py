@@ -65,8 +65,11 @@ class Continuation:
             ahead, step = self._step(before, point, step)
             if isinstance(ahead, End):
                 self.end = ahead
-            elif self._cross(ahead) if isinstance(ahead, Cut) else self._accept(point, ahead, born):
-                step = min(self.steps.restart, 0.1 * max(step, self.steps.first))
+            elif isinstance(ahead, Cut):
+                self._cross(ahead)
+                step = self.steps.restart
+            elif self._accept(point, ahead, born):
+                step = min(self.steps.restart, 0.1 * step)
             before, born = point, False
             if self.end is None and len(self.points) > self.steps.most_points:
                 self.end = End(CurveEnd.MOST_POINTS, self.points[-1].parameter, detail=str(self.steps.most_points))
