@@ -63,7 +63,6 @@ class JudgementSettings:
     longest_period: int = 128  # The longest period looked for in a regular motion that has not settled, in forcing periods.
     patience: int = 4000  # Forcing periods for which such a motion is followed, so that multipliers up to 0.99 may settle.
     tol: float = 1e-10  # The error of a step.
-    measured_tol: float = 1e-8  # The same where exponents are measured: their own error is that of samples, hundreds of times it.
 
 
 JUDGEMENT = JudgementSettings()
@@ -269,9 +268,7 @@ class _Judgement:
             if not rows.size:
                 return
             columns = {path: values[rows] for path, values in self.parameters.items()}
-            found = largest_exponents(
-                self.system, self.states[rows][:, chosen], columns, periods=periods, tol=self.settings.measured_tol
-            )
+            found = largest_exponents(self.system, self.states[rows][:, chosen], columns, periods=periods, tol=self.settings.tol)
             for name in ("exponent", "error", "positive", "negative"):
                 getattr(self, name)[rows] = getattr(found, name)
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import approached, find_recurrence
+from saltus.flow import Recurrence, approached, find_recurrence
 from saltus.orbits import initial_states, rest_state
 from saltus.studies.chart.cell_outcomes import outcomes
 from saltus.studies.chart.cell_verdicts import CellVerdicts
@@ -40,6 +40,9 @@ class CellSettings:
     patience: int = 4
     patient_with: int = 3
     negligible: float = 0.5  # Motions below this share of the least amplitude are not followed to where they settle.
+    # Motions fade whose amplitude in a forcing period is below this share of that in the period before: so do, under slow loads,
+    # those that come to rest, and small motions have thousands of impacts in a period.
+    fading: float = 0.5
     kept: int = 9  # Stroboscopic states from which it is read where a motion is going: enough for orbits of one and two periods.
     rounds: int = 400  # Rounds of starts from neighbours: more than the cells along a side of any chart.
 
@@ -142,9 +145,9 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
             many = np.bincount(moving["cell"], minlength=size)[moving["cell"]] > SETTINGS.patient_with
             left.append(moving[many])
             moving = moving[~many]
-        moving, rests = _followed(request, moving, math.ceil(share * request.periods))
+        moving, rests, fading = _followed(request, moving, math.ceil(share * request.periods))
         settled = moving["period"] > 0
-        small = ~rests & (moving["amplitude"] < least * np.where(settled, 1.0, SETTINGS.negligible))
+        small = ~rests & np.where(settled, moving["amplitude"] < least, fading < least * SETTINGS.negligible)
         found.append(moving[settled & ~small])
         _count(captured, moving[rests])
         _count(tiny, moving[small])
@@ -163,14 +166,15 @@ def _count(number: np.ndarray, motions: np.ndarray) -> None:
     np.add.at(number, motions["cell"], motions["starts"])
 
 
-def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
-    """The motions some forcing periods later, with the period of those that have settled, and which of them are captured.
+def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The motions some forcing periods later, with the period of those that have settled, which of them are captured, and the
+    amplitude in the last period of those that fade.
 
     What is about to settle is put where it is going.
     """
     motions = motions.copy()
     if not len(motions):
-        return motions, np.zeros(0, dtype=bool)
+        return motions, np.zeros(0, dtype=bool), np.zeros(0)
     ends = find_recurrence(
         request.system,
         motions["state"],
@@ -192,7 +196,19 @@ def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple
     motions["slowest"] = 0.0 if ends.speeds is None else ends.slowest
     motions["state"], motions["period"], motions["impact_count"] = state, ends.period, ends.impact_count
     motions["amplitude"], motions["other"] = np.maximum(high, low), np.minimum(high, low)
-    return motions, ends.rest
+    return motions, ends.rest, _fading(ends, motions["amplitude"])
+
+
+def _fading(ends: Recurrence, amplitude: np.ndarray) -> np.ndarray:
+    """The amplitude in the last forcing period of motions that fade, and that of all periods which are kept of the others, (n,).
+
+    The smaller a bouncing motion becomes the more impacts it has in a period: a few such take longer than thousands of others.
+    """
+    assert ends.extrema is not None
+    if ends.extrema.shape[1] < 2:
+        return amplitude
+    before, last = np.abs(ends.extrema[:, -2:]).max(axis=2).T
+    return np.where(last < SETTINGS.fading * before, last, amplitude)
 
 
 def joined(motions: np.ndarray) -> np.ndarray:
