@@ -64,7 +64,8 @@ def knots(spectrum: Any) -> Any:
 def _self_crossings(branch: Any) -> list[tuple[int, int, float]]:
     """(i, j, parameter) where stable parts of the amplitude curve cross, i and j the points of the branch nearest by."""
     start, step, near = _stable_steps(branch)
-    i, j = np.triu_indices(len(step), 2)
+    low, high = np.sort([start, start + step], axis=0)
+    i, j = np.nonzero(np.triu(_overlap(low[:, 0], high[:, 0]) & _overlap(low[:, 1], high[:, 1]), 2))
     det = step[i, 0] * step[j, 1] - step[i, 1] * step[j, 0]
     between = start[j] - start[i]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -73,6 +74,11 @@ def _self_crossings(branch: Any) -> list[tuple[int, int, float]]:
     crossed = (np.minimum(u, w) > 0) & (np.maximum(u, w) < 1)
     i, j, u = i[crossed], j[crossed], u[crossed]
     return [(int(near[a]), int(near[b]), float(start[a, 0] + t * step[a, 0])) for a, b, t in zip(i, j, u, strict=True)]
+
+
+def _overlap(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Which of some intervals have values in common, (n, n)."""
+    return np.asarray((low[:, None] <= high) & (low <= high[:, None]))
 
 
 def _stable_steps(branch: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

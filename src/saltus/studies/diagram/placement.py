@@ -56,11 +56,15 @@ class PlacedBranch:
         parameter, counts = self.columns[0], (self.columns[3] > 0) | (not stable)
         if len(parameter) < 2:
             return np.empty(0, dtype=int), np.empty(0, dtype=int)
-        low, high = np.minimum(parameter[:-1], parameter[1:]), np.maximum(parameter[:-1], parameter[1:])
-        usable = self.joined & (counts[:-1] | counts[1:])
-        there = usable & (low <= values[:, None]) & (values[:, None] <= high)
-        rows, before = np.nonzero(there)
-        return rows, before
+        usable = np.flatnonzero(self.joined & (counts[:-1] | counts[1:]))
+        low, high = np.sort([parameter[usable], parameter[usable + 1]], axis=0)
+        order = np.argsort(values)
+        first, last = np.searchsorted(values[order], low, "left"), np.searchsorted(values[order], high, "right")
+        number = last - first
+        rank = np.arange(number.sum()) + np.repeat(first - np.cumsum(number) + number, number)
+        rows, before = order[rank], np.repeat(usable, number)
+        each = np.lexsort((before, rows))
+        return rows[each], before[each]
 
     def extrema(self, value: float, before: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Extrema and slowest impact at a value after the point of this number: read off, uncertainty, change to the next.
