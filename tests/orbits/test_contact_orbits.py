@@ -178,8 +178,8 @@ def test_mirror_layers_switch_together():
     assert [str(end) for end in both.ends] == ["bound 0.05", "bound 0.8"]
     assert [special.kind for special in both.special] == [SpecialKind.SW] * 2
     low, high = (both.at(value)[0].signature for value in (0.1, 0.7))
-    assert (len(low.events), low.impact_count) == (2, 2)
-    assert (len(high.events), high.impact_count) == (6, 4)
+    assert (low.symmetric, len(low.events), low.impact_count) == (True, 1, 2)  # the events of half a period
+    assert (high.symmetric, len(high.events), high.impact_count) == (True, 3, 4)
 
 
 def test_a_grazing_is_where_the_linear_response_reaches_the_walls():
@@ -210,7 +210,9 @@ def test_a_branch_and_its_orbits_survive_a_file(branch):
 
 def test_a_doubled_orbit_begins_at_a_period_doubling():
     orbit = saltus.find_orbit(room(A=0.5, W=1.0, e=0.9, stiffness=0.0, damping=0.02), x=0.1, velocity=0.9)
-    branch = saltus.continue_orbit(orbit, "load.frequency", (0.3, 2.0))
+    symmetric = saltus.continue_orbit(orbit, "load.frequency", (0.3, 2.0))
+    breaking = next(special for special in symmetric.special if special.kind == SpecialKind.BPC)
+    branch = saltus.switch_branch(breaking, (0.3, 2.0))[0]
     doublings = [special for special in branch.special if special.kind == SpecialKind.PD]
     assert doublings
     (doubled,) = saltus.switch_branch(doublings[0], (0.3, 2.0))

@@ -14,7 +14,7 @@ from saltus.attractors.stroboscopic_section import section_states
 from saltus.attractors.verdict.classification import classify
 from saltus.flow import Recurrence, extrema_names, motions_from, stroboscopic
 from saltus.orbits import PeriodicOrbit, is_symmetric, rest_state
-from saltus.systems import System
+from saltus.systems import System, image_of
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class Registry:
 
     def _image(self, member: Attractor) -> int | None:
         """The label of the mirror image of an attractor."""
-        states = -section_states(self.system, member.states, 0.5)[:, 0]
+        states = image_of(self.system.model, section_states(self.system, member.states, 0.5)[:, 0])
         if member.target.dense:
             for other in (known.target for known in self.members if known.target.dense):
                 if np.median(other.distance(states)) < other.grain:

@@ -14,10 +14,9 @@ from saltus.orbits.contact_problem import ContactProblem
 from saltus.orbits.followed_problem import FollowedProblem
 from saltus.orbits.grazing import other_side
 from saltus.orbits.images import (
-    asymmetry,
     beside_image,
     falls_onto_image,
-    halves_of,
+    halves,
     nearest,
     on_family,
     passes_image,
@@ -27,6 +26,7 @@ from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
 from saltus.orbits.switching_contacts import contact_change
 from saltus.orbits.switching_followed import beyond, change_at, events_at, refused_beyond, same_events, stalled_at
+from saltus.orbits.symmetry import full_point
 from saltus.orbits.tolerances import TOLERANCES
 
 Run = Continuation
@@ -99,7 +99,8 @@ class BranchEvents(OrbitEvents):
         if isinstance(found.point.orbit.problem, FollowedProblem):
             return change_at(found.special, point)
         if isinstance(found.point.orbit.problem, ContactProblem):
-            return Cut(found.point, replace(found.special, kind=contact_change(found.point)))
+            point = full_point(found.point) if found.point.orbit.symmetric else found.point
+            return Cut(found.point, replace(found.special, kind=contact_change(point)))
         return found
 
     def interrupted(self, run: Run, point: OrbitPoint, ahead: OrbitPoint) -> End | None:
@@ -179,6 +180,8 @@ class BranchEvents(OrbitEvents):
                 return end
             if (cut := stalled_at(point, step)) is not None:
                 return cut
+        if point.orbit.problem.system.model.held and (limit := point.orbit.motion().limit) is not None:
+            return End(OrbitEnd.REFUSED, point.parameter, detail=limit)
         largest = abs(point.orbit.multipliers[0])
         if largest > SETTINGS.steepest and not point.orbit.grazes:
             return End(OrbitEnd.REPELS, point.parameter, detail=f"{largest:.1g}")
@@ -218,16 +221,14 @@ def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
 
     There the family's own equations are singular; those of the parent, over half of the period, are not.
     """
-    signature, problem = a.orbit.signature, a.curve.problem.halved
-    before, after = asymmetry(a), asymmetry(b)
-    assert before is not None
-    assert after is not None
-    length = float(np.linalg.norm(before))
-    share = length / (length + float(np.linalg.norm(after)))
-    place = a.place + share * (b.place - a.place)
+    problem, first, last = a.curve.problem.halved, halves(a), halves(b)
+    assert first is not None
+    assert last is not None
+    lengths = [float(np.linalg.norm(both[1] - both[0])) for both in (first, last)]
+    share = lengths[0] / sum(lengths)
+    between = (first + share * (last - first)).mean(axis=0)
     curve = a.curve.with_problem(problem)
-    between = halves_of(place[:-1], signature).mean(axis=0).ravel() if signature.sides else place[:-1]
-    guess = np.append(between, place[-1])
+    guess = np.append(between, a.parameter + share * (b.parameter - a.parameter))
     middle = curve.solve_at(guess, np.append(np.zeros(curve.problem.size), 1.0))
     if middle is None:
         return None

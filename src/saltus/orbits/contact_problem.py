@@ -4,7 +4,7 @@ Its events are impacts of single contacts and releases. Unknowns are the state j
 coordinates that are then held, and the phase of every event; equations are that each event's guard, the gap or the reaction, is 0
 at its phase, and that the state a period later, after the first event again, is the one of the start. Between events the contacts
 that are closed are those of the signature, whatever the signs of gaps and reactions. An orbit without events has the free
-coordinates and velocities at phase 0 as its unknowns.
+coordinates and velocities at phase 0 as its unknowns. A symmetric orbit is closed after half a period by its mirror image.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from saltus.flow import segments as at
 from saltus.orbits.followed_problem import FollowedProblem
 from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
 from saltus.orbits.signature import ModeChange, Signature
-from saltus.systems import System
+from saltus.systems import System, image_of
 from saltus.taylor import FREQUENCY
 
 AFTER_RELEASE, AFTER_IMPACT = 3, 2  # powers of the time with which a contact opens from rest
@@ -63,7 +63,7 @@ class ContactProblem(Problem):
         events = self.signature.events
         if not events:
             return no_event(self.signature.closed)
-        following = (*events[1:], events[0])
+        following = (*events[1:], events[0].image(self.images) if self.signature.symmetric else events[0])
         rows = [[e.closed, f.kind, f.contact, f.closed, self._power(e, f)] for e, f in zip(events, following, strict=True)]
         return np.array(rows, dtype=np.int64)
 
@@ -191,6 +191,8 @@ class ContactProblem(Problem):
             slope[:, parameters:] += maps[s, :, 2 * own :]
         last = SegmentEnd.NUMBERS + (8 if events else 4) * own
         after = ends[-1, last : last + 2 * own]
+        if self.signature.symmetric:
+            slope, after = image_of(self.system.model, slope.T).T, image_of(self.system.model, after)
         total = np.vstack([rows, slope[free]])
         here, there = total[:, :end_phase], np.zeros((first + events, first + events))
         there[events:, :first] = -np.eye(first)
@@ -220,6 +222,20 @@ class ContactProblem(Problem):
         there = self.carried_along(begin, int(self.plan[longest, SegmentPlan.ALONG]), part, values)
         assert there is not None, "an orbit's own segments can be followed"
         return there, float(part[1])
+
+    def halves(self, unknowns: np.ndarray, equations: Equations) -> np.ndarray | None:
+        """The unknowns of both halves of a period, each as of the equations of one, (2, n); None where their events differ."""
+        events, half = self.signature.events, len(self.signature.events) // 2
+        odd, own = self.signature.period % 2, self.own
+        image = tuple(event.image(self.images) for event in events[:half]) if odd else events[:half]
+        if len(events) % 2 or events[half:] != image:
+            return None
+        state, phases = self.split(unknowns)
+        place = SegmentEnd.NUMBERS + 8 * own
+        later = equations.ends[half - 1, place : place + 2 * own]
+        later = image_of(self.system.model, later) if odd else later
+        first, second = self.joined(state, phases[:half]), self.joined(later, phases[half:] - np.pi * self.signature.period)
+        return np.stack([first, second])
 
     def _with_held(self, state: np.ndarray, closed: int, values: np.ndarray) -> np.ndarray:
         contacts = self.at(values).model.contacts

@@ -213,7 +213,8 @@ def orbit_near(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOr
     """The orbit with the signature of a motion over `periods` forcing periods from a state at phase 0, by Newton's method."""
     system = base.system
     if isinstance(base, ContactProblem):
-        return solved_from(base, state, periods, SETTINGS.iterations)
+        solved = solved_from(base, state, periods, SETTINGS.iterations)
+        return None if solved is None else (half(solved) if _is_symmetric(solved.problem) else None) or solved
     motion = simulate(system, **state, periods=periods)
     if motion.side == 0 or len(motion.events.of(EventKind.REST)) or not motion.phase_known:
         return None
@@ -240,9 +241,12 @@ def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tup
 def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
     """An orbit by its least period and, where it is its own mirror image, by half of it."""
     orbit = divide(orbit) or orbit
-    problem = orbit.problem
-    symmetric = keeps_symmetry(problem.system, problem.paths[0]) if problem.paths else is_symmetric(problem.system)
-    return (half(orbit) if symmetric else None) or orbit
+    return (half(orbit) if _is_symmetric(orbit.problem) else None) or orbit
+
+
+def _is_symmetric(problem: Problem) -> bool:
+    """Whether a system has the mirror symmetry, for all parameters at the problem's paths."""
+    return keeps_symmetry(problem.system, problem.paths[0]) if problem.paths else is_symmetric(problem.system)
 
 
 def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:

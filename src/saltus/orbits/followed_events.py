@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from saltus.flow import EventCode, Motion
+from saltus.flow import EventCode, Motion, modes_of
 from saltus.orbits.sampled_motion import SampledMotion
+from saltus.systems import Model
 
 CHANGES = (
     EventCode.IMPACT,
@@ -74,17 +76,35 @@ class FollowedEvents:
         return least
 
 
-def events_of(motion: Motion, sampled: SampledMotion) -> FollowedEvents:
-    """The events of one period of an orbit, which begins at its section."""
+def events_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | None = None) -> FollowedEvents:
+    """The events of one period of an orbit, which begins at its section; with the number of the image of each contact and
+    friction, of one that is its own mirror image after the motion.
+    """
     period = motion.time - motion.start
     rows = _without_trains(_listed(motion))
     events, times = tuple(row[0] for row in rows), tuple(row[1] for row in rows)
     speeds = [row[2] for row in rows if row[0].kind == EventCode.IMPACT]
+    section_room = _section_room(motion, period)
+    if images is not None:
+        events += tuple(_image(event, motion.system.model, images) for event in events)
+        times, period = times + tuple(time + period for time in times), 2.0 * period
     apart = np.diff([*times, times[0] + period]) if len(times) > 1 else np.empty(0)
     apart = apart[apart > SETTINGS.together * period]
     room = float(min([SETTINGS.farthest, sampled.nearest_touch(), *speeds, *apart]))
     events, times = _in_order(events, times, SETTINGS.together * period)
-    return FollowedEvents(events, times, period, max(room, 0.0), _section_room(motion, period))
+    return FollowedEvents(events, times, period, max(room, 0.0), section_room)
+
+
+def _image(event: OrbitEvent, model: Model, images: Sequence[int]) -> OrbitEvent:
+    """The mirror image of an event."""
+    closed, slides = modes_of(model, np.array(event.mode))
+    count, mode = len(model.contacts), 1
+    for i, image in enumerate(images):
+        if i < count:
+            mode += (int(closed) >> i & 1) << image
+        else:
+            mode += (1 - int(slides[i - count])) << (count + 2 * (image - count))
+    return OrbitEvent(event.kind, sum(1 << image for i, image in enumerate(images) if event.parts >> i & 1), mode)
 
 
 Row = tuple[OrbitEvent, float, float]  # an event, its time, and the least speed at which it closes a contact

@@ -19,7 +19,7 @@ from saltus.flow import segments as at
 from saltus.orbits.followed_events import FollowedEvents, events_of, impact_speeds
 from saltus.orbits.problem import Equations, Problem
 from saltus.orbits.sampled_motion import SampledMotion
-from saltus.systems import System
+from saltus.systems import System, image_of
 from saltus.taylor import FREQUENCY
 
 DYING = 1e-5  # Slower impacts are not listed: they are of an accumulation.
@@ -34,7 +34,8 @@ class FollowedEquations(Equations):
 
 
 class FollowedProblem(Problem):
-    """The equations x = Phi(x) of a system with contacts or frictions."""
+    """The equations x = Phi(x) of a system with contacts or frictions; of a symmetric orbit, x is the image of Phi(x) of half a
+    period."""
 
     @property
     def size(self) -> int:
@@ -78,11 +79,14 @@ class FollowedProblem(Problem):
             return None
         if FREQUENCY in self.paths:  # the section stays at its phase
             rates = state_rates(motion)
-            parameters[:, self.paths.index(FREQUENCY)] -= (rates - found.state @ rates) * phase / frequency**2
-        after = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity))
-        here, there = found.state[None], -np.eye(len(after))[None]
+            before = image_of(system.model, rates) if self.signature.symmetric else rates
+            parameters[:, self.paths.index(FREQUENCY)] -= (rates - found.state @ before) * phase / frequency**2
+        after, state = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity)), found.state
+        if self.signature.symmetric:
+            after, state, parameters = (image_of(system.model, numbers.T).T for numbers in (after, state, parameters))
+        here, there = state[None], -np.eye(len(after))[None]
         sampled = SampledMotion.of(motion) if with_extremes else None
-        events = None if sampled is None else events_of(motion, sampled)
+        events = None if sampled is None else events_of(motion, sampled, self.images if self.signature.symmetric else None)
         residual, impacts = after - unknowns, self._impacts(motion)
         return FollowedEquations(residual, here, there, parameters, impacts, self._extremes(sampled), events)
 

@@ -12,7 +12,8 @@ from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
 from saltus.orbits.special_point import OrbitEnd
-from saltus.orbits.switching_contacts import Cycle, Switching, begins_excursion, cycle_of
+from saltus.orbits.switching_contacts import Cycle, Switching, begins_excursion, cycle_of, from_next_event
+from saltus.orbits.symmetry import full_point, half_point
 from saltus.orbits.tolerances import TOLERANCES
 
 PROBES = 10.0 ** -np.arange(2, 12.0)  # distances along the new branch, tried in turn until one direction has admissible orbits
@@ -28,7 +29,7 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
     the motion round; impacts that have lost their speed are left out.
     """
     if isinstance(point.orbit.problem, ContactProblem):
-        return _with_other_events(point)
+        return _beyond_both_halves(point) if point.orbit.symmetric else _with_other_events(point)
     changed = removed(point) if point.orbit.slowest < TOLERANCES.touch else inserted(point)
     if isinstance(changed, End):
         return changed
@@ -59,6 +60,16 @@ def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> Orbi
         if isinstance(ahead, OrbitPoint):
             return ahead
     return End(reason, point.parameter)
+
+
+def _beyond_both_halves(point: OrbitPoint) -> OrbitPoint | End:
+    """The same of a symmetric orbit: both halves change at once, or one after the other, which may break the symmetry."""
+    for start in (point, from_next_event(point)) if len(point.orbit.signature.events) > 1 else (point,):
+        ahead = _with_other_events(start)
+        if not isinstance(ahead, End):
+            return ahead
+    ahead = _with_other_events(full_point(point))
+    return ahead if isinstance(ahead, End) else half_point(ahead)
 
 
 def _admissible_direction(start: OrbitPoint) -> OrbitPoint | None:

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from saltus.continuation import between
+from saltus.orbits.contact_problem import ContactProblem
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
-from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
 
 NEAR_THE_END = (0.99, 0.95, 0.9)  # Shares of the last step: at the end itself the equations are singular.
@@ -21,24 +21,28 @@ def asymmetry(point: OrbitPoint) -> np.ndarray | None:
     That is its mirror image half a period later for an odd period of a symmetric system, and itself half a period later for an
     even one. None where it could not be its own image, or is by construction.
     """
-    signature, n = point.orbit.signature, len(point.orbit.signature.sides)
+    both = halves(point)
+    return None if both is None else np.asarray(both[1] - both[0])
+
+
+def halves(point: OrbitPoint) -> np.ndarray | None:
+    """The unknowns of both halves of a period, each as of the equations of one, (2, n); None as for `asymmetry`."""
+    signature, problem, unknowns = point.orbit.signature, point.orbit.problem, point.solution.unknowns
+    n, odd = len(signature.sides), signature.period % 2
     if signature.symmetric or n % 2:
         return None
+    if signature.events:
+        assert isinstance(problem, ContactProblem)
+        return None if odd and not point.curve.symmetric else problem.halves(unknowns, point.equations)
     if n == 0:
-        return point.half_way
+        return None if point.half_way is None else np.stack([unknowns, unknowns + point.half_way])
     first, second = signature.sides[: n // 2], signature.sides[n // 2 :]
-    expected = tuple(-s for s in first) if signature.period % 2 else first
-    if second != expected or (signature.period % 2 and not point.curve.symmetric):
+    expected = tuple(-s for s in first) if odd else first
+    if second != expected or (odd and not point.curve.symmetric):
         return None
-    halves = halves_of(point.solution.unknowns, signature)
-    return np.asarray((halves[1] - halves[0]).ravel())
-
-
-def halves_of(unknowns: np.ndarray, signature: Signature) -> np.ndarray:
-    """Phases and speeds of the impacts of both halves of a period, (2, n / 2, 2), each counted from its beginning."""
-    halves = unknowns.reshape(2, len(signature.sides) // 2, 2).copy()
-    halves[1, :, 0] -= np.pi * signature.period
-    return halves
+    both = unknowns.reshape(2, n // 2, 2).copy()
+    both[1, :, 0] -= np.pi * signature.period
+    return np.asarray(both.reshape(2, n))
 
 
 def on_family(point: OrbitPoint, parent: OrbitPoint) -> OrbitPoint | None:
@@ -54,10 +58,9 @@ def on_family(point: OrbitPoint, parent: OrbitPoint) -> OrbitPoint | None:
     signature, difference = point.orbit.signature, asymmetry(point)
     assert difference is not None
     unknowns, tangent = parent.solution.unknowns, difference
-    if signature.sides:
-        half = unknowns.reshape(-1, 2)
-        unknowns = np.concatenate([half, half + np.array([np.pi * signature.period, 0.0])]).ravel()
-        tangent = np.concatenate([difference, -difference])
+    if signature.sides or signature.events:
+        unknowns = parent.orbit.problem.repeated(unknowns)
+        tangent = parent.orbit.problem.alternating(difference)
     found = point.curve.known(unknowns, parent.solution.values)
     if found is None:
         return None

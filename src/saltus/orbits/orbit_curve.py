@@ -40,7 +40,7 @@ class OrbitPoint(Point):
         """Of an orbit without impacts: its image half a period later less itself; None where it cannot have its own image."""
         problem, odd = self.curve.problem, self.orbit.signature.period % 2
         sides = problem.system.model.sides and not problem.passes_contact
-        if type(problem) is not Problem or (odd and (sides or not self.curve.symmetric)):
+        if problem.signature.sides or problem.signature.closed or (odd and (sides or not self.curve.symmetric)):
             return None
         n = problem.size
         equations = problem.halved.evaluate(self.place[:n], self.place[n:])

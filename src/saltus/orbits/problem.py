@@ -25,7 +25,7 @@ from saltus.errors import ParameterError
 from saltus.flow import STRUCTURE_SIZES, ContactRegularity, Where, contact_regularity, load_segments, program, taylor_order
 from saltus.flow import segments as at
 from saltus.orbits.signature import Signature
-from saltus.systems import System, numbers
+from saltus.systems import System, contact_images, numbers
 from saltus.taylor import FREQUENCY, record_table
 
 ORBIT_TOLERANCE = 1e-14  # of the segments' steps: the orbits are then exact to rounding
@@ -182,11 +182,17 @@ class Problem:
         return type(self)(self.system, signature, self.paths, self.tol)
 
     @cached_property
+    def images(self) -> tuple[int, ...]:
+        """The number of the mirror image of each contact and friction; none where there is no such symmetry."""
+        return contact_images(self.system.model, self.system.impact) or ()
+
+    @cached_property
     def halved(self) -> Problem:
         """The problem of the orbits that are their own images: closed after half a period, by the mirror image if it is odd."""
         own, odd = self.signature, bool(self.signature.period % 2)
         period = own.period if odd else own.period // 2
-        return self.with_signature(replace(own, sides=own.sides[: len(own.sides) // 2], period=period, symmetric=odd))
+        sides, events = own.sides[: len(own.sides) // 2], own.events[: len(own.events) // 2]
+        return self.with_signature(replace(own, sides=sides, events=events, period=period, symmetric=odd))
 
     def impacts(self, unknowns: np.ndarray, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
         """The phases of the impacts, and the speeds at which the gap closes before them."""

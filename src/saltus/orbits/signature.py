@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from saltus.flow import EventCode
@@ -15,6 +16,11 @@ class ModeChange:
     contact: int  # its number
     closed: int  # the contacts that are closed after it, as bits
 
+    def image(self, images: Sequence[int]) -> ModeChange:
+        """The mirror image, with the number of the image of each contact."""
+        closed = sum(1 << image for i, image in enumerate(images) if self.closed >> i & 1)
+        return ModeChange(self.is_impact, images[self.contact], closed)
+
     @property
     def kind(self) -> int:
         """The number of this kind of event in the flow."""
@@ -26,7 +32,7 @@ class Signature:
     """What distinguishes families of periodic orbits.
 
     `sides` is the side before each impact. A symmetric orbit is its own mirror image half a period later; then only the
-    impacts of the first half are listed, and the equations are those of the half.
+    impacts, or events, of the first half are listed, and the equations are those of the half.
 
     Attributes
     ----------
@@ -62,7 +68,7 @@ class Signature:
     @property
     def impact_count(self) -> int:
         """Impacts in one period of the orbit; 0 of one with a section, whose impacts may be countless."""
-        return len(self.sides) * (2 if self.symmetric else 1) + sum(event.is_impact for event in self.events)
+        return (len(self.sides) + sum(event.is_impact for event in self.events)) * (2 if self.symmetric else 1)
 
     @property
     def span(self) -> float:

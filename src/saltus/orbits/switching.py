@@ -101,8 +101,8 @@ def _unsymmetric(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
     """The symmetric orbit over its full period, and the two directions in which its halves differ."""
     orbit = full_period(point.orbit)
     direction = _kernel(point.equations.jacobian(-1.0))
-    if point.orbit.signature.sides:
-        direction = np.concatenate([direction, -direction])
+    if point.orbit.signature.sides or point.orbit.signature.events:
+        direction = point.orbit.problem.alternating(direction)
     return tuple(_along(point, orbit.problem, orbit.solution.unknowns, sign * direction) for sign in (1.0, -1.0))
 
 

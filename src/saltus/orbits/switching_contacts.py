@@ -55,15 +55,18 @@ class Switching:
     def _together(self) -> Iterator[list[Timed]]:
         """Where two events that follow one another have come together."""
         events, n = list(self.events), len(self.events)
+        symmetric = self.problem.signature.symmetric
         for i in range(n if n > 1 else 0):
             j = (i + 1) % n
+            if symmetric and j == 0:
+                continue  # the second one is in the other half: see `from_next_event`
             first, second = events[i], events[j]
             apart = second.phase - first.phase + (self.problem.closing if j == 0 else 0.0)
             if abs(apart) > TOLERANCES.switching:
                 continue
             one, other = first.event, second.event
             if one.contact != other.contact:
-                before = events[i - 1].event.closed
+                before = self._before(i)
                 yield _changed(events, {i: None, j: second})  # what was released is opened by the impact
                 swapped = before ^ (1 << other.contact) if not other.is_impact or other.closed >> other.contact & 1 else before
                 yield _changed(events, {i: replace(second, phase=first.phase).leaving(swapped), j: first.leaving(other.closed)})
@@ -71,6 +74,11 @@ class Switching:
                 yield _changed(events, {i: first.leaving(other.closed), j: None})
             else:
                 yield _changed(events, {i: None, j: None})
+
+    def _before(self, i: int) -> int:
+        """The contacts that are closed before an event."""
+        event = self.events[i - 1].event
+        return (event.image(self.problem.images) if i == 0 and self.problem.signature.symmetric else event).closed
 
     def _without_pull(self) -> Iterator[list[Timed]]:
         """Where a contact is closed without a reaction at first, opens without a pull, or has lost its reaction at the end."""
@@ -92,7 +100,7 @@ class Switching:
         """Without an impact that has lost its speed."""
         for i, timed in enumerate(self.events):
             slow = abs(self.equations.ends[i - 1, SegmentEnd.RATE]) < TOLERANCES.touch
-            if timed.event.is_impact and slow and timed.event.closed == self.events[i - 1].event.closed:
+            if timed.event.is_impact and slow and timed.event.closed == self._before(i):
                 yield _changed(list(self.events), {i: None})
 
     def _touching(self) -> Iterator[list[Timed]]:
@@ -116,7 +124,8 @@ class Switching:
         """The problem with these events and its unknowns at this orbit; None where its motion cannot be followed."""
         closed = int(self.problem.plan[0, SegmentPlan.ALONG])
         changes, period = tuple(timed.event for timed in events), self.problem.signature.period
-        signature = Signature((), period, events=changes, closed=0 if events else closed)
+        symmetric = self.problem.signature.symmetric
+        signature = Signature((), period, symmetric, events=changes, closed=0 if events else closed)
         other = self.problem.with_signature(signature)
         assert isinstance(other, ContactProblem)
         phases = np.array([timed.phase for timed in events])
@@ -139,6 +148,22 @@ class Switching:
         end = phase if not self.events else 2.0 * np.pi * np.ceil(begin / (2.0 * np.pi))
         closed, start = int(self.problem.plan[0, SegmentPlan.ALONG]), self.equations.ends[0, SegmentEnd.NUMBERS :][:n]
         return self.problem.carried_along(start, closed, np.array([begin, end]) / frequency, self.point.solution.values)
+
+
+def from_next_event(point: OrbitPoint) -> OrbitPoint:
+    """The same symmetric orbit in the equations of the half that begins with its second event."""
+    here = Switching.at(point)
+    phases = [timed.phase for timed in here.events]
+    events = (*here.problem.signature.events[1:], here.problem.signature.events[0].image(here.problem.images))
+    problem = here.problem.with_signature(replace(here.problem.signature, events=events))
+    assert isinstance(problem, ContactProblem)
+    place = SegmentEnd.NUMBERS + 8 * problem.own
+    state = here.equations.ends[0, place : place + 2 * problem.own]
+    curve = point.curve.with_problem(problem)
+    found = curve.known(problem.joined(state, np.array([*phases[1:], phases[0] + problem.closing])), point.parameters)
+    assert found is not None, "an orbit can be followed from each of its events"
+    turned: OrbitPoint = curve.along_kernel(found)
+    return turned
 
 
 Cycle = tuple[ModeChange, ...]

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import cmath
+from dataclasses import replace
 
 import numpy as np
 
+from saltus.continuation import Corrected
+from saltus.errors import ParameterError
+from saltus.orbits.contact_problem import ContactProblem
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
-from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.public_functions import answered
 from saltus.systems import Constant, Harmonic, Load, Signal, System, check_system
@@ -63,25 +67,37 @@ def _harmonics(signal: Signal) -> dict[int, complex] | None:
 
 def keeps_symmetry(system: System, path: str) -> bool:
     """Whether a system is symmetric and stays so as the parameter at `path` changes."""
-    if system.model.held or not is_symmetric(system):
+    if not is_symmetric(system):
         return False
     value = float(system.get(path))
-    return any(is_symmetric(system.with_({path: value * (1 + s) + s})) for s in (1e-3, -1e-3))
+    for share in (1e-3, -1e-3):
+        try:
+            beside = system.with_({path: value * (1 + share) + share})
+        except ParameterError:  # on one side of a limit of the parameter
+            continue
+        if is_symmetric(beside):
+            return True
+    return False
 
 
 def half(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
     """An orbit that is its own mirror image, as a solution of the equations of half its period; None where it is not."""
     problem, signature, unknowns = orbit.problem, orbit.signature, orbit.solution.unknowns
-    n, odd = divmod(len(signature.sides), 2)
+    n, odd = divmod(len(signature.sides) + len(signature.events), 2)
     if signature.symmetric or signature.period % 2 == 0 or odd:
         return None
-    if n:
+    if signature.sides:
         first, second = unknowns.reshape(2, n, 2)
         if n % 2 == 0 or np.abs(second - first - [np.pi * signature.period, 0.0]).max() > TOLERANCES.halves:
             return None
-    elif problem.system.model.sides and not problem.passes_contact:
+    elif signature.events:
+        assert isinstance(problem, ContactProblem)
+        both = problem.halves(unknowns, orbit.solution.equations)
+        if both is None or np.abs(both[1] - both[0]).max() > TOLERANCES.halves:
+            return None
+    elif signature.closed or (problem.system.model.sides and not problem.passes_contact):
         return None
-    short = problem.with_signature(Signature(signature.sides[:n], signature.period, True, signature.side))
+    short = problem.with_signature(replace(signature, sides=signature.sides[:n], events=signature.events[:n], symmetric=True))
     found = PeriodicOrbit.near(short, unknowns[: short.size], orbit.solution.values)
     moved = found is not None and not n and np.abs(found.solution.unknowns - unknowns).max() >= TOLERANCES.halves
     return None if moved else found
@@ -91,8 +107,34 @@ def over_full_period(problem: Problem, unknowns: np.ndarray) -> tuple[Problem, n
     """The problem of the full period of a symmetric orbit, and the orbit's unknowns in it."""
     signature = problem.signature
     sides = (*signature.sides, *(-s for s in signature.sides))
-    other = problem.with_signature(Signature(sides, signature.period, False, signature.side))
-    return other, problem.repeated(unknowns) if sides else unknowns
+    events = (*signature.events, *(event.image(problem.images) for event in signature.events))
+    other = problem.with_signature(replace(signature, sides=sides, events=events, symmetric=False))
+    return other, problem.repeated(unknowns) if sides or events else unknowns
+
+
+def full_point(point: OrbitPoint) -> OrbitPoint:
+    """A point with a symmetric orbit on the curve of the equations of its full period."""
+    n = point.orbit.problem.size
+    other, unknowns = over_full_period(point.orbit.problem, point.place[:n])
+    _, ahead = over_full_period(point.orbit.problem, point.place[:n] + point.tangent[:n])
+    curve = point.curve.with_problem(other)
+    found = curve.known(unknowns, point.parameters)
+    assert found is not None, "a symmetric orbit can be followed over its full period"
+    tangent = np.append(ahead - unknowns, point.tangent[n:])
+    there: OrbitPoint = curve.point_at(found, tangent / curve.norm(tangent))
+    return there
+
+
+def half_point(point: OrbitPoint) -> OrbitPoint:
+    """A point on the curve of the equations of half of its period, where its orbit and the system are symmetric; else itself."""
+    orbit = half(point.orbit) if point.curve.symmetric else None
+    if orbit is None:
+        return point
+    curve, solution = point.curve.with_problem(orbit.problem), orbit.solution
+    found = Corrected(np.append(solution.unknowns, solution.values), solution.equations, point.iterations)
+    tangent = np.append(point.tangent[: orbit.problem.size], point.tangent[point.orbit.problem.size :])
+    there: OrbitPoint = curve.point_at(found, tangent / curve.norm(tangent))
+    return there
 
 
 def full_period(orbit: PeriodicOrbit) -> PeriodicOrbit:

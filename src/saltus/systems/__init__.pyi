@@ -8,6 +8,7 @@ from .impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduc
 from .impact_pair import ImpactPair
 from .load import Channel, Load
 from .metainterface import Metainterface
+from .mirror import contact_images, image_of
 from .model import MarginKind, Model
 from .newton_impact import NewtonImpact, energy_gain, energy_gains
 from .parameter_tables import broadcast_arrays, check_parameters, finite_array, parameter_table
@@ -78,9 +79,11 @@ __all__ = [
     "check_system",
     "children",
     "constrained_acceleration",
+    "contact_images",
     "energy_gain",
     "energy_gains",
     "finite_array",
+    "image_of",
     "is_number",
     "mass_and_force",
     "name_impact",

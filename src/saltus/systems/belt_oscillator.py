@@ -9,7 +9,7 @@ from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
 from saltus.public_functions import answering
 from saltus.systems.friction import Friction
-from saltus.systems.load import Load
+from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import Model
 
 
@@ -79,6 +79,10 @@ class BeltOscillator(Model):
     def force(self, t: Any, x: Any, velocity: Any, load: Load) -> Any:
         """F - c x' - k x."""
         return load.force(t) - self.damping * velocity - self.stiffness * x
+
+    def mirror(self, load: Load) -> Load | None:
+        """The force reversed, on ground that stands still; None otherwise."""
+        return reversed_load(load, "force") if self.belt_speed == 0.0 else None
 
     def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
         """x'^2 / 2."""

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from saltus.checks import settle_numbers
 from saltus.public_functions import answering
 from saltus.systems.contact import Contact
-from saltus.systems.load import Load
+from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import Model
 
 
@@ -64,6 +64,10 @@ class ImpactPair(Model):
     def force(self, t: Any, q: Any, velocity: Any, load: Load) -> tuple[Any, Any]:
         """(F - c z' - k z, 0)."""
         return load.force(t) - self.damping * velocity[0] - self.stiffness * q[0], 0.0 * q[1]
+
+    def mirror(self, load: Load) -> Load:
+        """The force reversed."""
+        return reversed_load(load, "force")
 
     def kinetic_energy(self, t: Any, q: Any, velocity: Any, side: Any, load: Load) -> Any:
         """(z'^2 + mu (z' + x')^2) / 2."""

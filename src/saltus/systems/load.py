@@ -9,7 +9,7 @@ from typing import Any
 from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.public_functions import answering
-from saltus.systems.signals import Record, Signal, as_signal
+from saltus.systems.signals import Record, Signal, as_signal, scaled
 
 
 class Channel:
@@ -142,3 +142,9 @@ def _check_quantity(name: str, signal: Signal) -> None:
             wanted = "displacement, velocity or acceleration" if name.startswith("ground_") else "force"
             kind = "record" if isinstance(term, Record) else type(term).__name__
             raise ParameterError(f"load.{name} takes a {kind} of {wanted}, got quantity={term.quantity!r}", f"load.{name}")
+
+
+def reversed_load(load: Load, ending: str) -> Load:
+    """A load with the signs of those channels turned whose names end so, such as "horizontal"."""
+    signals = {name: scaled(signal, -1.0) if name.endswith(ending) else signal for name, signal in load.channels.items()}
+    return Load(frequency=load.frequency, **signals)

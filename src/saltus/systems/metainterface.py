@@ -12,7 +12,7 @@ from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
 from saltus.public_functions import answering
 from saltus.systems.layered_cell import LayeredCell
-from saltus.systems.load import Load
+from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import MarginKind
 from saltus.systems.signals import Constant, Signal, scaled, vanishes
 
@@ -149,8 +149,7 @@ class Metainterface(LayeredCell):
             for name in ("horizontal", "vertical")
         ):
             return None
-        reversed_ = {n: scaled(s, -1.0) if n.endswith("horizontal") else s for n, s in channels.items()}
-        return Load(frequency=load.frequency, **reversed_)
+        return reversed_load(load, "horizontal")
 
     def _forces(self, t: Any, lower: Any, load: Load) -> tuple[Any, Any]:
         """[(1+h)^P H - (1+m)^P zeta''] and [(1+v)^P V - (1+m)^P nu''], with P = `lower`."""

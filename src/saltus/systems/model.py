@@ -138,6 +138,11 @@ class Model:
         return ()
 
     @property
+    def images(self) -> tuple[str, ...]:
+        """For each coordinate of a mirror image the one whose negative it is: its own, unless the mirror swaps two."""
+        return self.coordinates
+
+    @property
     def frictions(self) -> tuple[Friction, ...]:
         """The dry frictions of a model that gives its `force`."""
         return ()
@@ -290,7 +295,8 @@ class Model:
         a(t, -theta, -theta', -side, mirrored load) = -a(t, theta, theta', side, load), and the reset alike; a state at which that
         does not hold is refused.
 
-        The mirror turns the signs of all coordinates, velocities and sides; it does not shift the time.
+        The mirror turns the signs of all coordinates, velocities and sides; it does not shift the time. Of several coordinates
+        it may swap some, see `images`.
 
         Parameters
         ----------

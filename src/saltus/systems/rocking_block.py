@@ -10,9 +10,8 @@ import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
 from saltus.public_functions import answering
-from saltus.systems.load import Load
+from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import MarginKind, Model
-from saltus.systems.signals import scaled
 
 
 @answering("__init__")
@@ -76,5 +75,4 @@ class RockingBlock(Model):
 
     def mirror(self, load: Load) -> Load:
         """The load with the horizontal ground motion reversed."""
-        reversed_ = {n: scaled(s, -1.0) if n == "ground_horizontal" else s for n, s in load.channels.items()}
-        return Load(frequency=load.frequency, **reversed_)
+        return reversed_load(load, "ground_horizontal")

@@ -16,6 +16,7 @@ from saltus.systems.contact import check_contacts
 from saltus.systems.friction import check_frictions
 from saltus.systems.impact import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
+from saltus.systems.mirror import check_mirror, contact_images
 from saltus.systems.model import Model, check_sides
 from saltus.systems.parameters import children, numbers, replace
 from saltus.systems.serial import from_dict, to_dict
@@ -131,7 +132,9 @@ class System:
         return dict(numbers(self))
 
     def mirrored(self) -> System | None:
-        """The system in which -theta moves as theta does in this one, or None without a mirror symmetry.
+        """The system in which the mirror image of theta, -theta, moves as theta does in this one, or None without the symmetry.
+
+        Of several coordinates it is that of `Model.images`; contacts and frictions must be images of one another, with one law.
 
         Raises
         ------
@@ -139,11 +142,11 @@ class System:
             A `mirror` of the model that is no such symmetry, as a state shows.
         """
         load = self.model.mirror(self.load)
-        if load is None:
+        if load is None or contact_images(self.model, self.impact) is None:
             return None
         mirrored = System(model=self.model, load=load, impact=self.impact)
         for side in self.model.sides or (1,):
-            _check_mirror(self, mirrored, side)
+            check_mirror(self, mirrored, side)
         return mirrored
 
     def to_dict(self) -> dict[str, Any]:
@@ -211,43 +214,6 @@ class System:
             Text that is no TOML, or no system.
         """
         return cls.from_dict(_parsed(text, tomllib.loads, "TOML"))
-
-
-PROBE = (0.3711, 0.2931, 0.6173)  # A time, a gap and a velocity of no meaning, at which two equations that differ do so.
-MIRROR_ROUNDING = 1e-9  # Accelerations and velocities of mirror images differ by rounding alone.
-
-
-def _check_mirror(system: System, mirrored: System, side: int) -> None:
-    """Refuse a mirrored system in which the mirror image of a state moves otherwise than the state's motion does, mirrored."""
-    model, (t, distance, v) = system.model, PROBE
-    if len(model.coordinates) == 1:
-        into = 1.0 if not model.sides or model.gap(model.contact + 1.0, side) > 0.0 else -1.0
-        at = [model.contact + into * distance]
-    else:
-        at = [distance / (1 + i) for i in range(len(model.coordinates))]
-    there, image = (
-        model.acceleration(t, _of(model, [sign * x for x in at]), _of(model, [sign * v for _ in at]), sign * side, load)
-        for sign, load in ((1, system.load), (-1, mirrored.load))
-    )
-    pairs = [*zip(_each(there), _each(image), strict=True)]
-    if model.sides:
-        pairs.append((model.gap(at[0], side), -model.gap(-at[0], -side)))
-        inward = -into * v
-        one = model.reset(t, inward, side, system.load, system.impact)
-        pairs += zip(one, model.reset(t, -inward, -side, mirrored.load, system.impact), strict=True)
-    if any(abs(float(a) + float(b)) > MIRROR_ROUNDING * (1.0 + abs(float(a))) for a, b in pairs):
-        raise ParameterError(
-            f"{type(model).__name__}.mirror is no symmetry of its equations: with the signs of coordinate, velocity and side "
-            "turned, the load that it returns does not turn the sign of the acceleration; return None where there is none"
-        )
-
-
-def _of(model: Model, values: list[Any]) -> Any:
-    return values[0] if len(model.coordinates) == 1 else tuple(values)
-
-
-def _each(value: Any) -> list[Any]:
-    return list(value) if isinstance(value, (tuple, list)) else [value]
 
 
 def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:

@@ -12,8 +12,9 @@ from saltus.public_functions import answering
 from saltus.systems.constrained import reactions
 from saltus.systems.contact import Contact
 from saltus.systems.layered_cell import LayeredCell
-from saltus.systems.load import Load
+from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import MarginKind
+from saltus.systems.signals import vanishes
 
 
 @answering("__init__")
@@ -72,6 +73,18 @@ class TwoLayer(LayeredCell):
     def contact(self) -> Any:
         """Both layers closed."""
         return (0.0, 0.0)
+
+    @property
+    def images(self) -> tuple[str, ...]:
+        """The mirror swaps the layers."""
+        return self.coordinates[::-1]
+
+    def mirror(self, load: Load) -> Load | None:
+        """The load with its horizontal channels reversed, for m = 0, k = c = 1 and no loads on the lower mass; None otherwise."""
+        lower = any(not vanishes(signal) for name, signal in load.channels.items() if name.startswith("lower_"))
+        if lower or self.mass_ratio != 0.0 or self.stiffness_ratio != 1.0 or self.dissipation_ratio != 1.0:
+            return None
+        return reversed_load(load, "horizontal")
 
     def mass_matrix(self, theta: Any) -> Any:
         """M(theta)."""

@@ -9,7 +9,7 @@ from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
 from saltus.public_functions import answering
 from saltus.systems.contact import Contact
-from saltus.systems.load import Load
+from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import Model
 
 
@@ -58,6 +58,10 @@ class TwoStops(Model):
     def force(self, t: Any, x: Any, velocity: Any, load: Load) -> Any:
         """F - c x' - k x."""
         return load.force(t) - self.damping * velocity - self.stiffness * x
+
+    def mirror(self, load: Load) -> Load | None:
+        """The force reversed, for d_1 = -d_2; None otherwise."""
+        return reversed_load(load, "force") if self.left == -self.right else None
 
     def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
         """x'^2 / 2."""

@@ -18,7 +18,7 @@ from saltus.attractors.manifolds.saddle_manifolds import is_saddle, stable_manif
 from saltus.attractors.orbit_certificate import solved_orbit
 from saltus.attractors.stroboscopic_section import is_constant, section_states
 from saltus.orbits import PeriodicOrbit, is_symmetric, same_orbit
-from saltus.systems import System
+from saltus.systems import System, image_of
 from saltus.window import Window, check_window
 
 
@@ -132,6 +132,6 @@ def _image(orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
     """The mirror image of an orbit that is not its own."""
     if orbit.symmetric or not is_symmetric(orbit.system):
         return []
-    state = -section_states(orbit.system, np.array([orbit.state]), 0.5)[0, 0]
+    state = image_of(orbit.system.model, section_states(orbit.system, np.array([orbit.state]), 0.5)[0, 0])
     image = solved_orbit(orbit.system, state, orbit.period)
     return [] if image is None else [image]

@@ -36,7 +36,7 @@ from saltus.taylor import cached_jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-MOST_STEPS = 100_000  # of one segment
+MOST_STEPS = 10_000  # of one segment: more are taken only beside a singular mass matrix, in steps that shrink to nothing
 AT_REST = 1e-9  # the speed below which a contact opens from rest after an impact without restitution
 ENDS = 1e-6  # share of a segment at both of its ends in which no extremum is looked for: guards are 0 there
 

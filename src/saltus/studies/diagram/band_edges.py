@@ -12,7 +12,7 @@ from saltus.flow import Motion, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, is_symmetric
 from saltus.studies.diagram.bands import Band, Bands, Edge, EdgeKind
 from saltus.studies.diagram.chaos_search import Seed
-from saltus.systems import System
+from saltus.systems import System, image_of
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def _section(orbit: PeriodicOrbit) -> np.ndarray:
     states = _at(motion, times)
     if not is_symmetric(orbit.system):
         return states
-    return np.concatenate([states, -_at(motion, times + 0.5 * forcing)])
+    return np.concatenate([states, image_of(orbit.system.model, _at(motion, times + 0.5 * forcing))])
 
 
 def _at(motion: Motion, times: np.ndarray) -> np.ndarray:
