@@ -135,21 +135,23 @@ def starts(system: System, count: int, window: Window, seed: int) -> np.ndarray:
 
 def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: np.ndarray | None = None) -> CellOutcomes:
     """Follow motions from states (n, d) at phase 0 in the cells of these numbers until they settle, or come to a known one."""
-    size, least = math.prod(request.shape), request.least
-    captured, tiny, unsettled = (np.zeros(size, dtype=np.int64) for _ in range(3))
+    total, least = math.prod(request.shape), request.least
+    captured, tiny, unsettled = (np.zeros(total, dtype=np.int64) for _ in range(3))
     record = motion_type(request.system.dimension)
     moving, found, left = np.zeros(len(cell), record), [np.empty(0, record)], []
     moving["cell"], moving["state"], moving["starts"], moving["amplitude"] = cell, states, 1, np.inf
     for share in (*(SETTINGS.stages if len(cell) > SETTINGS.few_motions else SETTINGS.few_stages), SETTINGS.patience):
         if share == SETTINGS.patience:
-            many = np.bincount(moving["cell"], minlength=size)[moving["cell"]] > SETTINGS.patient_with
+            many = np.bincount(moving["cell"], minlength=total)[moving["cell"]] > SETTINGS.patient_with
             left.append(moving[many])
             moving = moving[~many]
         moving, rests, fading = _followed(request, moving, math.ceil(share * request.periods))
-        settled = moving["period"] > 0
-        small = ~rests & np.where(settled, moving["amplitude"] < least, fading < least * SETTINGS.negligible)
-        found.append(moving[settled & ~small])
         _count(captured, moving[rests])
+        settled = moving["period"] > 0
+        # The first one that comes to rest in its cell shows that there is rest, however many impacts it takes.
+        size = np.where(settled | (captured[moving["cell"]] == 0), moving["amplitude"], fading)
+        small = ~rests & (size < least * np.where(settled, 1.0, SETTINGS.negligible))
+        found.append(moving[settled & ~small])
         _count(tiny, moving[small])
         moving = joined(moving[~rests & ~settled & ~small])
         if known is not None:
