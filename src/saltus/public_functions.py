@@ -154,7 +154,7 @@ def _plain_kinds(
     parameters = _signature(function).parameters
     if next(iter(parameters), "") != "self":
         return (), {}, None, frozenset({""})
-    simple: dict[Any, type] = {float | None: float, Mapping[str, Any] | None: dict, Any: object}
+    simple: dict[Any, type] = {float | None: float, Mapping[str, Any] | None: dict, Any: object, Any | None: object}
     hints = {name: simple.get(hint, hint) for name, hint in _hints(function).items()}
     kinds: dict[str, type | None] = dict.fromkeys(parameters)
     told_otherwise = (bool, np.ndarray, Callable, Iterable)  # see `fits`

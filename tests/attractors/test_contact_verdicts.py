@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.attractors import classify, lyapunov_spectrum
+from saltus.attractors import classify, lyapunov_many, lyapunov_spectrum
 from saltus.errors import ParameterError
 from saltus.systems import FourCells, Harmonic, Load, NewtonImpact, System, ThreeCells, TwoCells, TwoLayer, TwoStops
 
@@ -44,12 +44,20 @@ def test_small_loads_leave_both_layers_closed():
 def test_the_exponents_of_an_orbit_are_those_of_its_multipliers_and_closed_contacts_take_directions_away():
     orbit = saltus.find_orbit(layers(0.2, m=0.0, transfer=1.0), theta_1=0.1, theta_2=0.0)
     (first, second), velocity = orbit.state
-    found = lyapunov_spectrum(
-        orbit.system, theta_1=first, theta_2=second, velocity=velocity, periods=128, transient=0, two_trajectories=False
-    )
+    found = lyapunov_spectrum(orbit.system, theta_1=first, theta_2=second, velocity=velocity, periods=128, transient=0)
     expected = np.log(np.abs(orbit.multipliers[:2])) / orbit.duration
     np.testing.assert_allclose(found.values[:2], expected, rtol=0, atol=1e-4)
     assert (found.values[2:] == -np.inf).all()
+    assert found.agrees
+
+
+def test_many_exponents_between_two_walls_are_those_of_one():
+    many = lyapunov_many(CHAOTIC, x=[0.1, 0.3], velocity=0.5, periods=1500, transient=50)
+    one = lyapunov_spectrum(CHAOTIC, x=0.1, velocity=0.5, periods=1500, transient=50, two_trajectories=False)
+    for row in range(2):  # chaotic motions from other roundings: averages agree within their errors
+        apart, error = np.abs(many["exponent"].values[row] - one.values), many["error"].values[row] + one.errors
+        assert (apart < error).all()
+    assert many["positive"].all()
 
 
 def test_chaos_between_two_walls_has_the_exponent_of_two_neighbouring_motions():
@@ -104,7 +112,7 @@ def test_an_orbit_whose_impacts_die_away_is_an_orbit():
     [
         (lambda: classify(layers(0.3), theta=0.1), "theta_1=..., theta_2=... and velocity=..., got theta"),
         (lambda: classify(layers(0.3), theta_1=0.1, theta_2=0.0, velocity=(0.1,)), "velocity must have 2 value(s)"),
-        (lambda: lyapunov_spectrum(layers(0.3), theta_1=0.1, theta_2=0.0), "lyapunov_spectrum is for models with one contact"),
+        (lambda: lyapunov_many(layers(0.3), theta_1=[0.1], theta_2=0.0), "lyapunov_many works on models with one coordinate"),
     ],
 )
 def test_what_has_no_meaning_is_refused_by_name(ask, words):

@@ -219,3 +219,17 @@ def test_laws_that_may_gain_energy_are_flagged():
     assert result.gaining_contacts.values.tolist() == [0, 2, 2]
     motion = saltus.simulate(system, theta=(0.1, 0.0), velocity=(0.0, 0.0), duration=0.1)
     assert set(motion.validity.gains) == {"upper"}
+
+
+@pytest.mark.parametrize(("gap", "speed"), [(1e-17, 0.0), (0.0, 1e-17)])
+def test_a_gap_of_rounding_on_a_pressed_contact_without_loss_ends_a_lane_as_it_ends_a_motion(gap, speed):
+    """It would bounce 1e8 times and more in a unit of time; with any loss it is at rest after as few as in a motion by itself."""
+    start = {"theta_1": 0.1, "theta_2": -gap, "velocity": (0.0, -speed), "duration": 2.0}
+    with pytest.raises(MotionError, match="more than 20000 impacts"):
+        saltus.simulate(layers(e=(1.0, 1.0)), **start)
+    ends = saltus.simulate_many(layers(e=(1.0, 1.0)), **start)
+    assert str(stop_names(ends)) == "unresolved"
+    assert int(ends.impact_count) < 25_000
+    kept = saltus.simulate_many(layers(e=(0.5, 0.5)), **start)
+    assert str(stop_names(kept)) == "horizon"
+    assert int(kept.impact_count) == len(saltus.simulate(layers(e=(0.5, 0.5)), **start).impacts)

@@ -1,16 +1,22 @@
 """Diagrams, charts and searches of models with several contacts, beside the reduced model and closed forms."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import saltus
 from saltus import branch_of
 from saltus.errors import ParameterError
-from saltus.orbits import search_orbits
+from saltus.orbits import initial_states, search_orbits
 from saltus.plots import draw_diagram, draw_stability_chart
 from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
+from saltus.studies.diagram.chaos_search import resolve_bands
+from saltus.studies.diagram.effort import EFFORTS, Effort
+from saltus.studies.diagram.simulated import followed
 from saltus.systems import Harmonic, Load, Metainterface, NewtonImpact, System, TwoLayer, TwoStops, VelocityReduction
+from saltus.window import check_window
 
 BETA80 = math.radians(80)
 FORCE, H = "load.force.amplitude", "load.horizontal.amplitude"
@@ -32,10 +38,11 @@ def stops(e=0.7):
 
 def test_a_spectrum_of_both_layers_is_the_reduced_one_where_the_closed_layer_stays_closed():
     """H = 0.1 and frequencies about 1: the same stable branch, to 1e-8 in amplitude, and nothing left that is not on it."""
-    few = {"values": [0.95, 1.0, 1.05], "starts": 6, "max_period": 1, "bands": False, "repelling": 0, "switch": False}
+    few = {"values": [0.95, 1.0, 1.05], "starts": 6, "max_period": 1, "repelling": 0, "switch": False}
     both, reduced = (response_spectrum(layers(model), bounds=(0.95, 1.05), **few) for model in (TwoLayer, Metainterface))
     assert both.attrs["coordinate"] == "theta_1 theta_2"
     for tree in (both, reduced):
+        assert tree["bands"].sizes["band"] == 0
         assert tree["unplaced"].sizes["dot"] == 0
         assert (tree["attractors"]["placed"] == 1).all()
     one, other = (tree["attractors"].to_dataset() for tree in (both, reduced))
@@ -65,7 +72,34 @@ def test_a_diagram_between_two_stops_follows_the_closed_form():
             assert (sine * speed) ** 2 + (1 / A + cosine * speed) ** 2 == pytest.approx(1.0, abs=1e-8)
             compared += 1
     assert compared > 5
+    assert draw_diagram(tree)[0].get_ylabel() == "least speed of an impact"  # all amplitudes are 1
+    assert draw_diagram(tree, "amplitude")[0].get_ylabel() == r"$\max_\tau|x|$"
     assert set(tree["unplaced"]["reason"].values.tolist()) <= {"longer"}  # motions of three periods, beside these from 0.62 on
+
+
+def test_chaos_between_two_walls_is_a_band_and_regular_motion_beside_it_is_none():
+    """At A = 1.1 motions settle; at 1.9 (e = 0.9) they part with the exponent that pairs of neighbouring motions have there."""
+    coarse = replace(EFFORTS[Effort.QUICK].chaos, step=0.5, fine_step=0.5, edge=0.5)
+    at, area = np.repeat([1.1, 1.9], 4), check_window(None, stops())
+    begun = followed(stops(0.9), FORCE, at, initial_states(stops(), 8, area, 0), 300)
+    bands, _ = resolve_bands(stops(0.9), FORCE, (1.1, 1.9), begun, settings=coarse)
+    assert bands.bands[-1].high == 1.9
+    assert not any(1.1 in band for band in bands.bands)
+    values, exponents = bands.tried.values, bands.tried.exponent
+    growth, length = [], 2 * math.pi
+    system = stops(0.9).with_({FORCE: 1.9})
+    state, apart = np.array([0.1, 0.5]), 1e-8
+    direction = np.array([apart, 0.0])
+    for _ in range(400):
+        begun = [state, state + direction]
+        one, other = (saltus.simulate(system, x=x, velocity=v, periods=1, dense=False) for x, v in begun)
+        state, change = np.array([one.x, one.velocity]), np.array([other.x - one.x, other.velocity - one.velocity])
+        growth.append(math.log(np.linalg.norm(change) / np.linalg.norm(direction)))
+        direction = change * (apart / np.linalg.norm(change))
+        direction[0] = np.clip(state[0] + direction[0], -1.0, 1.0) - state[0]
+    error = np.std(growth[20:]) / math.sqrt(len(growth) - 20) / length
+    found, its_error = exponents[values == 1.9][0], bands.tried.error[values == 1.9][0]
+    assert abs(np.mean(growth[20:]) / length - found) < 3 * math.hypot(error, its_error / 2)
 
 
 def test_a_chart_of_both_layers_is_the_reduced_one_where_the_closed_layer_stays_closed():

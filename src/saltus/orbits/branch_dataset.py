@@ -123,6 +123,7 @@ def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:
         "special_amplitude": [s.amplitude for s in special],
         "special_highest": [s.orbit.highest for s in special],
         "special_lowest": [s.orbit.lowest for s in special],
+        "special_slowest": [s.orbit.slowest for s in special],
         "special_impact_count": [s.orbit.signature.impact_count for s in special],
         "special_period": [s.orbit.period for s in special],
         "special_residual": [s.evidence.residual for s in special],

@@ -17,7 +17,7 @@ from saltus.orbits.contact_problem import problem_of
 from saltus.orbits.find import orbit_from
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
-from saltus.orbits.starts import states_beside
+from saltus.orbits.starts import held_by_contacts, states_beside
 from saltus.orbits.verify import same_orbit
 from saltus.systems import System
 
@@ -35,7 +35,6 @@ class NearReturnSettings:
     same_state: float = 1e-5  # States at one value are on the same orbit if they are this near.
     still: float = 1e-6  # An orbit no larger than this is rest.
     tol: float = 1e-11  # The error of a step.
-    difference: float = 1e-6  # Of a state, for derivatives where lanes have none: half of the digits of what a step keeps.
 
 
 SETTINGS = NearReturnSettings()
@@ -120,19 +119,8 @@ def _improved(system: System, path: str, values: np.ndarray, states: np.ndarray,
 def _mapped(system: System, path: str, values: np.ndarray, states: np.ndarray, period: int) -> tuple[np.ndarray, np.ndarray]:
     """States (n, d) some periods later, and their derivatives to the ones at the start, (n, d, d).
 
-    With several contacts differences take the place of derivatives, of motions beside on which closed contacts stay
-    closed.
+    A contact that is closed at the start stays so: its coordinate and velocity are varied no more.
     """
-    options: dict[str, Any] = {"periods": period, "sample": (), "tol": SETTINGS.tol}
-    if not system.model.contacts:
-        result = motions_from(system, states, parameters={path: values}, sensitivities=(), **options)
-        return last_states(system, result), result["derivative"].values
-    n, d = states.shape
-    shifts = SETTINGS.difference * np.concatenate([np.zeros((1, d)), np.eye(d)])
-    begun = states_beside(system, np.repeat(states, d + 1, axis=0), np.tile(shifts, (n, 1)))
-    result = motions_from(system, begun, parameters={path: np.repeat(values, d + 1)}, **options)
-    ends = last_states(system, result).reshape(n, d + 1, d)
-    moved = np.einsum("nii->ni", begun.reshape(n, d + 1, d)[:, 1:] - states[:, None])  # each along its own variable
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slope = np.where(moved[:, :, None] != 0.0, (ends[:, 1:] - ends[:, :1]) / moved[:, :, None], 0.0)
-    return ends[:, 0], slope.transpose(0, 2, 1)
+    options: dict[str, Any] = {"periods": period, "sample": (), "tol": SETTINGS.tol, "sensitivities": ()}
+    result = motions_from(system, states, parameters={path: values}, **options)
+    return last_states(system, result), np.where(held_by_contacts(system, states)[:, None], 0.0, result["derivative"].values)

@@ -84,14 +84,24 @@ def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.
     What then is open by no more than rounding is closed.
     """
     names, moved = system.model.coordinates, on_this_side(system, states + shifts)
+    held = held_by_contacts(system, states)
     for contact in system.model.contacts:
         place = names.index(contact.coordinate)
-        closed = (np.asarray(contact.gap(states[..., place])) == 0.0) & (states[..., len(names) + place] == 0.0)
         least = np.maximum(np.abs(contact.gap(moved[..., place])), np.abs(moved[..., len(names) + place]))
-        closed = closed | (least < CLOSED_BELOW)
+        closed = held[..., place] & (np.asarray(contact.gap(states[..., place])) == 0.0) | (least < CLOSED_BELOW)
         moved[..., place] = np.where(closed, float(contact.position), moved[..., place])
         moved[..., len(names) + place] = np.where(closed, 0.0, moved[..., len(names) + place])
     return moved
+
+
+def held_by_contacts(system: System, states: np.ndarray) -> np.ndarray:
+    """Which of the variables of states (..., d) are those of coordinates at rest at a contact, (..., d)."""
+    names, held = system.model.coordinates, np.zeros(states.shape, dtype=bool)
+    for contact in system.model.contacts:
+        place = names.index(contact.coordinate)
+        closed = (np.asarray(contact.gap(states[..., place])) == 0.0) & (states[..., len(names) + place] == 0.0)
+        held[..., [place, len(names) + place]] |= closed[..., None]
+    return held
 
 
 def _held(system: System, states: np.ndarray, window: Window) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 SYMBOLS = {"theta": r"\theta", "theta_1": r"\theta_1", "theta_2": r"\theta_2"}
 PARAMETERS = {
     "load.frequency": r"frequency $\Omega$",
+    "load.force.amplitude": r"force amplitude $\widehat{F}$",
     "load.horizontal.amplitude": r"load amplitude $\widehat{\mathcal{H}}$",
     "load.vertical": r"vertical load $\overline{\mathcal{V}}$",
     "load.vertical.mean": r"mean vertical load $\overline{\mathcal{V}}$",

@@ -30,18 +30,23 @@ class StateSettings:
 DRAWN_STATES = StateSettings()
 
 
-QUANTITIES = ("amplitude", "highest", "lowest")  # what branches, special points and simulated motions all have
+QUANTITIES = ("amplitude", "highest", "lowest", "slowest")  # what branches, special points and simulated motions all have
+SAME_AMPLITUDE = 1e-9  # of an amplitude: motions between two walls that reach both have the same one, but for rounding
 
 
 @drawing
-def draw_diagram(tree: Any, quantity: str = "amplitude", *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
+def draw_diagram(tree: Any, quantity: str | None = None, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
     """Draw the DataTree of `response_spectrum` or `bifurcation_diagram`; returns its axes, (1 or 2,).
 
     In a figure the states at phase 0 stand below the branches; into axes that are given the branches alone are drawn. The
-    `quantity` is the amplitude, or, where that is flat as at a wall, the highest or the lowest value of a coordinate.
+    `quantity` is the amplitude, the highest or the lowest value of a coordinate, or, with several contacts, the least speed of
+    an impact ("slowest", 0 without impacts); by default that where most motions have the same amplitude, as between two walls.
     """
-    if quantity not in QUANTITIES:
-        raise ParameterError(f"quantity must be one of {', '.join(QUANTITIES)}, got {shown(quantity)}", "quantity")
+    known = [name for name in QUANTITIES if name in tree["attractors"]]
+    if quantity is not None and quantity not in known:
+        raise ParameterError(f"quantity must be one of {', '.join(known)}, got {shown(quantity)}", "quantity")
+    quantity = quantity or ("slowest" if "slowest" in known and _is_flat(tree["attractors"]["amplitude"].values) else "amplitude")
+    tree = _with_finite_speeds(tree) if quantity == "slowest" else tree
     low, high = (float(x) for x in tree.attrs["bounds"])
     names, unit = tree.attrs["coordinate"], _unit(tree)
     simulated = "stroboscopic" in tree.children and ax is None
@@ -53,8 +58,8 @@ def draw_diagram(tree: Any, quantity: str = "amplitude", *, ax: Axes | None = No
     axes[0].set_xlim(low, high)
     bottom, top = _range(tree, quantity, low, high)
     axes[0].set_ylim(bottom - 0.02 * (top - bottom), top + 0.08 * (top - bottom))  # so that marks on the axis are not cut
-    axes[0].set_ylabel(f"${peak(names, quantity)}${unit}")
-    limits = [float(limit) for limit in np.atleast_1d(tree.attrs["limits"])]
+    axes[0].set_ylabel(f"least speed of an impact{unit}" if quantity == "slowest" else f"${peak(names, quantity)}${unit}")
+    limits = [] if quantity == "slowest" else [float(limit) for limit in np.atleast_1d(tree.attrs["limits"])]
     draw_response(axes[0], tree, quantity)
     draw_limits(axes[0], limits)
     note_missed(axes[0], tree)
@@ -67,6 +72,22 @@ def draw_diagram(tree: Any, quantity: str = "amplitude", *, ax: Axes | None = No
     return axes if ax is None else ax
 
 
+def _is_flat(amplitudes: np.ndarray) -> bool:
+    """Whether most motions have the same amplitude."""
+    usual = float(np.median(amplitudes)) if amplitudes.size else np.nan
+    return bool(2 * np.count_nonzero(np.abs(amplitudes - usual) <= SAME_AMPLITUDE * usual) > amplitudes.size)
+
+
+def _with_finite_speeds(tree: Any) -> Any:
+    """The diagram with 0 for the least impact of an orbit without impacts, as simulated motions have it."""
+    tree = tree.copy()
+    for table, name in (("points", "slowest"), ("special", "special_slowest")):
+        if name in tree[table]:
+            speeds = tree[table][name]
+            tree[table][name] = speeds.where(np.isfinite(speeds), 0.0)
+    return tree
+
+
 def _unit(tree: Any) -> str:
     """The unit of the amplitudes, as the branches carry it."""
     points = tree["points"]
@@ -74,14 +95,15 @@ def _unit(tree: Any) -> str:
 
 
 def _range(tree: Any, quantity: str, low: float, high: float) -> tuple[float, float]:
-    """The least and the largest value of a quantity within the bounds; of amplitudes from 0; up to 1 where there is none."""
+    """The least and the largest value of a quantity within the bounds, amplitudes and speeds from 0; to 1 where there is none."""
     points, found = tree["points"], tree["attractors"][quantity].values
     if points.sizes["point"]:
         x = points["parameter"].values
         found = np.append(found, points[quantity].values[(x >= low) & (x <= high)])
     found = found[np.isfinite(found)]
-    top = float(np.max(found, initial=0.0 if quantity == "amplitude" or not found.size else -np.inf))
-    bottom = 0.0 if quantity == "amplitude" else float(np.min(found, initial=top))
+    from_zero = quantity in ("amplitude", "slowest")
+    top = float(np.max(found, initial=0.0 if from_zero or not found.size else -np.inf))
+    bottom = 0.0 if from_zero else float(np.min(found, initial=top))
     return (bottom, top) if top > bottom else (bottom, bottom + 1.0)
 
 

@@ -156,18 +156,8 @@ class ThreeCells(CellChain):
 
     Parameters
     ----------
-    beta0
-        The angle of the undeformed cell, rad, in (0, pi).
-    coupling
-        kappa, the stiffness of a spring times length squared, over K2; at least 0.
-    damping
-        C, the damping of the upper layer, at least 0.
-    stiffness_ratio
-        k = K1 / K2, above 0.
-    mass_ratio
-        m = M1 / M2, at least 0.
-    dissipation_ratio
-        c = C1 / C2, at least 0.
+    beta0, coupling, damping, stiffness_ratio, mass_ratio, dissipation_ratio
+        As for `TwoCells`.
 
     Examples
     --------
@@ -186,18 +176,8 @@ class FourCells(CellChain):
 
     Parameters
     ----------
-    beta0
-        The angle of the undeformed cell, rad, in (0, pi).
-    coupling
-        kappa, the stiffness of a spring times length squared, over K2; at least 0.
-    damping
-        C, the damping of the upper layer, at least 0.
-    stiffness_ratio
-        k = K1 / K2, above 0.
-    mass_ratio
-        m = M1 / M2, at least 0.
-    dissipation_ratio
-        c = C1 / C2, at least 0.
+    beta0, coupling, damping, stiffness_ratio, mass_ratio, dissipation_ratio
+        As for `TwoCells`.
 
     Examples
     --------

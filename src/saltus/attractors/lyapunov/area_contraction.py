@@ -68,11 +68,11 @@ class Contraction:
 def impact_factor(system: System, parameters: Mapping[str, np.ndarray]) -> np.ndarray:
     """The product over the sides of abs(dv+/dv-) of impacts without speed, for arrays of parameters: below 1 rest is reached.
 
-    () or the shape of the arrays; NaN where the law has no slope there.
+    () or the shape of the arrays; NaN where the law has no slope there, and 0 where contacts or frictions hold a coordinate.
     """
     traced = trace(system)
     if traced.velocity_after is None:
-        return np.ones(())
+        return np.zeros(()) if system.model.held else np.ones(())
     values = [Interval(np.asarray(parameters.get(path, value), dtype=float)) for path, value in system.parameters.items()]
     product = np.ones(())
     for side in system.model.sides:

@@ -14,7 +14,7 @@ from saltus.attractors.lyapunov.renormalisation import check_run
 from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.attractors.lyapunov.tangent_frames import Stretched, stretch_many
 from saltus.errors import ParameterError
-from saltus.flow import Inputs, Stop, last_states, motions_from, read_inputs, stop_names
+from saltus.flow import Inputs, Stop, extrema_names, last_states, motions_from, read_inputs, stop_names
 from saltus.progress import Progress, part_of, silent
 from saltus.provenance import provenance
 from saltus.public_functions import Numbers
@@ -85,7 +85,8 @@ def lyapunov_many(
     started, captured = run.settle(run.begin(), transient)
     started[captured] = np.nan
     stretched = stretch_many(system, started, run.parameters, run.lengths, int(periods), tol, part_of(progress, 0.0, 0.95))
-    measures = _measures(system, run, stretched, captured) | {"period": run.period(stretched.states)}
+    period, still = run.period(stretched.states)
+    measures = _measures(system, run, stretched, captured, still) | {"period": period}
     progress(1.0, "exponents")
     return _dataset(run, measures, stretched.states, {"periods": periods, "transient": transient})
 
@@ -114,35 +115,45 @@ class _Many:
         going = np.isin(stop, (Stop.HORIZON, Stop.REST, Stop.SETTLED, Stop.CAPTURED))
         return np.where(going[:, None], last_states(self.system, result), np.nan), stop == Stop.CAPTURED
 
-    def period(self, states: np.ndarray) -> np.ndarray:
-        """Forcing periods after which motions from here repeat themselves; 0 where they do not, or are lost."""
-        found = np.zeros(len(states), dtype=int)
+    def period(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forcing periods after which motions from here repeat themselves, 0 where they do not, or are lost; and which stand."""
+        found, still = np.zeros(len(states), dtype=int), np.zeros(len(states), dtype=bool)
         here = np.flatnonzero(np.isfinite(states).all(axis=1))
         if here.size and self.system.load.frequency is not None:
-            found[here] = self._follow(states, LYAPUNOV.look_back, ("settled",), here)["recurrence_period"].values
-        return found
+            result = self._follow(states, LYAPUNOV.look_back, ("settled",), here, ("extrema",))
+            highest, lowest = (result[f"overall_{name}"].values for name in extrema_names(self.system.model.coordinates))
+            found[here], still[here] = result["recurrence_period"].values, highest == lowest
+        return found, still
 
-    def _follow(self, states: np.ndarray, periods: int, until: tuple[str, ...], rows: Any = slice(None)) -> Any:
+    def _follow(
+        self,
+        states: np.ndarray,
+        periods: int,
+        until: tuple[str, ...],
+        rows: Any = slice(None),
+        sample: tuple[str, ...] = (),
+    ) -> Any:
         forced = self.system.load.frequency is not None
         return motions_from(
             self.system,
             states[rows],
             parameters={path: values[rows] for path, values in self.parameters.items()},
             until=until if forced else ("rest",),
-            sample=(),
+            sample=sample,
             tol=self.tol,
             **({"periods": periods} if forced else {"duration": float(periods)}),
         )
 
 
-def _measures(system: System, run: _Many, stretched: Stretched, captured: np.ndarray) -> dict[str, np.ndarray]:
+def _measures(system: System, run: _Many, stretched: Stretched, captured: np.ndarray, still: np.ndarray) -> dict[str, np.ndarray]:
     """Exponents, errors and what follows from them, a row for each motion."""
     growth = stretched.growth
     if captured.any():
         lossy = impact_factor(system, run.parameters) < LYAPUNOV.lossless
         growth = np.where((captured & lossy)[None, :, None], -np.inf, growth)
     found, duration = Estimate.of(growth / run.lengths[None, :, None]), len(growth) * run.lengths
-    rested = captured | np.isneginf(found.value[:, 1])
+    # Contacts and frictions that hold a coordinate for a while take away derivatives of motions that go on.
+    rested = captured | (still if system.model.held else np.isneginf(found.value[:, 1]))
     moving = np.isfinite(stretched.states).all(axis=1)
     return {
         "exponent": found.value,

@@ -11,22 +11,9 @@ from scipy.special import stdtrit
 
 from saltus.attractors.lyapunov.averages import resolution
 from saltus.flow import Stop, last_states, motions_from, stop_names
-from saltus.orbits import states_beside
 from saltus.systems import System
 
 FEWEST = 4  # motions of which a scatter is taken
-
-
-@dataclass(frozen=True)
-class PartedSettings:
-    """How far a second motion is from the first, where no derivatives are used."""
-
-    distance: float = 1e-8  # Between the errors of a step, 1e-10, and where the map is no longer linear.
-    periods: int = 4  # Forcing periods after which it is brought back: at an exponent of 0.3 it is then 2000 times as far.
-    rounding: float = 1e-12  # Nearer states are one but for rounding.
-
-
-PARTED = PartedSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +39,8 @@ def largest_exponents(
     The motions of a group are taken for independent samples of one attractor, so that their scatter gives the error, by Student's
     t. Motions that are lost are left out, and so are those whose perturbations surely shrink where others surely grow. A
     perturbation is given a quarter of the periods to turn to the direction that grows. The derivatives of the end to the start,
-    through impacts, are those of `simulate_many`: along that direction they are accurate however far it grows. With several
-    contacts a motion 1e-8 beside each takes the place of its derivatives, brought back to there every four periods.
+    through impacts, are those of `simulate_many`: along that direction they are accurate however far it grows. A perturbation
+    of which closed contacts and sticking frictions leave nothing has shrunk by as much as a number can.
 
     The resolution is 2 ln(t) / t for the time t of one motion, as regular ones may part like t^2.
 
@@ -82,45 +69,20 @@ def _stretched(
     if not here.any():
         return later, turned, growth
     chosen = {path: values[here] for path, values in columns.items()}
-    if system.model.contacts:
-        later[here], turned[here], growth[here] = _parted(system, states[here], direction[here], chosen, periods, tol)
-        return later, turned, growth
     options = {"parameters": chosen, "periods": periods, "sensitivities": (), "sample": (), "until": ("rest",), "tol": tol}
     ends = motions_from(system, states[here], **options)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         grown = np.einsum("nij,nj->ni", ends["derivative"].values, direction[here])
-        length = np.linalg.norm(grown, axis=1)
+        size = np.abs(grown).max(axis=1, keepdims=True)  # squares of what has grown by 1e200 are no numbers
+        length = size[:, 0] * np.linalg.norm(grown / np.where(size > 0.0, size, 1.0), axis=1)
         # What is captured at rest would have to be followed through all of its impacts, of which there are millions.
         moving = (ends["side"].values != 0) & (stop_names(ends) != Stop.CAPTURED)
-        going = moving & np.isfinite(length) & (length > 0.0)
-        growth[here] = np.where(going, np.log(length), np.nan)
-        turned[here] = grown / length[:, None]
+        gone = length == 0.0 if system.model.held else np.zeros(length.shape, dtype=bool)
+        going = moving & np.isfinite(length) & ((length > 0.0) | gone)
+        growth[here] = np.where(going, np.log(np.maximum(length, np.finfo(float).tiny)), np.nan)
+        turned[here] = np.where(gone[:, None], direction[here], grown / length[:, None])
     later[here] = np.where(going[:, None], last_states(system, ends), np.nan)
     return later, turned, growth
-
-
-def _parted(
-    system: System, states: np.ndarray, direction: np.ndarray, columns: dict[str, np.ndarray], periods: int, tol: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same from a second motion beside each one; a closed contact stays closed, and so is none of the direction."""
-    growth, n = np.zeros(len(states)), len(states)
-    twice = {path: np.tile(values, 2) for path, values in columns.items()}
-    for done in range(0, periods, PARTED.periods):
-        beside = states_beside(system, states, PARTED.distance * direction)
-        began = np.linalg.norm(beside - states, axis=1)
-        span = min(PARTED.periods, periods - done)
-        ends = motions_from(system, np.concatenate([states, beside]), parameters=twice, periods=span, sample=(), tol=tol)
-        going = (ends["side"].values[:n] != 0) & np.isin(stop_names(ends)[:n], (Stop.HORIZON,))
-        both = last_states(system, ends)
-        apart = np.where(going[:, None], both[n:] - both[:n], np.nan)
-        length = np.linalg.norm(apart, axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            # What comes together to within rounding shrinks at least so fast.
-            growth += np.log(np.maximum(length, PARTED.rounding) / began)
-            direction = np.where(length[:, None] > PARTED.rounding, apart / length[:, None], direction)
-        states = np.where(going[:, None], both[:n], np.nan)
-        direction = np.where(going[:, None], direction, np.nan)
-    return states, direction, growth
 
 
 def _averaged(rates: np.ndarray, least: np.ndarray) -> Largest:

@@ -18,7 +18,7 @@ from saltus.flow import Motion
 from saltus.systems import System, check_system
 
 
-def check_run(function: str, system: Any, periods: Any, transient: Any, tol: float, several_contacts: bool = False) -> None:
+def check_run(function: str, system: Any, periods: Any, transient: Any, tol: float) -> None:
     """Refuse what has no exponents, and a run too short for error bars of its halves.
 
     Raises
@@ -26,7 +26,7 @@ def check_run(function: str, system: Any, periods: Any, transient: Any, tol: flo
     ParameterError
         With the name of the argument.
     """
-    check_system(system, function, several_contacts=several_contacts)
+    check_system(system, function, several_contacts=True)
     check_periodic(system)
     check_count("periods", periods, 2 * LYAPUNOV.batches)
     check_count("transient", transient, 0)

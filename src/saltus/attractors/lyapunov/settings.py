@@ -20,6 +20,7 @@ class LyapunovSettings:
     distance: float = 1e-7  # Between two trajectories: far above the error of a period, small enough for the map to be linear.
     accuracy: float = 1e-5  # The error of the exponent from two trajectories, which have errors of their own.
     tolerance: float = 1e-14  # The error of a step of the two trajectories.
+    rounding: float = 1e-13  # What is left of a derivative that contacts or frictions take away, relative to the largest one.
     every: int = 16  # The number of periods between calls of the progress.
 
 

@@ -22,8 +22,6 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-DERIVATIVE_ROUNDING = 1e-13  # of a derivative, relative to the largest one
-
 
 @dataclass(frozen=True, eq=False)
 class Exponents(Result):
@@ -124,7 +122,8 @@ class Exponents(Result):
 
     def __repr__(self) -> str:
         values = ", ".join(f"{x:.5g} +- {e:.1g}" for x, e in zip(self.values, self.errors, strict=True))
-        note = f", {self.note}" if self.note else f", sum - divergence = {self.values.sum() - self.divergence:.1e}"
+        known = f", sum - divergence = {self.values.sum() - self.divergence:.1e}" if np.isfinite(self.divergence) else ""
+        note = f", {self.note}" if self.note else known
         return f"Exponents({values}; stroboscopic {self.stroboscopic:.5g}; {self.periods} periods{note})"
 
 
@@ -144,11 +143,11 @@ def lyapunov_spectrum(
     The derivatives Phi of the exact flow, with the saltation of every impact, are carried over spans of a forcing period, each
     no longer than 6.5 units of time, and made orthogonal after each. Averages over the periods are weighted
     (`averages.weights`), so that exponents of periodic and quasi-periodic motions, and of equilibria, converge faster than any
-    power of the time.
+    power of the time. They are -inf in the directions that closed contacts and sticking frictions take away.
 
     Two checks come along. The exponents must add up to the mean divergence, which is computed from the impacts and from the
-    times on each side. And the stroboscopic map must have the same largest exponent, from a second trajectory that starts 1e-7
-    beside the motion and is moved back to that distance after every period.
+    times on each side; with several contacts or frictions it is not known. And the stroboscopic map must have the same largest
+    exponent, from a second trajectory that starts 1e-7 beside the motion and is moved back to that distance after every period.
 
     Parameters
     ----------
@@ -163,8 +162,7 @@ def lyapunov_spectrum(
     tol
         The error that one step may make.
     two_trajectories
-        False leaves out the stroboscopic map's exponent, and a half of the work. With several contacts it has
-        to be False; exponents are then -inf in the directions that closed contacts take away.
+        False leaves out the stroboscopic map's exponent, and a half of the work.
     progress
         Called with the fraction done and what is being done.
 
@@ -181,7 +179,7 @@ def lyapunov_spectrum(
     >>> exponents.values.round(3)  # half of -C each, as the multipliers are complex
     array([-0.05, -0.05])
     """
-    check_run("lyapunov_spectrum", system, periods, transient, tol, several_contacts=not two_trajectories)
+    check_run("lyapunov_spectrum", system, periods, transient, tol)
     run, start = _Run(system, periods), dict[str, Any](coordinates, velocity=velocity)
     motion = simulate(system, **start, duration=transient * run.length, tol=tol, dense=False)
     run.state, run.note = state_of(motion), _lost(motion)
@@ -233,8 +231,8 @@ class _Run:
         frame, upper = np.linalg.qr(found.state @ frame)
         with np.errstate(divide="ignore"):
             lengths = np.abs(np.diag(upper))
-            if self.system.model.held:  # what closed contacts take away is 0 but for rounding
-                lengths[lengths < DERIVATIVE_ROUNDING * lengths.max()] = 0.0
+            if self.system.model.held:  # what closed contacts and sticking frictions take away is 0 but for rounding
+                lengths[lengths < LYAPUNOV.rounding * lengths.max()] = 0.0
             self.stretch[p] += np.log(lengths)
         self.areas[p] += contraction.along(found.motion)
         self.condition = max(self.condition, float(np.linalg.cond(found.state)))

@@ -81,6 +81,7 @@ class _Follower:
         self._states[:, [0, 3]] = states
         self._states[:, [1, 2, 4, 5]] = first_frame(2).ravel()
         self._alive = np.isfinite(states).all(axis=1)
+        self._rounding = LYAPUNOV.rounding if ensemble.held else 0.0
 
     def period(self, spans: int) -> np.ndarray:
         """Go on for a period; returns ln of the stretch in it, (n, 2)."""
@@ -91,7 +92,7 @@ class _Follower:
                 break
             span = self._lengths[here] / spans
             ends = self._ensemble.advance(self._rows[here], self._states[here], j * span, (j + 1) * span)
-            self._states[here], stretch = _orthonormal(ends.states)
+            self._states[here], stretch = _orthonormal(ends.states, self._rounding)
             self._alive[here[~ends.sound]] = False
             growth[here] += np.where(ends.sound[:, None], stretch, np.nan)
         return growth
@@ -101,11 +102,15 @@ class _Follower:
         return np.where(self._alive[:, None], self._states[:, [0, 3]], np.nan)
 
 
-def _orthonormal(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The states with their derivatives made orthonormal, by Gram and Schmidt, and ln of the lengths that they had, (n, 2)."""
+def _orthonormal(states: np.ndarray, rounding: float) -> tuple[np.ndarray, np.ndarray]:
+    """The states with their derivatives made orthonormal, by Gram and Schmidt, and ln of the lengths that they had, (n, 2).
+
+    A second length that is no more than `rounding` of the first one is 0.
+    """
     states = states.copy()
     x1, x2, y1, y2 = states[:, 1], states[:, 2], states[:, 4], states[:, 5]
     first, area = np.hypot(x1, y1), x1 * y2 - x2 * y1
+    area[np.abs(area) <= rounding * first**2] = 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
         growth = np.log(np.stack([first, np.abs(area) / first], axis=1))
         unit_x, unit_y = np.where(first > 0.0, x1 / first, 1.0), np.where(first > 0.0, y1 / first, 0.0)

@@ -9,6 +9,7 @@ import numpy as np
 from saltus.attractors.lyapunov.renormalisation import state_of
 from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.flow import simulate
+from saltus.orbits import states_beside
 from saltus.progress import Progress, silent
 from saltus.systems import System
 
@@ -20,18 +21,19 @@ def separation_growth(
 
     After each period the second state is moved back to the distance of 1e-7 along the line to it (Benettin, Galgani, Giorgilli
     and Strelcyn, Meccanica 15 (1980) 9). Where it lies on the other side of the contact, or meets it once more, nothing is
-    special.
+    special; of several contacts those that are closed stay so.
     """
     here = _vector(state)
     away = np.full(here.size, LYAPUNOV.distance / np.sqrt(here.size))
     growth = np.full(periods, -np.inf)
     for p in range(periods):
-        following = _mapped(system, here, length)
-        apart = _mapped(system, here + away, length) - following
+        beside, following = states_beside(system, here, away), _mapped(system, here, length)
+        before = float(np.linalg.norm(beside - here))
+        apart = _mapped(system, beside, length) - following
         distance = float(np.linalg.norm(apart))
-        if distance == 0.0:
+        if distance == 0.0 or before == 0.0:
             break
-        growth[p] = np.log(distance / np.linalg.norm(away))
+        growth[p] = np.log(distance / before)
         here, away = following, apart * (LYAPUNOV.distance / distance)
         if p % LYAPUNOV.every == LYAPUNOV.every - 1:
             progress((p + 1) / periods, "two trajectories")

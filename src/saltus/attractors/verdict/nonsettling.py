@@ -82,7 +82,7 @@ class _Judged:
 def unsettled(case: VerdictRequest, ends: Recurrence) -> Verdict:
     """The verdict on a motion that has not settled."""
     if case.system.load.period is None:
-        return case.undecided(Reason.CONSERVATIVE, ends, {})
+        return case.undecided(Reason.SELF_EXCITED if case.system.model.frictions else Reason.CONSERVATIVE, ends, {})
     runs, series = _runs(case, ends.states[0, -1]), ends.states[0, :, 0]
     series = series[np.isfinite(series)]
     opinion = zero_one_test(series, seed=case.seed) if series.size >= FEWEST_ENTRIES else None
@@ -104,8 +104,7 @@ def _runs(case: VerdictRequest, state: np.ndarray) -> list[Exponents]:
     runs: list[Exponents] = []
     for span, part in ((third, (0.1, 0.1 + 0.8 / 3)), (2 * third, (0.1 + 0.8 / 3, 0.9))):
         progress = part_of(case.progress, *part)
-        second = not runs and not case.system.model.held
-        options: dict[str, Any] = {"periods": span, "transient": 0, "tol": case.tol, "two_trajectories": second}
+        options: dict[str, Any] = {"periods": span, "transient": 0, "tol": case.tol, "two_trajectories": not runs}
         runs.append(lyapunov_spectrum(case.system, **at, **options, progress=progress))
         at = runs[-1].state
         if runs[-1].note is not None:

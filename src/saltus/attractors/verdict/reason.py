@@ -9,6 +9,7 @@ class Reason(StrEnum):
     """The sentences of verdicts, to be filled in by `format`."""
 
     CAPTURED = "within {periods} forcing periods it is captured by the contact, from where no later load pulls it"
+    STANDS = "within {periods} forcing periods it stands still, held by what no later load overcomes"
     ON_ORBIT = "{seen}, on an orbit of period {period} with the largest multiplier {multiplier:.6g}"
     EQUILIBRIUM = "it comes to the equilibrium at {place:.9g}, which attracts"
     DOUBTFUL_ORBIT = "{seen}, but {doubt}"
@@ -16,6 +17,10 @@ class Reason(StrEnum):
     CANNOT_GO_ON = "the motion cannot go on: {error}"
     NOT_FOLLOWED = "the motion cannot be followed beyond some {periods} forcing periods"
     CONSERVATIVE = "under constant loads it goes on moving: it has not lost its energy, or has none to lose"
+    SELF_EXCITED = (
+        "under constant loads it goes on moving: the ground that its friction moves on may drive it round a cycle, which has no "
+        "forcing period"
+    )
     NO_EXPONENTS = "after {periods} forcing periods {note}"
     TRANSIENT = (
         "its largest exponent is {size}, but {left} of {companions} motions from beside its last state settle within {followed} "

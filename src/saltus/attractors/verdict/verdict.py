@@ -150,7 +150,8 @@ def settled(case: VerdictRequest, ends: Recurrence, start: np.ndarray) -> Verdic
     if ends.rest[0] or (ends.period[0] == 1 and stays_at_rest(case.clock, ends.last[0])):
         held, numbers = case.system.model.held, {"periods": round(float(ends.periods[0]))}
         point = ends.last[0] if held else np.array([float(case.system.model.contact), 0.0])
-        return case.verdict(AttractorKind.REST, Reason.CAPTURED, ends, numbers, state=start_at(case.system, point))
+        cause = Reason.STANDS if case.system.model.frictions else Reason.CAPTURED
+        return case.verdict(AttractorKind.REST, cause, ends, numbers, state=start_at(case.system, point))
     if ends.ended[0]:
         return _ended(case, ends, start)
     if not ends.periodic[0]:

@@ -70,7 +70,8 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
         status = advance(where, state, limits, env, model, rows, steps, events)
         detail = record_impacts(lane, where, m, contacts, events)
         record_extrema(lane, where, m, steps, poly)
-        if (status != Status.FULL and status != Status.PAUSED) or control[0] != 0:
+        many = get(m, Slot.IMPACTS, lane) > get(m, Slot.NEXT_CHECK, lane)  # the driver asks whether they are too many
+        if (status != Status.FULL and status != Status.PAUSED) or many or control[0] != 0:
             break
     put_state(lane, at, m, flags, lanes, where, state)
     put(m, Slot.SIDE, lane, 1.0 + tell_closed(lane, at, m, contacts))

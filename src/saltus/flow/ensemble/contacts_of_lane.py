@@ -28,11 +28,14 @@ def tell_closed(lane, at, m, contacts):
 
 @lean_jit
 def contacts_of(lane, sizes, at, m, contacts):
-    """Fill the scalar kernel's `contacts` of a lane that moves smoothly: an open gap may be 0 at the start."""
+    """Fill the scalar kernel's `contacts` of a lane that moves smoothly: an open gap may be 0 at the start.
+
+    After how many impacts it is tried again whether they come to rest stays known: trying may take as long as all that follow.
+    """
     closed = int(get(m, Slot.SIDE, lane)) - 1
     for i in range(contacts.shape[0]):
         coordinate = sizes[Size.CONTACTS + 1 + i]
         there = get(m, at[LanePart.POSITION] + coordinate, lane) == get(m, at[LanePart.CONTACTS] + i, lane)
         contacts[i, ContactColumn.COORDINATE], contacts[i, ContactColumn.CLOSED] = coordinate, closed >> i & 1
         contacts[i, ContactColumn.SKIP] = 1 if there and not closed >> i & 1 else 0
-        contacts[i, ContactColumn.RELEASED] = contacts[i, ContactColumn.WAITS] = 0
+        contacts[i, ContactColumn.RELEASED] = 0

@@ -118,14 +118,16 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
                     begin_together(m, free)
                     control[1] += lane_count(free)
                     past &= ~free
-                checked = bits(load(m, Slot.IMPACTS) > load(m, Slot.NEXT_CHECK)) & flags[Flag.BUSY] & ~past
+            checked = bits(load(m, Slot.IMPACTS) > load(m, Slot.NEXT_CHECK)) & flags[Flag.BUSY] & ~past
             arrived = bits(load(m, Slot.NOW) >= load(m, Slot.PERIOD_END)) & flags[Flag.BUSY]
         concerned = away | captured | checked | arrived
         while concerned:
             lane = first_lane(concerned)
             concerned &= concerned - 1
             status, detail = Status.PAUSED, 0
-            if (checked >> lane) & 1 and unresolved(lane, m):  # first, as slow impacts need the scalar kernel in every step
+            if (checked >> lane) & 1 and unresolved(
+                lane, sizes, m
+            ):  # first, as slow impacts need the scalar kernel in every step
                 status = Status.UNRESOLVED
             elif (away >> lane) & 1:
                 scalar_motion, parameters = helpers[Helper.SCALAR_MOTION], jobs[JobArray.PARAMETERS]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.ensemble.lane_layout import (
+    BURST,
     MOST_IMPACTS,
     Code,
     EndLabel,
@@ -49,7 +50,7 @@ def fill(lane, i, code, sizes, at, m, flags, lanes, jobs, tables):
     put_all(m, at[LanePart.VELOCITY], lane, state[i, half:])
     put_all(m, at[LanePart.PARAMETERS], lane, parameters[i])
     put_all(m, at[LanePart.CONSTANTS], lane, constants[lane])
-    begin_time(lane, m, numbers[i], labels[i])
+    begin_time(lane, sizes, m, numbers[i], labels[i])
     begin_overall(lane, m)
     begin_records(lane, sizes, at, m)
     mode, side = begin_contact(lane, code, sizes, at, m, lanes, env, state[i], labels[i, JobLabel.PIECE])
@@ -70,7 +71,13 @@ def put_all(m, first, lane, values):
 
 
 @inline_jit
-def begin_time(lane, m, numbers, labels):
+def impacts_between_checks(sizes):
+    """After how many impacts it is looked whether there are too many."""
+    return BURST if sizes[Size.CONTACTS] > 0 else MOST_IMPACTS
+
+
+@inline_jit
+def begin_time(lane, sizes, m, numbers, labels):
     """Set the forcing period and the time at which a trajectory starts."""
     start = numbers[JobNumber.START_TIME]
     put(m, Slot.NOW, lane, start)
@@ -79,7 +86,7 @@ def begin_time(lane, m, numbers, labels):
     put(m, Slot.CAPTURE_SPEED, lane, numbers[JobNumber.CAPTURE_SPEED])
     put(m, Slot.PERIOD, lane, float(labels[JobLabel.FIRST_PERIOD]))
     put(m, Slot.PERIODS_DONE, lane, 0.0)
-    put(m, Slot.NEXT_CHECK, lane, MOST_IMPACTS)
+    put(m, Slot.NEXT_CHECK, lane, impacts_between_checks(sizes))
     put(m, Slot.LAST_CHECK, lane, start)
 
 
@@ -106,13 +113,13 @@ def begin_records(lane, sizes, at, m):
 
 
 @lean_jit
-def unresolved(lane, m):
-    """Whether the last MOST_IMPACTS impacts took less than a unit of time, or than a shorter forcing period."""
-    now, length = get(m, Slot.NOW, lane), get(m, Slot.PERIOD_LENGTH, lane)
+def unresolved(lane, sizes, m):
+    """Whether there were more than MOST_IMPACTS in a unit of time, or in a shorter forcing period, since the last check."""
+    many, now, length = impacts_between_checks(sizes), get(m, Slot.NOW, lane), get(m, Slot.PERIOD_LENGTH, lane)
     since = get(m, Slot.LAST_CHECK, lane)
     put(m, Slot.LAST_CHECK, lane, now)
-    put(m, Slot.NEXT_CHECK, lane, get(m, Slot.NEXT_CHECK, lane) + MOST_IMPACTS)
-    return now - since < (min(length, 1.0) if length > 0.0 else 1.0)
+    put(m, Slot.NEXT_CHECK, lane, get(m, Slot.NEXT_CHECK, lane) + many)
+    return now - since < (min(length, 1.0) if length > 0.0 else 1.0) * many / MOST_IMPACTS
 
 
 @inline_jit

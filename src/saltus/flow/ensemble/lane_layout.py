@@ -197,5 +197,6 @@ class EndLabel(IntEnum):
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 MOST_IMPACTS = 1e6  # of a unit of time, or of a shorter forcing period: more are an accumulation that is not being resolved
+BURST = 2e4  # of them at several contacts, over which that rate is looked for: each takes a pass of the scalar kernel
 NO_ROOT, TOUCH = -1.0, -2.0  # instead of the time of a lane's root
 FAST = 1e300  # A state beyond this has left the range of numbers.

@@ -147,7 +147,7 @@ class _Place:
     period: int = field(default=0, compare=False)  # of what settles slowly, or on a long period
     care: int = field(default=0, compare=False)  # number of the judgement that the verdict is of
     settled: int = field(default=0, compare=False)  # companions that settled in it
-    chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 2)), compare=False)  # (n, d): states of what is unsettled
+    chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)  # (n, d): states of what is unsettled
     orbits: list[tuple[int, int, float, np.ndarray]] = field(default_factory=list, compare=False)
 
     @property
@@ -212,7 +212,7 @@ class _BandSearch:
         """What is known at a value; a new place where nothing is."""
         at = bisect_left(self.places, _Place(value))
         if at == len(self.places) or self.places[at].value != value:
-            insort(self.places, _Place(value))
+            insort(self.places, _Place(value, chaos=np.empty((0, self.work.system.dimension))))
         return self.places[at]
 
     def look(self, values: Sequence[float], starts: Sequence[np.ndarray], care: int = 0) -> None:
