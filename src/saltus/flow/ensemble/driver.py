@@ -125,9 +125,8 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
             lane = first_lane(concerned)
             concerned &= concerned - 1
             status, detail = Status.PAUSED, 0
-            if (checked >> lane) & 1 and unresolved(
-                lane, sizes, m
-            ):  # first, as slow impacts need the scalar kernel in every step
+            # First, as slow impacts need the scalar kernel in every step.
+            if (checked >> lane) & 1 and unresolved(lane, sizes, m):
                 status = Status.UNRESOLVED
             elif (away >> lane) & 1:
                 scalar_motion, parameters = helpers[Helper.SCALAR_MOTION], jobs[JobArray.PARAMETERS]
