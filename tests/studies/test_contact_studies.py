@@ -15,7 +15,17 @@ from saltus.studies import bifurcation_diagram, bordered_chart, response_spectru
 from saltus.studies.diagram.chaos_search import resolve_bands
 from saltus.studies.diagram.effort import EFFORTS, Effort
 from saltus.studies.diagram.simulated import followed
-from saltus.systems import Harmonic, Load, Metainterface, NewtonImpact, System, TwoLayer, TwoStops, VelocityReduction
+from saltus.systems import (
+    BeltOscillator,
+    Harmonic,
+    Load,
+    Metainterface,
+    NewtonImpact,
+    System,
+    TwoLayer,
+    TwoStops,
+    VelocityReduction,
+)
 from saltus.window import check_window
 
 BETA80 = math.radians(80)
@@ -119,6 +129,17 @@ def test_a_chart_tells_motions_apart_that_all_reach_both_stops():
     speeds = chart["motion_slowest"].values[np.isfinite(chart["motion_slowest"].values)]
     assert len(speeds) == int(chart["count"].values[0, 0])
     assert (np.diff(np.sort(speeds)) > 1e-4).all()
+
+
+def test_a_cell_whose_only_motion_has_a_longer_period_than_is_looked_for_is_not_at_rest():
+    """A mass on a belt that moves cannot come to rest; here it repeats itself every seven periods, a chart looks for six."""
+    model = BeltOscillator(kinetic=0.2, static=0.3, belt_speed=0.1, damping=0.02)
+    belt = System(model=model, load=Load(frequency=0.3, force=Harmonic(amplitude=0.2636)))
+    assert saltus.classify(belt, x=0.1).period == 7
+    axes = {"horizontal": [0.2636], "vertical": [0.3], "paths": (FORCE, "load.frequency"), "starts": 4}
+    for max_period, words in ((6, "long"), (7, "one_motion")):
+        outcome = stability_chart(belt, **axes, max_period=max_period)["outcome"]
+        assert outcome.attrs["flag_meanings"].split()[int(outcome[0, 0])] == words
 
 
 def test_a_search_finds_the_orbit_of_both_layers_and_says_what_it_searched():

@@ -27,7 +27,7 @@ class CellVerdicts:
         found = judge_unsettled(request.system, states, parameters, settings=judgement(request.periods, request.tol))
         self.verdict, self.exponent, self.error = found.verdict.copy(), found.exponent, found.error
         longer = np.unique(found.settled.question[found.settled.period > request.max_period])
-        self.verdict[longer[self.verdict[longer] == Unsettled.TRANSIENT]] = Unsettled.PERIODIC  # they settle, but on no known period
+        self.verdict[longer[self.verdict[longer] == Unsettled.TRANSIENT]] = Unsettled.PERIODIC  # on no known one
         self.later = self.cell[found.settled.question], found.settled.state
 
         known = (found.period > 0) & (found.period <= request.max_period)
