@@ -44,6 +44,8 @@ def contact_images(model: Model, impact: ImpactLaw) -> tuple[int, ...] | None:
         ]
     if len(found) < count + len(frictions):
         return None
+    if not count:
+        return tuple(found)  # frictions have no impact law
     law = np.array(impact.restitution_matrix(model), dtype=float).reshape(count, count)
     return tuple(found) if np.array_equal(law, law[np.ix_(found[:count], found[:count])]) else None
 
