@@ -215,5 +215,5 @@ def test_where_the_amplitude_is_flat_the_lowest_values_can_be_drawn():
     assert axes.get_ylabel().startswith(r"$\min_\tau")
     assert axes.get_ylim()[0] < -2.0
     assert axes.get_ylim()[1] > -1.0
-    with pytest.raises(ParameterError, match="quantity must be one of amplitude, highest, lowest, got 'speed'"):
+    with pytest.raises(ParameterError, match="quantity must be one of amplitude, lowest, got 'speed'"):
         draw_diagram(tree, "speed")

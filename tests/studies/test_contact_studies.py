@@ -126,6 +126,8 @@ def test_a_chart_of_both_layers_is_the_reduced_one_where_the_closed_layer_stays_
 def test_a_chart_tells_motions_apart_that_all_reach_both_stops():
     """Between two stops every motion has the amplitude 1; at A = 0.8 the two that are mirror images of one another count once."""
     chart = stability_chart(stops(), horizontal=[0.8], vertical=[0.0], paths=(FORCE, "model.damping"), starts=12)
+    wide = stability_chart(stops(), horizontal=[0.52, 0.6], vertical=[0.0, 0.01], paths=(FORCE, "model.damping"), starts=4)
+    assert draw_stability_chart(wide).figure.axes[-1].get_ylabel() == "least speed of an impact"
     speeds = chart["motion_slowest"].values[np.isfinite(chart["motion_slowest"].values)]
     assert len(speeds) == int(chart["count"].values[0, 0])
     assert (np.diff(np.sort(speeds)) > 1e-4).all()

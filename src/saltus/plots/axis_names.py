@@ -13,9 +13,11 @@ PARAMETERS = {
     "load.horizontal.amplitude": r"load amplitude $\widehat{\mathcal{H}}$",
     "load.vertical": r"vertical load $\overline{\mathcal{V}}$",
     "load.vertical.mean": r"mean vertical load $\overline{\mathcal{V}}$",
+    "impact.e": "restitution $e$",
     "model.damping": r"damping $\mathcal{C}$",
     "model.beta0": r"$\beta_0$ (rad)",
 }
+SAME_AMPLITUDE = 1e-9  # of an amplitude: motions between two walls that reach both have the same one, but for rounding
 
 
 def symbol(name: str) -> str:
@@ -96,3 +98,9 @@ def _start_name(dataset: Any, name: str) -> str:
         return r"$\tau$ at the start"
     coordinate = next(iter(dataset.data_vars))
     return f"${state_symbol(state, (str(coordinate), state))}$ at the start{unit_in_brackets(dataset[name])}"
+
+
+def is_flat(amplitudes: np.ndarray) -> bool:
+    """Whether most of several motions have the same amplitude."""
+    usual = float(np.median(amplitudes)) if amplitudes.size > 1 else np.nan
+    return bool(2 * np.count_nonzero(np.abs(amplitudes - usual) <= SAME_AMPLITUDE * usual) > amplitudes.size)

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import Normal, Stroke
 
 from saltus.branch_lines import border_curves
-from saltus.plots.axis_names import parameter_name, peak, unit_in_brackets
+from saltus.plots.axis_names import is_flat, parameter_name, peak, unit_in_brackets
 from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, axes_or_new, legend_of, outside_legend
 from saltus.plots.drawing import drawing
 from saltus.plots.marks import cell_edges
@@ -54,8 +54,9 @@ def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
     ax.set_xlabel(parameter_name(path[0]))
     ax.set_ylabel(parameter_name(path[1]))
     if cells is not None:
-        amplitude = f"${peak(chart.attrs['coordinate'])}${unit_in_brackets(chart['amplitude'])}"
-        ax.figure.colorbar(cells, ax=ax, label=f"largest amplitude {amplitude}", ticks=cells.norm.boundaries, format="%g")
+        name = "least speed of an impact" if has_speeds(chart) else f"largest amplitude ${peak(chart.attrs['coordinate'])}$"
+        label = f"{name}{unit_in_brackets(chart['amplitude'])}"
+        ax.figure.colorbar(cells, ax=ax, label=label, ticks=cells.norm.boundaries, format="%g")
     handles = _cell_handles(chart)
     if chart is not data:
         dots = draw_lines(ax, data)
@@ -106,8 +107,9 @@ def _resting(chart: Any) -> np.ndarray:
 
 
 def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:
-    """The cells: coloured by the largest amplitude, filled and hatched where there is something else (`FILLINGS`), white where
-    there is nothing but rest; crosses where the largest motion goes beyond the kinematic limit.
+    """The cells: coloured by the largest amplitude, or where `has_speeds` by the largest of the least speeds of impacts, filled
+    and hatched where there is something else (`FILLINGS`), white where there is nothing but rest; crosses where the largest
+    motion goes beyond the kinematic limit.
 
     Returns what a colour bar needs, or None.
     """
@@ -117,6 +119,9 @@ def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:
     edges = cell_edges(x), cell_edges(y)
     ax.set_xlim(*((x[0], x[-1]) if len(x) > 1 else edges[0]))
     ax.set_ylim(*((y[0], y[-1]) if len(y) > 1 else edges[1]))
+    if has_speeds(chart):
+        of["amplitude"] = chart["motion_slowest"].fillna(-np.inf).max("motion").transpose("vertical", "horizontal").values
+        of["amplitude"][~np.isfinite(of["amplitude"])] = np.nan
     cells = _amplitudes(ax, edges, of["amplitude"], top)
     for name, (fill, hatch, colour, _) in FILLINGS.items():
         where = with_outcome(chart, name)
@@ -130,6 +135,13 @@ def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:
     if "beyond_line" in of:
         _outline(ax, *edges, of["beyond_line"])
     return cells
+
+
+def has_speeds(chart: Any) -> bool:
+    """Whether the motions of most cells have the same amplitude, as between two walls, so that speeds of impacts are drawn."""
+    amplitudes = chart["amplitude"].values
+    known = "motion_slowest" in chart and float(chart["motion_slowest"].max()) > 0.0
+    return known and is_flat(amplitudes[np.isfinite(amplitudes)])
 
 
 def with_outcome(chart: Any, name: str) -> np.ndarray:

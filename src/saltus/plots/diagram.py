@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from saltus.errors import ParameterError, shown
-from saltus.plots.axis_names import parameter_name, peak, symbol, unit_in_brackets
+from saltus.plots.axis_names import is_flat, parameter_name, peak, symbol, unit_in_brackets
 from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure
 from saltus.plots.drawing import drawing
 from saltus.plots.response import draw_bands, draw_limits, draw_response, note_missed, response_legend
@@ -31,7 +31,6 @@ DRAWN_STATES = StateSettings()
 
 
 QUANTITIES = ("amplitude", "highest", "lowest", "slowest")  # what branches, special points and simulated motions all have
-SAME_AMPLITUDE = 1e-9  # of an amplitude: motions between two walls that reach both have the same one, but for rounding
 
 
 @drawing
@@ -45,7 +44,7 @@ def draw_diagram(tree: Any, quantity: str | None = None, *, ax: Axes | None = No
     known = [name for name in QUANTITIES if name in tree["attractors"]]
     if quantity is not None and quantity not in known:
         raise ParameterError(f"quantity must be one of {', '.join(known)}, got {shown(quantity)}", "quantity")
-    quantity = quantity or ("slowest" if "slowest" in known and _is_flat(tree["attractors"]["amplitude"].values) else "amplitude")
+    quantity = quantity or ("slowest" if "slowest" in known and is_flat(tree["attractors"]["amplitude"].values) else "amplitude")
     tree = _with_finite_speeds(tree) if quantity == "slowest" else tree
     low, high = (float(x) for x in tree.attrs["bounds"])
     names, unit = tree.attrs["coordinate"], _unit(tree)
@@ -70,12 +69,6 @@ def draw_diagram(tree: Any, quantity: str | None = None, *, ax: Axes | None = No
     axes[-1].set_xlabel(parameter_name(tree.attrs["path"]))
     response_legend(figure if ax is None else ax, [tree], limits=min(limits, default=np.inf) < axes[0].get_ylim()[1])
     return axes if ax is None else ax
-
-
-def _is_flat(amplitudes: np.ndarray) -> bool:
-    """Whether most motions have the same amplitude."""
-    usual = float(np.median(amplitudes)) if amplitudes.size else np.nan
-    return bool(2 * np.count_nonzero(np.abs(amplitudes - usual) <= SAME_AMPLITUDE * usual) > amplitudes.size)
 
 
 def _with_finite_speeds(tree: Any) -> Any:
