@@ -10,8 +10,9 @@ from saltus import continue_orbit, find_orbit
 from saltus.orbits import SpecialKind, switch_branch
 from saltus.studies.diagram.band_edges import explained, seeds_of, turning_points
 from saltus.studies.diagram.bands import EdgeKind
-from saltus.studies.diagram.chaos_search import resolve_bands
+from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.chaos_settings import SETTINGS
+from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.simulated import simulate_from
 
 FREQUENCY, BOUNDS = "load.frequency", (0.36, 0.402)
@@ -34,8 +35,9 @@ def bands(branches):
     states = np.random.default_rng(3).uniform(-0.2, 0.2, (15 * 4, 2))
     system, settings = forced(0.2), replace(SETTINGS, step=0.02, fine_step=0.01, edge=2e-3)
     begun = simulate_from(system, FREQUENCY, np.repeat(values, 4), states, 300)
-    found, _ = resolve_bands(system, FREQUENCY, BOUNDS, begun, seeds_of(branches), settings)
-    return explained(system, found, branches).bands
+    search = BandSearch(DiagramWork(system, FREQUENCY), BOUNDS, settings)
+    search.look(begun, seeds_of(branches))
+    return explained(system, search.bands, branches).bands
 
 
 def test_the_branches_turn_where_the_cascade_of_period_doublings_begins(branches):

@@ -4,14 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shared_systems import forced
+from shared_systems import forced, under
 
-from saltus import ParameterError, WallOscillator
+from saltus import ParameterError, WallOscillator, continue_orbit, find_orbit
 from saltus.attractors import Unsettled
 from saltus.flow import Outcome, find_recurrence
+from saltus.orbits import SpecialKind
 from saltus.studies import chaotic_bands
+from saltus.studies.diagram.band_edges import seeds_of
 from saltus.studies.diagram.bands import Band, Edge, EdgeKind, band_dataset
-from saltus.studies.diagram.chaos_search import _BandSearch, resolve_bands
+from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.chaos_settings import SETTINGS
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.simulated import simulate_from, starts_at
@@ -30,7 +32,9 @@ def bands(system, path, bounds, count=9, starts=4, settings=COARSE):
     values = np.repeat(np.linspace(*bounds, count), starts)
     states = starts_at(system, np.linspace(*bounds, count), starts, check_window(WINDOW, system), 0).reshape(-1, 2)
     begun = simulate_from(system, path, values, states, COARSE.settling)
-    return resolve_bands(system, path, bounds, begun, settings=settings)[0]
+    search = BandSearch(DiagramWork(system, path), bounds, settings)
+    search.look(begun)
+    return search.bands
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +50,25 @@ def test_the_band_that_the_paper_calls_quasi_periodic_is_chaotic(quasi_periodic_
     assert max(band.high for band in quasi_periodic_band.bands) < 0.3995
     assert widest.exponent - widest.error > 0.0
     assert widest.exponent == pytest.approx(0.03, abs=0.012)
+
+
+def test_a_cascade_of_long_periods_is_followed_to_its_chaos_beside_another_attractor():
+    """Fig. 10a's orbit of period 16 doubles at Omega = 3.8024; four of five random motions settle on period 1 everywhere here."""
+    system, bounds = under(ground_horizontal=Harmonic(amplitude=0.25), vertical=-0.5), (3.798, 3.814)
+    family = continue_orbit(
+        find_orbit(system.with_({FREQUENCY: 3.799}), theta=-2.513657, velocity=-1.455095, period=16), FREQUENCY, (3.796, 3.806)
+    )
+    assert any(special.kind == SpecialKind.PD and abs(special.parameter - 3.802431) < 1e-5 for special in family.special)
+    settings = replace(COARSE, step=0.1, fine_step=0.05, edge=0.01, beside=(-0.05, 0.05))
+    search = BandSearch(DiagramWork(system, FREQUENCY), bounds, settings)
+    search.look(simulate_from(system, FREQUENCY, np.linspace(*bounds, 5), np.zeros((5, 2)), COARSE.settling))
+    assert not search.bands.bands
+    search.look(search.further[0].only(slice(0)), seeds_of([family]))
+    inside = np.array([any(value in band for band in search.bands.bands) for value in (3.8035, 3.809)])
+    assert inside.tolist() == [False, True]
+    states = np.random.default_rng(2).uniform(-4.0, 4.0, (40, 2))
+    ends = find_recurrence(system, states, 20_000, parameters={FREQUENCY: np.full(40, 3.809)}, max_period=64, kept=130)
+    assert 0 < (ends.outcome == Outcome.MOVING).sum() < 20  # plain simulation: few random motions stay in that chaos
 
 
 def test_the_brackets_of_edges_are_narrow(quasi_periodic_band):
@@ -137,7 +160,7 @@ def test_bands_become_a_dataset_also_where_there_are_none():
 
 def test_an_interval_at_whose_ends_no_motion_is_left_to_begin_with_is_halved_all_the_same():
     """There a motion of a long period was judged, of which no state is kept as settled: such an interval was tried for ever."""
-    search = _BandSearch(DiagramWork(forced(0.2), FREQUENCY), 1.0, (), SETTINGS)
+    search = BandSearch(DiagramWork(forced(0.2), FREQUENCY), (0.0, 1.0))
     for value in (0.5, 0.5005):
         search.place(value).period = SETTINGS.long_period + 1
     search.refine()

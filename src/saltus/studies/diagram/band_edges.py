@@ -152,7 +152,7 @@ def _turns(branch: Branch, special: SpecialPoint) -> bool:
 
 
 def seeds_of(branches: Sequence[Branch]) -> list[Seed]:
-    """The special points of branches at which narrow bands may begin, as `resolve_bands` takes them."""
+    """The special points of branches at which narrow bands may begin, as `BandSearch` takes them."""
     return [
         Seed(str(special.kind), special.parameter, tuple(special.orbit.section_state.tolist()))
         for special in turning_points(branches)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from saltus.attractors import Earlier, Judged, SettledLater, Unsettled
+from saltus.attractors import Earlier, SettledLater
 from saltus.checks import check_count
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
@@ -18,6 +18,7 @@ from saltus.studies.checks import check_diagram
 from saltus.studies.diagram.bands import Bands, Tried, bands_of
 from saltus.studies.diagram.chaos_settings import SETTINGS, ChaosSettings
 from saltus.studies.diagram.diagram_work import DiagramWork
+from saltus.studies.diagram.searched_value import SearchedValue
 from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
 from saltus.window import Box, check_window
@@ -98,124 +99,70 @@ def chaotic_bands(
     values, area = np.linspace(*bounds, count), check_window(window, system)
     states = starts_at(system, values, starts, area, seed).reshape(-1, system.dimension)
     first = part_of(progress, 0.0, 0.2, "looking for chaos")
-    begun = DiagramWork(system, path).simulate(np.repeat(values, starts), states, SETTINGS.settling, first)
-    return resolve_bands(system, path, bounds, begun, special, progress=part_of(progress, 0.2, 1.0))[0]
-
-
-def resolve_bands(
-    system: System,
-    path: str,
-    bounds: tuple[float, float],
-    begun: SimulatedMotions,
-    special: Iterable[Seed] = (),
-    settings: ChaosSettings = SETTINGS,
-    progress: Progress = silent,
-    work: DiagramWork | None = None,
-) -> tuple[Bands, SimulatedMotions]:
-    """The bands of chaos between two values, and all motions that were simulated to find them, those of `begun` left out.
-
-    `begun` is an ensemble over values between the bounds; `special` are special points, where more is looked for. `work` says
-    who computes what takes long, if it is not this process.
-    """
-    work = work or DiagramWork(system, path)
-    search = _BandSearch(work, float(bounds[1] - bounds[0]), sorted(special, key=lambda seed: seed.value), settings)
-    search.take(begun)
-    search.spread()
-    search.beside_special_points(bounds)
-    progress(0.2, "looking for chaos")
-    search.refine()
-    progress(0.6, "looking for chaos")
-    search.locate_edges()
-    progress(1.0, "looking for chaos")
-    tried, further = search.tried(), search.further[1:]
-    motions = further[0].joined(*further[1:]) if further else begun.only(slice(0))
-    return Bands(system, path, bands_of(tried), tried, begun.joined(motions)), motions
-
-
-RANKS = (Unsettled.PERIODIC, Unsettled.TRANSIENT, Unsettled.UNDECIDED, Unsettled.CHAOTIC)  # of several, the last one counts
-
-
-@dataclass(order=True)
-class _Place:
-    """What is known at one value of the parameter."""
-
-    value: float
-    verdict: Unsettled = field(default=Unsettled.PERIODIC, compare=False)  # all motions settle, where nothing else is known
-    exponent: float = field(default=np.nan, compare=False)
-    error: float = field(default=np.nan, compare=False)
-    life: float = field(default=np.nan, compare=False)
-    period: int = field(default=0, compare=False)  # of what settles slowly, or on a long period
-    care: int = field(default=0, compare=False)  # number of the judgement that the verdict is of
-    settled: int = field(default=0, compare=False)  # companions that settled in it
-    chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)  # (n, d): states of what is unsettled
-    orbits: list[tuple[int, int, float, np.ndarray]] = field(default_factory=list, compare=False)
-
-    @property
-    def chaotic(self) -> bool:
-        """Whether there is chaos."""
-        return self.verdict is Unsettled.CHAOTIC
-
-    @property
-    def quiet(self) -> float:
-        """Forcing periods in which none of the companions has settled, if none has at all; see `Judged.life`."""
-        return 0.0 if self.settled else 3.0 * self.life
-
-    @property
-    def kinds(self) -> set[tuple[int, int]]:
-        """Period and impacts of the motions that have settled."""
-        return {orbit[:2] for orbit in self.orbits}
-
-    @property
-    def longest(self) -> int:
-        """The longest period of what settles, in forcing periods."""
-        return max(self.period, *(orbit[0] for orbit in self.orbits), 0)
-
-    def judge(self, judged: Judged, row: int, care: int) -> None:
-        """Take an answer about what is unsettled here; a more careful one replaces what was thought before."""
-        verdict = Unsettled(judged.verdict[row])
-        if care < self.care or (care == self.care and RANKS.index(verdict) < RANKS.index(self.verdict)):
-            return
-        self.verdict, self.care, self.chaos = verdict, care, judged.states[row]
-        self.exponent, self.error = float(judged.exponent[row]), float(judged.error[row])
-        self.life, self.period = float(judged.life[row]), int(judged.period[row])
-        self.settled = int(judged.gone[row])
-
-    def settle(self, period: int, impacts: int, amplitude: float, state: np.ndarray) -> None:
-        """Add a motion that has settled here, unless it is known."""
-        for q, n, size, _ in self.orbits:
-            if (q, n) == (period, impacts) and abs(size - amplitude) <= 1e-4 * size:
-                return
-        self.orbits.append((period, impacts, amplitude, state))
-
-    def starts(self, seeds: int, orbits: int) -> np.ndarray:
-        """States from which motions at neighbouring values are begun, (n, d)."""
-        unsettled = len(self.chaos) > 0 and (self.chaotic or not self.orbits)
-        chosen = self.chaos[np.linspace(0, len(self.chaos) - 1, seeds).astype(int)] if unsettled else self.chaos[:0]
-        settled = [orbit[3][None] for orbit in self.orbits[:orbits]]
-        return np.concatenate([*([chosen] if len(chosen) or not settled else []), *settled])
+    work = DiagramWork(system, path)
+    search = BandSearch(work, (float(bounds[0]), float(bounds[1])))
+    search.look(work.simulate(np.repeat(values, starts), states, SETTINGS.settling, first), special, part_of(progress, 0.2, 1.0))
+    return search.bands
 
 
 @dataclass
-class _BandSearch:
-    """Motions of one system at ever more values of one of its parameters."""
+class BandSearch:
+    """The search for bands of chaos between two values of a parameter, which knows all motions that it was shown and began.
+
+    `work` says who computes what takes long.
+    """
 
     work: DiagramWork
-    span: float
-    special: Sequence[Seed]
-    settings: ChaosSettings
-    places: list[_Place] = field(default_factory=list)  # by value
+    bounds: tuple[float, float]
+    settings: ChaosSettings = SETTINGS
+    special: list[Seed] = field(default_factory=list)  # by value
+    places: list[SearchedValue] = field(default_factory=list)  # by value
     further: list[SimulatedMotions] = field(default_factory=list)
     # Pairs of neighbouring values: motions were begun at the second one on the chaos of the first one.
     carried: set[tuple[float, float]] = field(default_factory=set)
 
-    def place(self, value: float) -> _Place:
+    def look(self, begun: SimulatedMotions, special: Iterable[Seed] = (), progress: Progress = silent) -> SimulatedMotions:
+        """Look where these motions and special points are, which it has not seen; returns the motions that it has begun."""
+        known, fresh = len(self.further), list[Seed]()
+        for seed in special:
+            if not any(self._is_same(seed, other) for other in (*self.special, *fresh)):
+                fresh.append(seed)
+        self.special = sorted([*self.special, *fresh], key=lambda seed: seed.value)
+        self.take(begun)
+        self.spread()
+        self.beside_special_points(fresh)
+        progress(0.2, "looking for chaos")
+        self.refine()
+        progress(0.6, "looking for chaos")
+        self.locate_edges()
+        progress(1.0, "looking for chaos")
+        further = self.further[known + 1 :]
+        return further[0].joined(*further[1:]) if further else begun.only(slice(0))
+
+    def _is_same(self, one: Seed, other: Seed) -> bool:
+        """Whether two special points are one: that of a branch is found again on the one that is born at it."""
+        near = self.settings.same * self.span
+        return abs(one.value - other.value) <= near and np.allclose(one.state, other.state, rtol=0.0, atol=self.settings.same)
+
+    @property
+    def bands(self) -> Bands:
+        """The bands that have been found."""
+        tried, motions = self.tried(), self.further[0].joined(*self.further[1:])
+        return Bands(self.work.system, self.work.path, bands_of(tried), tried, motions)
+
+    @property
+    def span(self) -> float:
+        """The width of the range."""
+        return self.bounds[1] - self.bounds[0]
+
+    def place(self, value: float) -> SearchedValue:
         """What is known at a value; a new place where nothing is."""
-        at = bisect_left(self.places, _Place(value))
+        at = bisect_left(self.places, SearchedValue(value))
         if at == len(self.places) or self.places[at].value != value:
-            insort(self.places, _Place(value, chaos=np.empty((0, self.work.system.dimension))))
+            insort(self.places, SearchedValue(value))
         return self.places[at]
 
-    def look(self, values: Sequence[float], starts: Sequence[np.ndarray], care: int = 0) -> None:
+    def follow(self, values: Sequence[float], starts: Sequence[np.ndarray], care: int = 0) -> None:
         """Follow motions from states (n, d) of each value's own, and judge those that do not settle."""
         column = np.repeat(np.asarray(values, dtype=float), [len(states) for states in starts])
         if len(column):
@@ -254,20 +201,20 @@ class _BandSearch:
             self.place(float(motions.value[i])).settle(*facts, motions.last[i])
 
     def spread(self) -> None:
-        """Carry chaos on to neighbouring values: motions begun on it, as long as they find more."""
+        """Carry what goes on to neighbouring values: motions begun on it, as long as they find more."""
         while True:
             pairs = [pair for a, b in pairwise(self.places) for pair in ((a, b), (b, a))]
-            fresh = [(a, b) for a, b in pairs if a.chaotic and not b.chaotic and (a.value, b.value) not in self.carried]
+            fresh = [(a, b) for a, b in pairs if a.goes_on and not b.goes_on and (a.value, b.value) not in self.carried]
             if not fresh:
                 return
             self.carried.update((a.value, b.value) for a, b in fresh)
-            self.look([b.value for _, b in fresh], [a.starts(self.settings.seeds, 0) for a, _ in fresh])
+            self.follow([b.value for _, b in fresh], [a.starts(self.settings.seeds, 0) for a, _ in fresh])
 
-    def beside_special_points(self, bounds: tuple[float, float]) -> None:
+    def beside_special_points(self, special: Sequence[Seed]) -> None:
         """Begin motions on the orbits of special points at values beside these."""
-        values = [(seed.value + share * self.span, seed.state) for seed in self.special for share in self.settings.beside]
-        inside = [(value, state) for value, state in values if bounds[0] <= value <= bounds[1]]
-        self.look([value for value, _ in inside], [np.array([state]) for _, state in inside])
+        values = [(seed.value + share * self.span, seed.state) for seed in special for share in self.settings.beside]
+        inside = [(value, state) for value, state in values if self.bounds[0] <= value <= self.bounds[1]]
+        self.follow([value for value, _ in inside], [np.array([state]) for _, state in inside])
 
     def refine(self) -> None:
         """Halve intervals in which something changes, or in which there is chaos, as long as they are wide."""
@@ -275,7 +222,7 @@ class _BandSearch:
             self._begin_between(pairs)
             self.spread()
 
-    def _is_of_interest(self, a: _Place, b: _Place) -> bool:
+    def _is_of_interest(self, a: SearchedValue, b: SearchedValue) -> bool:
         """Whether chaos may begin, end or pause between two neighbouring values, and they are not near to one another yet."""
         width = (b.value - a.value) / self.span
         if width <= self.settings.step:
@@ -285,12 +232,12 @@ class _BandSearch:
         special = inside < len(self.special) and self.special[inside].value <= b.value
         return special or a.kinds != b.kinds or bool(len(a.chaos) + len(b.chaos))
 
-    def _begin_between(self, pairs: Sequence[tuple[_Place, _Place]], care: int = 0) -> None:
+    def _begin_between(self, pairs: Sequence[tuple[SearchedValue, SearchedValue]], care: int = 0) -> None:
         """Motions at the middles of intervals, begun on those at both ends."""
         middles = [0.5 * (a.value + b.value) for a, b in pairs]
         few = (self.settings.seeds, self.settings.neighbours)
         begun = [[some for some in (a.starts(*few), b.starts(*few)) if len(some)] for a, b in pairs]
-        self.look(middles, [np.concatenate(some) if some else np.empty((0, 2)) for some in begun], care)
+        self.follow(middles, [np.concatenate(some) if some else np.empty((0, 2)) for some in begun], care)
         for (a, b), middle in zip(pairs, middles, strict=True):
             self.place(middle)  # also where there is nothing to begin with: all that moves at both ends comes to rest
             self.carried.update(((a.value, middle), (b.value, middle)))
@@ -309,14 +256,14 @@ class _BandSearch:
                 return
             self._confirm_near(failed, self.settings.near * 2**i)
 
-    def _confirm_near(self, failed: list[_Place], count: int) -> None:
+    def _confirm_near(self, failed: list[SearchedValue], count: int) -> None:
         """Judge so much chaos on each side of values that have turned out to have none as these were judged."""
         chaotic = [place for place in self.places if place.chaotic]
         for care in {place.care for place in failed}:
             at = [bisect_left(chaotic, place) for place in failed if place.care == care]
             self._confirm((place for i in at for place in chaotic[max(0, i - count) : i + count]), care)
 
-    def _edges(self) -> list[tuple[_Place, _Place]]:
+    def _edges(self) -> list[tuple[SearchedValue, SearchedValue]]:
         """Neighbours of which the first is chaotic and the second is not."""
         pairs = [pair for a, b in pairwise(self.places) for pair in ((a, b), (b, a))]
         return [(a, b) for a, b in pairs if a.chaotic and not b.chaotic]
@@ -327,7 +274,7 @@ class _BandSearch:
             for care in {b.care for _, b in wide}:
                 self._begin_between([pair for pair in wide if pair[1].care == care], care)
 
-    def _confirm(self, places: Iterable[_Place], care: int) -> list[_Place]:
+    def _confirm(self, places: Iterable[SearchedValue], care: int) -> list[SearchedValue]:
         """Judge chaos with more care where that has not been done; returns where there is none after all."""
         care = min(care, len(self.settings.judgements) - 1)
         doubtful = list({place.value: place for place in places if place.chaotic and place.care < care}.values())
@@ -337,9 +284,9 @@ class _BandSearch:
             self._judge(np.array([place.value for place in alike]), np.stack([place.chaos for place in alike]), care, known)
         return [place for place in doubtful if not place.chaotic]
 
-    def _runs(self) -> list[list[_Place]]:
+    def _runs(self) -> list[list[SearchedValue]]:
         """Successive places with chaos."""
-        runs: list[list[_Place]] = [[]]
+        runs: list[list[SearchedValue]] = [[]]
         for place in self.places:
             if place.chaotic:
                 runs[-1].append(place)
@@ -347,12 +294,12 @@ class _BandSearch:
                 runs.append([])
         return [run for run in runs if run]
 
-    def _some_of(self, run: list[_Place]) -> list[_Place]:
+    def _some_of(self, run: list[SearchedValue]) -> list[SearchedValue]:
         """The ends of a band, and values evenly between them."""
         count = 2 + int((run[-1].value - run[0].value) / (self.settings.every * self.span))
         return [run[i] for i in np.unique(np.linspace(0, len(run) - 1, count).astype(int))]
 
-    def _beside_windows(self, run: list[_Place]) -> list[_Place]:
+    def _beside_windows(self, run: list[SearchedValue]) -> list[SearchedValue]:
         """Where there are, beside chaos, motions that settle over a narrow part of a band: it may be a window."""
         extents: dict[tuple[int, int], list[float]] = {}
         for place in run:
@@ -378,7 +325,7 @@ class _BandSearch:
         )
 
 
-def _beside_settled(some: list[_Place]) -> list[_Place]:
+def _beside_settled(some: list[SearchedValue]) -> list[SearchedValue]:
     """Those next to chaos in which companions settled: it may be a long transient, and so may they."""
     settled = [i for i, place in enumerate(some) if place.chaotic and place.settled]
     return [some[i] for i in sorted({j for i in settled for j in (i - 1, i, i + 1) if 0 <= j < len(some)})]

@@ -16,7 +16,7 @@ from saltus.studies.diagram.attractors_found import LONG, AttractorsFound, Place
 from saltus.studies.diagram.band_edges import seeds_of
 from saltus.studies.diagram.bands import Bands
 from saltus.studies.diagram.branch_set import BranchSet
-from saltus.studies.diagram.chaos_search import resolve_bands
+from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EffortSettings
 from saltus.studies.diagram.placement import PlacedBranch, placed, stable_motions
@@ -77,6 +77,7 @@ class DiagramSearch:
     branches: BranchSet
     max_period: int  # the longest one that is followed
     found: AttractorsFound = field(init=False)
+    band_search: BandSearch | None = None
     chaos: Bands | None = None
     missed: MissedShare = field(default_factory=MissedShare)
     prepared: set[int] = field(default_factory=set)  # rows of motions that were followed with others at once
@@ -223,20 +224,24 @@ class DiagramSearch:
 
     def look_for_chaos(self, progress: Progress) -> None:
         """Find the bands of chaos, and follow what settles in windows within them."""
-        special, motions = seeds_of(self.branches.branches), self.found.motions
+        motions = self.found.motions
         kept = np.unique(motions.value, return_index=True)[1], self.found.rows, np.flatnonzero(motions.unsettled)
-        begun = motions.only(np.unique(np.concatenate(kept)))  # each attractor once, and every value
-        self.chaos, further = resolve_bands(
-            self.system, self.path, self.bounds, begun, special, self.effort.chaos, progress, self.work
-        )
-        self.found.add(further)
-        self.follow(silent)
+        self.band_search = BandSearch(self.work, self.bounds, self.effort.chaos)
+        self._add_bands(motions.only(np.unique(np.concatenate(kept))), progress)  # each attractor once, and every value
+
+    def _add_bands(self, begun: SimulatedMotions, progress: Progress = silent) -> None:
+        """Look for bands where motions are, and beside the special points of branches that are new since the last time."""
+        if self.band_search is not None:
+            self.found.add(self.band_search.look(begun, seeds_of(self.branches.branches), progress))
+            self.chaos = self.band_search.bands
+            self.follow(silent)
 
     def estimate(self, follow: bool) -> None:
         """Estimate which share of the states ends on something that the diagram does not have, by random motions.
 
         What has not settled where there is no chaos is given more time, as it is on its way to something. With `follow` these
-        motions are followed too, after they have been counted, and new ones are counted then.
+        motions are followed too, and chaos is looked for where they do not settle, after they have been counted; new ones are
+        counted then.
         """
         for number in range(self.effort.samples):
             motions = self._random_motions(number)
@@ -250,6 +255,7 @@ class DiagramSearch:
                 return
             self.found.reopen(np.arange(first, len(self.found.motions)))
             self.follow(silent)
+            self._add_bands(motions.only(motions.unsettled & ~self._in_bands(motions.value)))
 
     def _random_motions(self, number: int) -> SimulatedMotions:
         """Motions from random states of the window at random values, from a seed of their own."""

@@ -1,0 +1,78 @@
+"""What the search for chaos knows at one value of the parameter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from saltus.attractors import Judged, Unsettled
+
+RANKS = (Unsettled.PERIODIC, Unsettled.TRANSIENT, Unsettled.UNDECIDED, Unsettled.CHAOTIC)  # of several, the last one counts
+
+
+@dataclass(order=True)
+class SearchedValue:
+    """What is known at one value of the parameter."""
+
+    value: float
+    verdict: Unsettled = field(default=Unsettled.PERIODIC, compare=False)  # all motions settle, where nothing else is known
+    exponent: float = field(default=np.nan, compare=False)
+    error: float = field(default=np.nan, compare=False)
+    life: float = field(default=np.nan, compare=False)
+    period: int = field(default=0, compare=False)  # of what settles slowly, or on a long period
+    care: int = field(default=0, compare=False)  # number of the judgement that the verdict is of
+    settled: int = field(default=0, compare=False)  # companions that settled in it
+    chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)  # (n, d): states of what is unsettled
+    orbits: list[tuple[int, int, float, np.ndarray]] = field(default_factory=list, compare=False)
+
+    @property
+    def chaotic(self) -> bool:
+        """Whether there is chaos."""
+        return self.verdict is Unsettled.CHAOTIC
+
+    @property
+    def quiet(self) -> float:
+        """Forcing periods in which none of the companions has settled, if none has at all; see `Judged.life`."""
+        return 0.0 if self.settled else 3.0 * self.life
+
+    @property
+    def kinds(self) -> set[tuple[int, int]]:
+        """Period and impacts of the motions that have settled."""
+        return {orbit[:2] for orbit in self.orbits}
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether motions are chaotic, may be so, or repeat themselves after more forcing periods than all that have settled."""
+        long = self.period > max((orbit[0] for orbit in self.orbits), default=0)
+        open_ = self.verdict in (Unsettled.CHAOTIC, Unsettled.UNDECIDED)
+        return open_ or (self.verdict is Unsettled.PERIODIC and long)
+
+    @property
+    def longest(self) -> int:
+        """The longest period of what settles, in forcing periods."""
+        return max(self.period, *(orbit[0] for orbit in self.orbits), 0)
+
+    def judge(self, judged: Judged, row: int, care: int) -> None:
+        """Take an answer about what is unsettled here; a more careful one replaces what was thought before."""
+        verdict = Unsettled(judged.verdict[row])
+        if care < self.care or (care == self.care and RANKS.index(verdict) < RANKS.index(self.verdict)):
+            return
+        self.verdict, self.care, self.chaos = verdict, care, judged.states[row]
+        self.exponent, self.error = float(judged.exponent[row]), float(judged.error[row])
+        self.life, self.period = float(judged.life[row]), int(judged.period[row])
+        self.settled = int(judged.gone[row])
+
+    def settle(self, period: int, impacts: int, amplitude: float, state: np.ndarray) -> None:
+        """Add a motion that has settled here, unless it is known."""
+        for q, n, size, _ in self.orbits:
+            if (q, n) == (period, impacts) and abs(size - amplitude) <= 1e-4 * size:
+                return
+        self.orbits.append((period, impacts, amplitude, state))
+
+    def starts(self, seeds: int, orbits: int) -> np.ndarray:
+        """States from which motions at neighbouring values are begun, (n, d)."""
+        unsettled = len(self.chaos) > 0 and (self.goes_on or not self.orbits)
+        chosen = self.chaos[np.linspace(0, len(self.chaos) - 1, seeds).astype(int)] if unsettled else self.chaos[:0]
+        settled = [orbit[3][None] for orbit in self.orbits[:orbits]]
+        return np.concatenate([*([chosen] if len(chosen) or not settled else []), *settled])
