@@ -12,7 +12,8 @@ from saltus.errors import ParameterError
 from saltus.orbits import initial_states, search_orbits
 from saltus.plots import draw_diagram, draw_stability_chart
 from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
-from saltus.studies.diagram.chaos_search import resolve_bands
+from saltus.studies.diagram.chaos_search import BandSearch
+from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EFFORTS, Effort
 from saltus.studies.diagram.simulated import followed
 from saltus.systems import (
@@ -92,7 +93,9 @@ def test_chaos_between_two_walls_is_a_band_and_regular_motion_beside_it_is_none(
     coarse = replace(EFFORTS[Effort.QUICK].chaos, step=0.5, fine_step=0.5, edge=0.5)
     at, area = np.repeat([1.1, 1.9], 4), check_window(None, stops())
     begun = followed(stops(0.9), FORCE, at, initial_states(stops(), 8, area, 0), 300)
-    bands, _ = resolve_bands(stops(0.9), FORCE, (1.1, 1.9), begun, settings=coarse)
+    search = BandSearch(DiagramWork(stops(0.9), FORCE), (1.1, 1.9), coarse)
+    search.look(begun)
+    bands = search.bands
     assert bands.bands[-1].high == 1.9
     assert not any(1.1 in band for band in bands.bands)
     values, exponents = bands.tried.values, bands.tried.exponent

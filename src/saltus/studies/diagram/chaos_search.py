@@ -159,7 +159,7 @@ class BandSearch:
         """What is known at a value; a new place where nothing is."""
         at = bisect_left(self.places, SearchedValue(value))
         if at == len(self.places) or self.places[at].value != value:
-            insort(self.places, SearchedValue(value))
+            insort(self.places, SearchedValue(value, chaos=np.empty((0, self.work.system.dimension))))
         return self.places[at]
 
     def follow(self, values: Sequence[float], starts: Sequence[np.ndarray], care: int = 0) -> None:
@@ -237,7 +237,7 @@ class BandSearch:
         middles = [0.5 * (a.value + b.value) for a, b in pairs]
         few = (self.settings.seeds, self.settings.neighbours)
         begun = [[some for some in (a.starts(*few), b.starts(*few)) if len(some)] for a, b in pairs]
-        self.follow(middles, [np.concatenate(some) if some else np.empty((0, 2)) for some in begun], care)
+        self.follow(middles, [np.concatenate(some) if some else np.empty((0, 0)) for some in begun], care)
         for (a, b), middle in zip(pairs, middles, strict=True):
             self.place(middle)  # also where there is nothing to begin with: all that moves at both ends comes to rest
             self.carried.update(((a.value, middle), (b.value, middle)))
