@@ -14,7 +14,7 @@ from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new, marks_of, 
 from saltus.plots.drawing import drawing
 from saltus.plots.response import MARK_NAMES, MARKS, line_handles, line_style
 
-RESTS: dict[str, dict[str, Any]] = {"RL": {"marker": "p", "markersize": 3.0}, "CH": {"marker": "h", "markersize": 3.0}}
+RESTS: dict[str, dict[str, Any]] = {"RL": {"marker": "x", "markersize": 3.4}, "CH": {"marker": "+", "markersize": 4.4}}
 REST_NAMES = {"RL": "lost release (RL)", "CH": "end of a rest (CH)"}
 
 
