@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -56,9 +57,7 @@ class CellChain(LayeredCell):
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """Two for each cell, in the order of the coordinates."""
-        signs = (1, -1) * self.cells
-        names = zip(self.coordinates, signs, strict=True)
-        return tuple(Contact(name=name, coordinate=name, sign=sign, group=name.split("_")[1]) for name, sign in names)
+        return _contacts_at(self.coordinates)
 
     def cell(self) -> TwoLayer:
         """One cell by itself; its numbers may be symbols, which no checks could be made of."""
@@ -188,3 +187,9 @@ class FourCells(CellChain):
     cells: ClassVar[int] = 4
     coordinates: ClassVar[tuple[str, ...]] = _names(4)
     stops: ClassVar[tuple[str, ...]] = tuple(f"{name}_kinematic_limit" for name in _names(4))
+
+
+@cache
+def _contacts_at(coordinates: tuple[str, ...]) -> tuple[Contact, ...]:
+    names = zip(coordinates, (1, -1) * (len(coordinates) // 2), strict=True)
+    return tuple(Contact(name=name, coordinate=name, sign=sign, group=name.split("_")[1]) for name, sign in names)

@@ -16,6 +16,8 @@ from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import MarginKind
 from saltus.systems.signals import vanishes
 
+CONTACTS = (Contact(name="lower", coordinate="theta_1"), Contact(name="upper", coordinate="theta_2", sign=-1))
+
 
 @answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +69,7 @@ class TwoLayer(LayeredCell):
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """The lower layer's, theta_1 >= 0, and the upper layer's, theta_2 <= 0."""
-        return (Contact(name="lower", coordinate="theta_1"), Contact(name="upper", coordinate="theta_2", sign=-1))
+        return CONTACTS
 
     @property
     def contact(self) -> Any:

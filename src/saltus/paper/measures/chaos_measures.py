@@ -104,7 +104,7 @@ def _collision(panels: Panels) -> Measured:
         number = Counter(map(str, kinds[within]))
         known = sum(number[kind] for kind in EDGES if kind != "bound")
         rows.append({"load": load, "known": known, "unknown": number.total() - known, **{kind: number[kind] for kind in EDGES}})
-    shares = [share_interval(row["fold"] + row["crisis"], row["known"]) for row in rows]
+    shares = [share_interval(int(row["fold"] + row["crisis"]), int(row["known"])) for row in rows]
     most = all(low > CRITERIA.collisions for low, _ in shares)
     few = any(high < CRITERIA.collisions for _, high in shares)
     return measured(most if rows and most != few else None, panels=rows)
