@@ -75,6 +75,8 @@ class BranchEvents(OrbitEvents):
     functions: dict[str, UserFunction] = field(default_factory=dict)
     until: SpecialKind | None = None  # the kind of special point at which to end
     while_stable: bool = False  # whether to end beyond the loss of stability
+    # The last step that was asked for its cut: a step is accepted by it, and then cut by it.
+    last_cut: tuple[OrbitPoint, OrbitPoint, Cut | End | None] | None = None
 
     name = "branch"
     keeps_special = True  # so that a line through the points shows the fold
@@ -93,6 +95,11 @@ class BranchEvents(OrbitEvents):
 
     def cut(self, point: OrbitPoint, ahead: OrbitPoint) -> Cut | End | None:
         """The cut at a grazing, or where a release or a closing of one of several contacts appears or is lost."""
+        if self.last_cut is None or self.last_cut[0] is not point or self.last_cut[1] is not ahead:
+            self.last_cut = point, ahead, self._cut(point, ahead)
+        return self.last_cut[2]
+
+    def _cut(self, point: OrbitPoint, ahead: OrbitPoint) -> Cut | End | None:
         found = super().cut(point, ahead)
         if not isinstance(found, Cut) or found.special is None:
             return found
