@@ -116,10 +116,11 @@ class MotionEvents(Sequence[Event]):
     """The events of a motion in order of time, made one by one from the kernel's arrays."""
 
     def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray) -> None:
-        self._times, self._labels, self._values = times, labels, values
+        self.times = times  # (n,)
+        self._labels, self._values = labels, values
 
     def __len__(self) -> int:
-        return int(self._times.size)
+        return int(self.times.size)
 
     @overload
     def __getitem__(self, index: int) -> Event: ...
@@ -129,12 +130,12 @@ class MotionEvents(Sequence[Event]):
         return self._only(index) if isinstance(index, slice) else self._event(index)
 
     def _only(self, chosen: Any) -> Self:
-        return type(self)(self._times[chosen], self._labels[chosen], self._values[chosen])
+        return type(self)(self.times[chosen], self._labels[chosen], self._values[chosen])
 
     def _event(self, index: int) -> Any:
         kind, side = self._labels[index, 1:3]
         before, after = self._values[index, 1:].tolist()
-        return Event(float(self._times[index]), EVENT_KINDS[kind], int(side), before, after)
+        return Event(float(self.times[index]), EVENT_KINDS[kind], int(side), before, after)
 
     def __repr__(self) -> str:
         counts = {kind.value: int(np.sum(self._labels[:, 1] == i)) for i, kind in enumerate(EVENT_KINDS)}
@@ -143,11 +144,6 @@ class MotionEvents(Sequence[Event]):
     def of(self, kind: EventKind) -> Self:
         """The events of one kind."""
         return self._only(self._labels[:, 1] == EVENT_KINDS.index(kind))
-
-    @property
-    def times(self) -> np.ndarray:
-        """When they happen, (n,)."""
-        return self._times
 
     @property
     def codes(self) -> np.ndarray:
@@ -163,7 +159,7 @@ class MotionEvents(Sequence[Event]):
         """The impacts, as arrays."""
         impacts = self.of(EventKind.IMPACT)
         labels, values = impacts._labels, impacts._values
-        return Impacts(impacts._times, labels[:, 2].astype(np.int8), values[:, 1], values[:, 2])
+        return Impacts(impacts.times, labels[:, 2].astype(np.int8), values[:, 1], values[:, 2])
 
 
 @dataclass(frozen=True, eq=False)

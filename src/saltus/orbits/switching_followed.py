@@ -79,7 +79,7 @@ def change_at(zero: Zero, reference: OrbitPoint) -> Cut:
     other = next(_beside(zero.point, order), None)
     if other is None:
         kind: SpecialKind | None = SpecialKind.SW
-    elif _parts(other):
+    elif _is_discontinuous(other):
         kind = first_change(events_at(zero.point), events_of_equations(other))
     else:
         kind = kind_between(events_at(reference), events_of_equations(other))
@@ -131,7 +131,7 @@ def other_events(point: OrbitPoint, order: Order) -> OrbitPoint | End:
     """An orbit beside a point that has other events than these, with the direction away from it; or why there is none."""
     reason, detail = OrbitEnd.NO_OTHER_EVENTS, ""
     for equations in _beside(point, order):
-        if _parts(equations):
+        if _is_discontinuous(equations):
             reason, detail = OrbitEnd.NOT_CONTINUOUS, f"{np.abs(equations.residual).max():.3g}"
             continue
         curve = point.curve.with_problem(point.curve.problem)
@@ -150,8 +150,8 @@ def _leads_away(point: OrbitPoint, ahead: OrbitPoint, probe: float) -> bool:
     return point.curve.norm(chord) < 3.0 * probe and float(ahead.tangent @ (point.curve.weights**2 * chord)) > 0.0
 
 
-def _parts(equations: FollowedEquations) -> bool:
-    """Whether a motion all but beside an orbit ends up elsewhere."""
+def _is_discontinuous(equations: FollowedEquations) -> bool:
+    """Whether a motion that begins all but on an orbit ends away from it."""
     return bool(np.abs(equations.residual).max() > SETTINGS.jump)
 
 
@@ -161,7 +161,7 @@ def _beside(point: OrbitPoint, order: Order) -> Iterator[FollowedEquations]:
     for distance in SETTINGS.beside:
         for direction in (point.tangent, -point.tangent, *axes, *-axes):
             equations = point.curve.evaluate(point.place + distance * direction, thorough=True)
-            if equations is not None and (events_of_equations(equations).order != order or _parts(equations)):
+            if equations is not None and (events_of_equations(equations).order != order or _is_discontinuous(equations)):
                 yield equations
 
 

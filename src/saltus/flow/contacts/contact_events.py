@@ -33,12 +33,12 @@ class ContactEvents(MotionEvents):
         self._contacts, self._frictions, self._own = contacts, frictions, (values.shape[1] - 1 - len(contacts)) // 2
 
     def _only(self, chosen: Any) -> ContactEvents:
-        return ContactEvents(self._times[chosen], self._labels[chosen], self._values[chosen], self._contacts, self._frictions)
+        return ContactEvents(self.times[chosen], self._labels[chosen], self._values[chosen], self._contacts, self._frictions)
 
     def _event(self, index: int) -> ContactEvent:
         kind, bits = (int(x) for x in self._labels[index, 1:3])
         before, after, impulse = (tuple(x.tolist()) for x in self._parts(index))
-        return ContactEvent(float(self._times[index]), EVENT_KINDS[kind], self._called(bits), before, after, impulse)
+        return ContactEvent(float(self.times[index]), EVENT_KINDS[kind], self._called(bits), before, after, impulse)
 
     def _parts(self, index: Any) -> list[np.ndarray]:
         return np.split(self._values[index, 1:], [self._own, 2 * self._own], axis=-1)
@@ -51,4 +51,4 @@ class ContactEvents(MotionEvents):
         """The impacts, as arrays; `side` has the bits of the contacts that were hit, velocities are (n, coordinates)."""
         impacts = self.of(EventKind.IMPACT)
         before, after, _ = impacts._parts(slice(None))
-        return Impacts(impacts._times, impacts._labels[:, 2].astype(np.int16), before, after)
+        return Impacts(impacts.times, impacts._labels[:, 2].astype(np.int16), before, after)
