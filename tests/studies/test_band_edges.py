@@ -8,7 +8,7 @@ from shared_systems import forced
 
 from saltus import continue_orbit, find_orbit
 from saltus.orbits import SpecialKind, switch_branch
-from saltus.studies.diagram.band_edges import explained, seeds_of, turning_points
+from saltus.studies.diagram.band_edges import band_origins, explained, turning_points
 from saltus.studies.diagram.bands import EdgeKind
 from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.chaos_settings import SETTINGS
@@ -36,7 +36,7 @@ def bands(branches):
     system, settings = forced(0.2), replace(SETTINGS, step=0.02, fine_step=0.01, edge=2e-3)
     begun = simulate_from(system, FREQUENCY, np.repeat(values, 4), states, 300)
     search = BandSearch(DiagramWork(system, FREQUENCY), BOUNDS, settings)
-    search.look(begun, seeds_of(branches))
+    search.look(begun, band_origins(branches))
     return explained(system, search.bands, branches).bands
 
 

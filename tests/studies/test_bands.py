@@ -11,7 +11,7 @@ from saltus.attractors import Unsettled
 from saltus.flow import Outcome, find_recurrence
 from saltus.orbits import SpecialKind
 from saltus.studies import chaotic_bands
-from saltus.studies.diagram.band_edges import seeds_of
+from saltus.studies.diagram.band_edges import band_origins
 from saltus.studies.diagram.bands import Band, Edge, EdgeKind, band_dataset
 from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.chaos_settings import SETTINGS
@@ -63,7 +63,7 @@ def test_a_cascade_of_long_periods_is_followed_to_its_chaos_beside_another_attra
     search = BandSearch(DiagramWork(system, FREQUENCY), bounds, settings)
     search.look(simulate_from(system, FREQUENCY, np.linspace(*bounds, 5), np.zeros((5, 2)), COARSE.settling))
     assert not search.bands.bands
-    search.look(search.further[0].only(slice(0)), seeds_of([family]))
+    search.look(search.further[0].only(slice(0)), band_origins([family]))
     inside = np.array([any(value in band for band in search.bands.bands) for value in (3.8035, 3.809)])
     assert inside.tolist() == [False, True]
     states = np.random.default_rng(2).uniform(-4.0, 4.0, (40, 2))

@@ -11,7 +11,7 @@ from saltus.attractors import Unsettled
 from saltus.flow import Motion, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, is_symmetric
 from saltus.studies.diagram.bands import Band, Bands, Edge, EdgeKind
-from saltus.studies.diagram.chaos_search import Seed
+from saltus.studies.diagram.chaos_search import BandOrigin
 from saltus.systems import System, image_of
 
 
@@ -151,10 +151,10 @@ def _turns(branch: Branch, special: SpecialPoint) -> bool:
     return bool(beside.any()) and not (len(beside) == 2 and bool(beside.all()))
 
 
-def seeds_of(branches: Sequence[Branch]) -> list[Seed]:
+def band_origins(branches: Sequence[Branch]) -> list[BandOrigin]:
     """The special points of branches at which narrow bands may begin, as `BandSearch` takes them."""
     return [
-        Seed(str(special.kind), special.parameter, tuple(special.orbit.section_state.tolist()))
+        BandOrigin(str(special.kind), special.parameter, tuple(special.orbit.section_state.tolist()))
         for special in turning_points(branches)
     ]
 

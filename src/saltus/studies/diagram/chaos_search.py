@@ -24,7 +24,7 @@ from saltus.systems import System
 from saltus.window import Box, check_window
 
 
-class Seed(NamedTuple):
+class BandOrigin(NamedTuple):
     """A special point of a branch, at which bands of chaos may begin."""
 
     kind: str
@@ -58,7 +58,7 @@ def chaotic_bands(
     starts: int = 8,
     window: Box | None = None,
     seed: int = 0,
-    special: Iterable[Seed] = (),
+    special: Iterable[BandOrigin] = (),
     progress: Progress = silent,
 ) -> Bands:
     """Where motions are chaotic along a parameter, first from `starts` states at each of `count` values.
@@ -115,19 +115,19 @@ class BandSearch:
     work: DiagramWork
     bounds: tuple[float, float]
     settings: ChaosSettings = SETTINGS
-    special: list[Seed] = field(default_factory=list)  # by value
+    special: list[BandOrigin] = field(default_factory=list)  # by value
     places: list[SearchedValue] = field(default_factory=list)  # by value
     further: list[SimulatedMotions] = field(default_factory=list)
     # Pairs of neighbouring values: motions were begun at the second one on the chaos of the first one.
     carried: set[tuple[float, float]] = field(default_factory=set)
 
-    def look(self, begun: SimulatedMotions, special: Iterable[Seed] = (), progress: Progress = silent) -> SimulatedMotions:
+    def look(self, begun: SimulatedMotions, special: Iterable[BandOrigin] = (), progress: Progress = silent) -> SimulatedMotions:
         """Look where these motions and special points are, which it has not seen; returns the motions that it has begun."""
-        known, fresh = len(self.further), list[Seed]()
-        for seed in special:
-            if not any(self._is_same(seed, other) for other in (*self.special, *fresh)):
-                fresh.append(seed)
-        self.special = sorted([*self.special, *fresh], key=lambda seed: seed.value)
+        known, fresh = len(self.further), list[BandOrigin]()
+        for origin in special:
+            if not any(self._is_same(origin, other) for other in (*self.special, *fresh)):
+                fresh.append(origin)
+        self.special = sorted([*self.special, *fresh], key=lambda origin: origin.value)
         self.take(begun)
         self.spread()
         self.beside_special_points(fresh)
@@ -139,7 +139,7 @@ class BandSearch:
         further = self.further[known + 1 :]
         return further[0].joined(*further[1:]) if further else begun.only(slice(0))
 
-    def _is_same(self, one: Seed, other: Seed) -> bool:
+    def _is_same(self, one: BandOrigin, other: BandOrigin) -> bool:
         """Whether two special points are one: that of a branch is found again on the one that is born at it."""
         near = self.settings.same * self.span
         return abs(one.value - other.value) <= near and np.allclose(one.state, other.state, rtol=0.0, atol=self.settings.same)
@@ -210,9 +210,9 @@ class BandSearch:
             self.carried.update((a.value, b.value) for a, b in fresh)
             self.follow([b.value for _, b in fresh], [a.starts(self.settings.seeds, 0) for a, _ in fresh])
 
-    def beside_special_points(self, special: Sequence[Seed]) -> None:
+    def beside_special_points(self, special: Sequence[BandOrigin]) -> None:
         """Begin motions on the orbits of special points at values beside these."""
-        values = [(seed.value + share * self.span, seed.state) for seed in special for share in self.settings.beside]
+        values = [(origin.value + share * self.span, origin.state) for origin in special for share in self.settings.beside]
         inside = [(value, state) for value, state in values if self.bounds[0] <= value <= self.bounds[1]]
         self.follow([value for value, _ in inside], [np.array([state]) for _, state in inside])
 
@@ -228,7 +228,7 @@ class BandSearch:
         if width <= self.settings.step:
             near_chaos = not (a.chaotic and b.chaotic) and max(a.longest, b.longest) > self.settings.long_period
             return near_chaos and width > self.settings.fine_step
-        inside = bisect_left(self.special, a.value, key=lambda seed: seed.value)
+        inside = bisect_left(self.special, a.value, key=lambda origin: origin.value)
         special = inside < len(self.special) and self.special[inside].value <= b.value
         return special or a.kinds != b.kinds or bool(len(a.chaos) + len(b.chaos))
 

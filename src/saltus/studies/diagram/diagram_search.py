@@ -13,7 +13,7 @@ from saltus.flow import motions_from, stroboscopic
 from saltus.orbits import PeriodicOrbit, keeps_symmetry, orbits_near_returns, solved_near, within_window
 from saltus.progress import Progress, silent
 from saltus.studies.diagram.attractors_found import LONG, AttractorsFound, Place
-from saltus.studies.diagram.band_edges import seeds_of
+from saltus.studies.diagram.band_edges import band_origins
 from saltus.studies.diagram.bands import Bands
 from saltus.studies.diagram.branch_set import BranchSet
 from saltus.studies.diagram.chaos_search import BandSearch
@@ -232,7 +232,7 @@ class DiagramSearch:
     def _add_bands(self, begun: SimulatedMotions, progress: Progress = silent) -> None:
         """Look for bands where motions are, and beside the special points of branches that are new since the last time."""
         if self.band_search is not None:
-            self.found.add(self.band_search.look(begun, seeds_of(self.branches.branches), progress))
+            self.found.add(self.band_search.look(begun, band_origins(self.branches.branches), progress))
             self.chaos = self.band_search.bands
             self.follow(silent)
 
