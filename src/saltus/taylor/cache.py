@@ -149,9 +149,11 @@ def load_module(kind: str, text: str) -> ModuleType:
     with _loading:
         if name not in sys.modules:
             path = cache_directory() / f"{name.removeprefix('saltus_')}.py"
-            if not _holds(path, text):
-                _write(path, text)
-            with contextlib.nullcontext() if is_compiled(name) else _alone(path):
+            with contextlib.nullcontext() if _holds(path, text) and is_compiled(name) else _alone(path):
+                if not _holds(path, text):
+                    if path.exists():
+                        log.warning("%s is damaged; it is written again", path)
+                    _write(path, text)
                 _execute(name, path, text)
         return sys.modules[name]
 
@@ -159,21 +161,18 @@ def load_module(kind: str, text: str) -> ModuleType:
 @contextlib.contextmanager
 def _alone(path: Path) -> Iterator[None]:
     """Let other processes that want the same source wait, and load what this one has compiled; they compile it too where files
-    cannot be locked."""
-    with path.open("rb") as file:
+    cannot be locked. The lock is on a file beside the source, which is never replaced as the source is."""
+    with path.with_suffix(".lock").open("ab") as file:
         lock(file, wait=True)
         yield
 
 
 def _holds(path: Path, text: str) -> bool:
-    """Whether a file has this text; what has another is remarked."""
+    """Whether a file has this text."""
     try:
-        same = path.is_file() and path.read_bytes() == text.encode()
+        return path.is_file() and path.read_bytes() == text.encode()
     except OSError:
-        same = False
-    if not same and path.exists():
-        log.warning("%s is damaged; it is written again", path)
-    return same
+        return False
 
 
 def _execute(name: str, path: Path, text: str) -> None:
