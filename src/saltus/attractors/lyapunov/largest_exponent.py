@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import stdtrit
 
 from saltus.attractors.lyapunov.averages import resolution
-from saltus.flow import Stop, last_states, motions_from, stop_names
+from saltus.attractors.lyapunov.neighbours import SETTINGS, Neighbours
+from saltus.attractors.lyapunov.stretching import stretched
+from saltus.flow import motions_from
 from saltus.systems import System
 
 FEWEST = 4  # motions of which a scatter is taken
@@ -25,22 +27,38 @@ class Largest:
     positive: np.ndarray  # (groups,): whether it is above its error and the resolution
     negative: np.ndarray  # (groups,): whether it is below them
 
+    @classmethod
+    def unknown(cls, groups: int) -> Largest:
+        """Of so many groups nothing."""
+        return cls(*np.full((2, groups), np.nan), *np.zeros((2, groups), dtype=bool))
+
+    @property
+    def open_rows(self) -> np.ndarray:
+        """The numbers of the groups whose sign is not known."""
+        return np.flatnonzero(~self.positive & ~self.negative)
+
+    def put(self, rows: np.ndarray, other: Largest) -> None:
+        """Put what is now known of these groups in its place."""
+        for name in ("exponent", "error", "positive", "negative"):
+            getattr(self, name)[rows] = getattr(other, name)
+
 
 def largest_exponents(
     system: System,
     states: np.ndarray,
     parameters: Mapping[str, np.ndarray],
     *,
-    periods: int,
+    runs: Sequence[int],
     tol: float = 1e-10,
 ) -> Largest:
-    """The largest exponent of each group of motions from states (groups, size, d) at phase 0, over so many forcing periods.
+    """The largest exponent of each group of motions from states (groups, size, d) at phase 0, by ever longer runs.
 
-    The motions of a group are taken for independent samples of one attractor, so that their scatter gives the error, by Student's
-    t. Motions that are lost are left out, and so are those whose perturbations surely shrink where others surely grow. A
-    perturbation is given a quarter of the periods to turn to the direction that grows. The derivatives of the end to the start,
-    through impacts, are those of `simulate_many`: along that direction they are accurate however far it grows. A perturbation
-    of which closed contacts and sticking frictions leave nothing has shrunk by as much as a number can.
+    A group goes on to the next run as long as its sign is open. The motions of a group are taken for independent samples of one
+    attractor, so that their scatter gives the error, by Student's t. Motions that are lost are left out, and so are those whose
+    perturbations surely shrink where others surely grow. A perturbation is given a quarter of a run to turn to the direction that
+    grows. Its growth is that of `simulate_many`'s derivatives, of which each run takes its own: along that direction they are
+    accurate however far it grows. Where contacts hold single coordinates and impacts are many, as those are that die away, it is
+    the parting of two neighbouring motions (`Neighbours`); a run then goes on from the one before, and is twice as long.
 
     The resolution is 2 ln(t) / t for the time t of one motion, as regular ones may part like t^2.
 
@@ -48,45 +66,63 @@ def largest_exponents(
     ----------
     parameters
         Numbers by dotted path, (groups,) each, in place of the system's.
+    runs
+        The forcing periods of each run, increasing.
     """
-    groups, size = states.shape[:2]
+    groups = len(states)
     frequency = parameters.get("load.frequency", np.array(system.load.frequency, dtype=float))
-    duration = periods * 2.0 * math.pi / np.broadcast_to(frequency, groups)
+    lengths, found = np.broadcast_to(2.0 * math.pi / frequency, groups), Largest.unknown(groups)
+    many = _have_many_impacts(system, states, parameters, runs[0] // 4, tol)
+    for rows, measured in ((many, _by_neighbours), (~many, _by_derivatives)):
+        if rows.any():
+            columns = {path: values[rows] for path, values in parameters.items()}
+            found.put(np.flatnonzero(rows), measured(system, states[rows], columns, lengths[rows], runs, tol))
+    return found
+
+
+def _have_many_impacts(
+    system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray], periods: int, tol: float
+) -> np.ndarray:
+    """Of which groups of motions neighbours are followed sooner than derivatives are, (groups,)."""
+    groups, size, d = states.shape
+    if not system.model.contacts:
+        return np.zeros(groups, dtype=bool)
     columns = {path: np.repeat(values, size) for path, values in parameters.items()}
-    d = states.shape[-1]
-    begin, direction = states.reshape(-1, d), np.full((groups * size, d), math.sqrt(1.0 / d))
-    begin, direction, _ = _stretched(system, begin, direction, columns, max(1, periods // 4), tol)
-    _, _, growth = _stretched(system, begin, direction, columns, periods, tol)
-    return _averaged(growth.reshape(groups, size) / duration[:, None], resolution(duration))
+    ends = motions_from(system, states.reshape(-1, d), parameters=columns, periods=periods, sample=(), tol=tol)
+    return np.asarray(ends["impact_count"].values.reshape(groups, size).mean(axis=1) > SETTINGS.many_impacts * periods)
 
 
-def _stretched(
-    system: System, states: np.ndarray, direction: np.ndarray, columns: dict[str, np.ndarray], periods: int, tol: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States, directions and ln of the growth of small perturbations after so many periods; nan where a motion is lost."""
-    here = np.isfinite(states).all(axis=1)
-    later, turned, growth = np.full_like(states, np.nan), np.full_like(states, np.nan), np.full(len(states), np.nan)
-    if not here.any():
-        return later, turned, growth
-    chosen = {path: values[here] for path, values in columns.items()}
-    options = {"parameters": chosen, "periods": periods, "sensitivities": (), "sample": (), "until": ("rest",), "tol": tol}
-    ends = motions_from(system, states[here], **options)
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        grown = np.einsum("nij,nj->ni", ends["derivative"].values, direction[here])
-        size = np.abs(grown).max(axis=1, keepdims=True)  # squares of what has grown by 1e200 are no numbers
-        length = size[:, 0] * np.linalg.norm(grown / np.where(size > 0.0, size, 1.0), axis=1)
-        # What is captured at rest would have to be followed through all of its impacts, of which there are millions.
-        moving = (ends["side"].values != 0) & (stop_names(ends) != Stop.CAPTURED)
-        gone = length == 0.0 if system.model.held else np.zeros(length.shape, dtype=bool)
-        going = moving & np.isfinite(length) & ((length > 0.0) | gone)
-        growth[here] = np.where(going, np.log(np.maximum(length, np.finfo(float).tiny)), np.nan)
-        turned[here] = np.where(gone[:, None], direction[here], grown / length[:, None])
-    later[here] = np.where(going[:, None], last_states(system, ends), np.nan)
-    return later, turned, growth
+def _by_neighbours(
+    system: System, states: np.ndarray, columns: dict[str, np.ndarray], lengths: np.ndarray, runs: Sequence[int], tol: float
+) -> Largest:
+    """The exponents of groups from one run that is doubled as long as their signs are open."""
+    neighbours, found = Neighbours(system, states, columns, lengths, runs[0] // 4, tol), Largest.unknown(len(states))
+    doubled = [runs[0] * 2**i for i in range(math.ceil(math.log2(runs[-1] / runs[0])))]
+    for periods in (*doubled, runs[-1]):
+        if (rows := found.open_rows).size:
+            found.put(rows, _averaged(*neighbours.rates(rows, periods)))
+    return found
 
 
-def _averaged(rates: np.ndarray, least: np.ndarray) -> Largest:
-    """The averages of rates (groups, size), of which those below `least` (groups,) count as 0."""
+def _by_derivatives(
+    system: System, states: np.ndarray, columns: dict[str, np.ndarray], lengths: np.ndarray, runs: Sequence[int], tol: float
+) -> Largest:
+    """The exponents of groups from a run of its own after another, as long as their signs are open."""
+    found, (size, d) = Largest.unknown(len(states)), states.shape[1:]
+    for periods in runs:
+        if (rows := found.open_rows).size:
+            every = {path: np.repeat(values[rows], size) for path, values in columns.items()}
+            begin = states[rows].reshape(-1, d)
+            direction = np.full_like(begin, math.sqrt(1.0 / d))
+            begin, direction, _ = stretched(system, begin, direction, every, max(1, periods // 4), tol)
+            growth = stretched(system, begin, direction, every, periods, tol)[2].reshape(-1, size)
+            found.put(rows, _averaged(growth / (periods * lengths[rows])[:, None], periods * lengths[rows]))
+    return found
+
+
+def _averaged(rates: np.ndarray, duration: np.ndarray) -> Largest:
+    """The averages of rates (groups, size) over these times, (groups,); those below the resolution count as 0."""
+    least = resolution(duration)
     surely = np.abs(rates) > least[:, None]
     grows, shrinks = surely & (rates > 0.0), surely & (rates < 0.0)
     counted = np.isfinite(rates) & ~(shrinks & grows.any(axis=1)[:, None])

@@ -263,14 +263,12 @@ class _Judgement:
         """The exponents of some survivors, by ever longer runs as long as these leave open whether they are positive."""
         count = min(self.settings.measured, self.settings.companions)
         chosen = np.linspace(0, self.settings.companions - 1, count).astype(int)
-        for periods in self.settings.runs:
-            rows = np.flatnonzero(self.open & ~self.positive & ~self.negative)
-            if not rows.size:
-                return
-            columns = {path: values[rows] for path, values in self.parameters.items()}
-            found = largest_exponents(self.system, self.states[rows][:, chosen], columns, periods=periods, tol=self.settings.tol)
-            for name in ("exponent", "error", "positive", "negative"):
-                getattr(self, name)[rows] = getattr(found, name)
+        rows = np.flatnonzero(self.open)
+        columns = {path: values[rows] for path, values in self.parameters.items()}
+        given = self.states[rows][:, chosen]
+        found = largest_exponents(self.system, given, columns, runs=self.settings.runs, tol=self.settings.tol)
+        for name in ("exponent", "error", "positive", "negative"):
+            getattr(self, name)[rows] = getattr(found, name)
 
     def look_for_long_periods(self) -> None:
         """Follow what is not surely chaotic, and has not settled, until it does: near bifurcations exponents are near 0."""

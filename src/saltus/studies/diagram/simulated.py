@@ -28,6 +28,10 @@ class SimulationSettings:
     # An unsettled motion is slow and no chaos if it comes back so near to where it was, relative to the size of the motion.
     slow: float = 1e-2
     patience: int = 8  # Slow motions are followed for so many times the forcing periods of the others.
+    # With several contacts or frictions chaos comes back so near, too, and its impacts take long to follow: there this is done in
+    # rounds as long as the first one, as long as each of them brings a motion nearer to itself by this factor. What does not can
+    # hardly settle in the time that is left.
+    nearer: float = 0.3
     still: float = 1e-6  # A motion that stays this near to the contact is at rest.
     tol: float = 1e-11  # The error of a step: a tenth of what the lanes ask of states that are the same.
 
@@ -124,8 +128,13 @@ def simulate_from(
     follow = follow or partial(followed, system, path)
     found = follow(values, states, periods, progress)
     slow = np.flatnonzero(found.unsettled & _is_slow(found))
-    if slow.size:
-        found.gone_on(slow, follow(values[slow], found.last[slow], SETTINGS.patience * periods, silent))
+    rounds = SETTINGS.patience if system.model.held else 1
+    for _ in range(rounds):
+        if slow.size:
+            before = _return_distance(found.only(slow))
+            found.gone_on(slow, follow(values[slow], found.last[slow], SETTINGS.patience * periods // rounds, silent))
+            later = found.only(slow)
+            slow = slow[later.unsettled & (_return_distance(later) <= SETTINGS.nearer * before)]
     return found
 
 
@@ -172,7 +181,11 @@ def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedM
     )
 
 
+def _return_distance(motions: SimulatedMotions) -> np.ndarray:
+    """How near motions come back to where they were, (n,); inf where that is not known."""
+    return np.asarray(np.nan_to_num(return_distances(motions.states, SETTINGS.max_period).min(axis=1), nan=np.inf))
+
+
 def _is_slow(motions: SimulatedMotions) -> np.ndarray:
     """Which motions come back near to where they were, (n,)."""
-    distance = return_distances(motions.states, SETTINGS.max_period).min(axis=1)
-    return np.asarray(np.nan_to_num(distance, nan=np.inf) <= SETTINGS.slow * np.maximum(motions.amplitude, SETTINGS.still))
+    return np.asarray(_return_distance(motions) <= SETTINGS.slow * np.maximum(motions.amplitude, SETTINGS.still))

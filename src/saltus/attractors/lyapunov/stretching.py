@@ -1,0 +1,38 @@
+"""How much small perturbations of many motions grow, by the derivatives of their ends to their starts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from saltus.flow import Stop, last_states, motions_from, stop_names
+from saltus.systems import System
+
+
+def stretched(
+    system: System, states: np.ndarray, direction: np.ndarray, columns: Mapping[str, np.ndarray], periods: int, tol: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """States, directions and ln of the growth of small perturbations after so many periods; nan where a motion is lost.
+
+    A perturbation of which closed contacts and sticking frictions leave nothing has shrunk by as much as a number can.
+    """
+    here = np.isfinite(states).all(axis=1)
+    later, turned, growth = np.full_like(states, np.nan), np.full_like(states, np.nan), np.full(len(states), np.nan)
+    if not here.any():
+        return later, turned, growth
+    chosen = {path: values[here] for path, values in columns.items()}
+    options = {"parameters": chosen, "periods": periods, "sensitivities": (), "sample": (), "until": ("rest",), "tol": tol}
+    ends = motions_from(system, states[here], **options)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        grown = np.einsum("nij,nj->ni", ends["derivative"].values, direction[here])
+        size = np.abs(grown).max(axis=1, keepdims=True)  # squares of what has grown by 1e200 are no numbers
+        length = size[:, 0] * np.linalg.norm(grown / np.where(size > 0.0, size, 1.0), axis=1)
+        # What is captured at rest would have to be followed through all of its impacts, of which there are millions.
+        moving = (ends["side"].values != 0) & (stop_names(ends) != Stop.CAPTURED)
+        gone = length == 0.0 if system.model.held else np.zeros(length.shape, dtype=bool)
+        going = moving & np.isfinite(length) & ((length > 0.0) | gone)
+        growth[here] = np.where(going, np.log(np.maximum(length, np.finfo(float).tiny)), np.nan)
+        turned[here] = np.where(gone[:, None], direction[here], grown / length[:, None])
+    later[here] = np.where(going[:, None], last_states(system, ends), np.nan)
+    return later, turned, growth

@@ -1,0 +1,61 @@
+"""Exponents from pairs of neighbouring motions, beside derivatives and multipliers."""
+
+import math
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.attractors.lyapunov.largest_exponent import largest_exponents
+from saltus.attractors.lyapunov.neighbours import SETTINGS, Neighbours
+from saltus.attractors.lyapunov.stretching import stretched
+from saltus.flow import find_recurrence
+from saltus.systems import Harmonic, Load, NewtonImpact, System, TwoLayer
+
+
+def layers(amplitude, frequency=1.0, damping=0.1, **law):
+    return System(
+        model=TwoLayer(beta0=math.radians(80), damping=damping, mass_ratio=0.1),
+        load=Load(frequency=frequency, vertical=-0.5, horizontal=Harmonic(amplitude=amplitude)),
+        impact=NewtonImpact(**law),
+    )
+
+
+DYING = layers(1.0, 1.02, e=0.5)  # chaos whose impacts die away: 50 of them in a forcing period
+
+
+def states_of(system, count):
+    """States (count, 4) of motions that have gone on for 60 forcing periods."""
+    begin = np.array([[0.1 * (i + 1), -0.05 * i, 0.0, -0.1] for i in range(count)])
+    return find_recurrence(system, begin, 60, kept=1, stop_early=False).last
+
+
+def test_neighbours_part_as_the_derivatives_say_through_impacts_that_die_away():
+    """Over the same 12 periods from the same states, after the same four in which they turn to the direction that grows."""
+    states, lengths = states_of(DYING, 5), np.array([DYING.load.period])
+    rates, time = Neighbours(DYING, states[None], {}, lengths, 4, 1e-11).rates(np.array([0]), 12)
+    begin, direction, _ = stretched(DYING, states, np.full_like(states, 0.5), {}, 4, 1e-11)
+    growth = stretched(DYING, begin, direction, {}, 12, 1e-11)[2]
+    assert time[0] == 12 * lengths[0]
+    np.testing.assert_allclose(rates[0], growth / time[0], rtol=0, atol=2e-4)
+
+
+@pytest.mark.parametrize(("damping", "together"), [(0.1, False), (1.0, True)])
+def test_the_exponent_of_an_orbit_is_that_of_its_multiplier_also_where_neighbours_become_one(damping, together):
+    """With much damping these pairs come nearer in four periods than two motions can tell."""
+    orbit = saltus.find_orbit(layers(2.0, damping=damping, e=0.0), theta_1=0.1, theta_2=0.0)
+    expected = math.log(abs(orbit.multipliers[0])) / orbit.duration
+    assert (4 * orbit.duration * expected < math.log(SETTINGS.least)) == together
+    begin = np.repeat(np.concatenate(orbit.section_state[None, None]), 4, axis=0)[None]
+    rates, _ = Neighbours(orbit.system, begin, {}, np.array([orbit.duration]), 32, 1e-12).rates(np.array([0]), 16)
+    np.testing.assert_allclose(rates[0], expected, rtol=0, atol=1e-4)
+
+
+def test_an_exponent_does_not_depend_on_what_else_is_asked():
+    """A group alone and beside one of another frequency, whose pairs are brought together after other times."""
+    states = np.stack([states_of(DYING, 4)] * 2)
+    frequencies = np.array([1.02, 0.61])
+    both = largest_exponents(DYING, states, {"load.frequency": frequencies}, runs=(16, 64))
+    alone = largest_exponents(DYING, states[:1], {"load.frequency": frequencies[:1]}, runs=(16, 64))
+    assert alone.exponent[0] == both.exponent[0]
+    assert np.isfinite(both.exponent).all()
