@@ -19,6 +19,9 @@ class EquationCurve(Curve[P]):
 
     iterations = 7  # of Newton's method in a hyperplane: where it takes more the step is too long
     iterations_at = 12  # and at a fixed number, where the guess may be farther away
+    stray: float = (
+        math.inf
+    )  # Share of a step: a corrector that leads farther than this from where a step was predicted is given up.
 
     @abstractmethod
     def evaluate(self, place: np.ndarray, thorough: bool) -> Evaluation | None:
@@ -29,12 +32,19 @@ class EquationCurve(Curve[P]):
         """A solution as a point."""
 
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
+        return self.solve_within(guess, direction, math.inf)
+
+    def solve_within(self, guess: np.ndarray, direction: np.ndarray, reach: float) -> P | None:
+        """`solve`, given up where Newton's method leads farther than `reach` from the guess."""
         normal = direction * self.weights**2
+
+        def evaluate(place: np.ndarray, thorough: bool) -> Evaluation | None:
+            return self.evaluate(place, thorough) if self.norm(place - guess) <= reach else None
 
         def linear(found: Evaluation, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return bordered(found.derivatives(), normal), -bordered(found.residual, normal @ (place - guess))
 
-        found = newton(self.evaluate, linear, guess, self.iterations)
+        found = newton(evaluate, linear, guess, self.iterations)
         return None if found is None else self.with_tangent(found, direction)
 
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
@@ -83,7 +93,8 @@ class EquationCurve(Curve[P]):
     def advance(self, before: P | None, point: P, step: float) -> P | None:
         """The point a step further; None where Newton's method does not converge or leads away from what was predicted."""
         guess = predicted(before, point, step)
-        ahead = self.solve(guess, point.tangent)
+        within = self.stray * step
+        ahead = self.solve(guess, point.tangent) if within == math.inf else self.solve_within(guess, point.tangent, within)
         straight = before is None or not before.curve.joins(point.curve)
         off = STEPS.off_tangent if straight else STEPS.off
         return None if ahead is None or self.norm(ahead.place - guess) >= off * step else ahead

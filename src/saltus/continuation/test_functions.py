@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +21,8 @@ class LocationSettings:
     rounding: float = 4e-15  # The narrowest bracket that is asked for, in which a few places differ by their rounding.
     slow: int = 3  # After so many points that have not halved the bracket the next one is its middle.
     overshoot: float = 0.5  # Share of the wanted width by which a point is put beyond the zero, so that it closes the bracket.
+    unsure: float = 0.1  # Share of the way to a zero by which it is unsure that two values before it alone tell.
+    halvings: int = 60  # Of the interval in which the zero of a power lies: to rounding.
     nodes: int = 4  # Nearest points through which the inverse interpolation goes.
     apart: float = 0.5  # Share of the distance of an end to a singular zero at which a further point is solved for.
     near: float = 0.3  # Share of the distance of its neighbours by which a point may lie off the cubic through them.
@@ -38,6 +41,7 @@ class TestFunction:
     decisive: bool = False  # whether the count of `Events.outside` changes at its zeros
     guides: bool = False  # whether it is smooth, so that a step is taken again, shorter, in which it changes unexpectedly
     singular: bool = False  # whether the equations are singular at its zeros, so that points beside them cannot be solved for
+    one_sided: bool = False  # whether it tells only on the side of the first point, as a power of the distance, where its zero is
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,8 @@ def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero 
         return None
     widths = [1.0]
     at_share = _interpolated(test, known) if singular else lambda share: _solved(known, share)
-    while (share := _next_share(known, before, test.width, widths)) is not None:
+    following = _next_share_from_one_side if test.one_sided else _next_share
+    while (share := following(known, before, test.width, widths)) is not None:
         point = at_share(share)
         if point is None or not np.isfinite(value := test.value(point)):
             return None
@@ -97,6 +102,51 @@ def _next_share(known: list[KnownPlace], before: float, width: float, widths: li
     guess += beyond if guess - low < high - guess else -beyond  # towards the farther end, so that it is drawn near as well
     guess = min(max(guess, low + beyond), high - beyond)
     return guess if low < guess < high else middle if low < middle < high else None
+
+
+def _next_share_from_one_side(known: list[KnownPlace], before: float, width: float, widths: list[float]) -> float | None:
+    """The same where only the values before the zero tell where it is: just beyond that, or, once that is known, before it."""
+    i = _bracket(known, before) if before != 0.0 else 0
+    low, high = known[i].share, known[i + 1].share
+    width = max(width, SETTINGS.rounding)
+    widths.append(high - low)
+    if high - low <= width or known[i].value == 0.0 or len(widths) > SETTINGS.most_points:
+        return None
+    middle = 0.5 * (low + high)
+    slow = len(widths) > SETTINGS.slow + 1 and widths[-1] > 0.5 * widths[-1 - SETTINGS.slow]
+    if i == 0 or slow:
+        return middle if low < middle < high else None
+    guess, unsure = _extrapolated(known[max(0, i - 3) : i + 1], high)
+    unsure = max(unsure, SETTINGS.overshoot * width)
+    if not low < guess < high:
+        return middle if low < middle < high else None
+    beyond = guess + unsure
+    share = beyond if beyond < low + 0.5 * (high - low) or high - guess > 3.0 * unsure else guess - unsure
+    return share if low < share < high else middle if low < middle < high else None
+
+
+def _extrapolated(places: list[KnownPlace], high: float) -> tuple[float, float]:
+    """Where a function that is about a power of the distance to its zero is 0, from places before, and how unsure that is."""
+    last = places[-1].share
+    if len(places) < 3 or (zero := _zero_of_power(places[-3:], high)) is None:
+        guess = _inverse([place.share for place in places[-2:]], [place.value for place in places[-2:]])
+        return guess, SETTINGS.unsure * abs(guess - last)
+    before = _zero_of_power(places[-4:-1], high) if len(places) > 3 else None
+    return zero, SETTINGS.unsure * (zero - last) if before is None else min(abs(zero - before), SETTINGS.unsure * (zero - last))
+
+
+def _zero_of_power(places: list[KnownPlace], high: float) -> float | None:
+    """The zero before `high` of a power of the distance to it through three places; None where they are not on such a one."""
+    shares, values = [place.share for place in places], [abs(place.value) for place in places]
+    if not values[0] > values[1] > values[2] > 0.0:
+        return None
+    steeper = math.log(values[0] / values[1]) / math.log(values[1] / values[2])
+    low, top = shares[-1], high
+    for _ in range(SETTINGS.halvings):  # the exponents between the first two and the last two places are equal at the zero
+        zero = 0.5 * (low + top)
+        first, second, third = (math.log(max(zero - share, 1e-300)) for share in shares)
+        low, top = (low, zero) if first - second > steeper * (second - third) else (zero, top)
+    return zero
 
 
 def _inverse(shares: list[float], values: list[float]) -> float:

@@ -29,10 +29,11 @@ from .recurrence import (
     return_period,
 )
 from .regularity import ContactRegularity, contact_regularity
-from .sensitivity import Sensitivities, sensitivities, state_rates
+from .request import MotionRequest
+from .sensitivity import Sensitivities, derivatives_of, sensitivities, state_rates
 from .simulation import simulate
 from .stops import Stop
-from .structures import limits_of, program, taylor_order
+from .structures import Program, limits_of, program, taylor_order
 from .validity import Validity
 
 __all__ = [
@@ -49,7 +50,9 @@ __all__ = [
     "Jobs",
     "Lanes",
     "Motion",
+    "MotionRequest",
     "Outcome",
+    "Program",
     "Recurrence",
     "RecurrenceSettings",
     "Release",
@@ -67,6 +70,7 @@ __all__ = [
     "compiled_lanes",
     "contact_pull",
     "contact_regularity",
+    "derivatives_of",
     "extrema_names",
     "find_recurrence",
     "last_states",

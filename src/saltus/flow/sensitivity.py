@@ -18,6 +18,7 @@ from saltus.flow.motion_dataset import state_names
 from saltus.flow.request import MotionRequest
 from saltus.flow.simulation import Followed, follow
 from saltus.flow.stops import Stop
+from saltus.flow.structures import Program
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
 from saltus.result import Result, result_dataset
@@ -169,9 +170,16 @@ def sensitivities(
         dense=dense,
         sensitivities=paths,
     )
-    followed = follow(request, progress)
-    motion, n = followed.motion, len(system.model.coordinates)
-    columns = followed.columns + np.outer(state_rates(motion), _end_shift(followed, paths, periods))
+    return derivatives_of(request, None, progress)
+
+
+def derivatives_of(request: MotionRequest, run: Program | None, progress: Progress = silent) -> Sensitivities:
+    """`sensitivities` of a request, with its program if that is known."""
+    followed, paths = follow(request, progress, run), request.sensitivities or ()
+    motion, n = followed.motion, len(request.system.model.coordinates)
+    shift, columns = _end_shift(followed, paths, request.periods), followed.columns
+    if shift.any():
+        columns = columns + np.outer(state_rates(motion), shift)
     return Sensitivities(
         motion=motion,
         state=columns[:, : 2 * n],

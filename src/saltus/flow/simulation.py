@@ -104,9 +104,9 @@ class Followed:
     shifts: np.ndarray  # (events, columns): how the time of each event moves
 
 
-def follow(request: MotionRequest, progress: Progress) -> Followed:
-    """`simulate`, and its tangent if the request asks for it."""
-    run = program(request.system, request.limits, request.sensitivities)
+def follow(request: MotionRequest, progress: Progress, run: Program | None = None) -> Followed:
+    """`simulate`, and its tangent if the request asks for it, with the request's program if that is known."""
+    run = run or program(request.system, request.limits, request.sensitivities)
     now = (ContactState if request.system.model.held else KernelState).at_start(request, run)
     recorder = Recorder(request, int(now.where[Where.ORDER]), int(now.where[Where.COLUMNS]))
     status = _advance(request.system, run, now, recorder, progress)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,11 @@ class Program:
     env: tuple[Any, ...]  # parameters, constants, record breakpoints, record table
     model: tuple[Any, ...]  # the structure's functions and the geometry of its contact
     limits: tuple[str, ...]
+
+    def at(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> Program:
+        """The same with other numbers."""
+        env, model = self.structure.prepare(parameters, records)
+        return replace(self, env=env, model=model)
 
 
 def program(system: System, limits: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None) -> Program:

@@ -29,10 +29,10 @@ class EventSettings:
     """Which events are one, and when a section has to be moved."""
 
     together: float = 1e-9  # Events nearer to each other than this share of the orbit's duration have no order.
-    grows: float = 1e-6  # Share by which an impact is faster than the one before if its train has not begun to die away.
+    grows: float = 1e-6  # Share by which an impact is faster than the one before if they have not begun to die away.
     # The section is moved where it is nearer to an event than this share of the time between the events before and after it.
-    section_room: float = 0.02
-    farthest: float = 1.0  # The largest room that is told: it would be infinite for an orbit that never turns.
+    section_distance: float = 0.02
+    farthest: float = 1.0  # The largest distance that is told: it would be infinite for an orbit that never turns.
 
 
 SETTINGS = EventSettings()
@@ -53,11 +53,11 @@ class FollowedEvents:
     events: tuple[OrbitEvent, ...]
     times: tuple[float, ...]
     period: float
-    room: float  # the least of gaps, speeds, reactions and durations that are 0 where an event appears or is lost
-    section_room: float  # where the section lies between its neighbouring events: 0 on one of them, 1/2 in the middle
+    distance: float  # the least of gaps, speeds, reactions and durations that are 0 where an event appears or is lost
+    section_distance: float  # where the section lies between its neighbouring events: 0 on one of them, 1/2 in the middle
 
     @property
-    def order(self) -> tuple[OrbitEvent, ...]:
+    def sequence(self) -> tuple[OrbitEvent, ...]:
         """The events from the same one on wherever the section lies."""
         return min((self.events[i:] + self.events[:i] for i in range(len(self.events))), default=())
 
@@ -81,18 +81,18 @@ def events_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | No
     friction, of one that is its own mirror image after the motion.
     """
     period = motion.time - motion.start
-    rows = _without_trains(_listed(motion))
-    events, times = tuple(row[0] for row in rows), tuple(row[1] for row in rows)
-    speeds = [row[2] for row in rows if row[0].kind == EventCode.IMPACT]
-    section_room = _section_room(motion, period)
+    listed, when, all_speeds = _listed(motion)
+    events, times = tuple(listed), tuple(when.tolist())
+    speeds = [speed for event, speed in zip(events, all_speeds.tolist(), strict=True) if event.kind == EventCode.IMPACT]
+    section_distance = _section_distance(motion, period)
     if images is not None:
         events += tuple(_image(event, motion.system.model, images) for event in events)
         times, period = times + tuple(time + period for time in times), 2.0 * period
     apart = np.diff([*times, times[0] + period]) if len(times) > 1 else np.empty(0)
     apart = apart[apart > SETTINGS.together * period]
-    room = float(min([SETTINGS.farthest, sampled.nearest_touch(), *speeds, *apart]))
+    distance = float(min([SETTINGS.farthest, sampled.nearest_touch(), *speeds, *apart]))
     events, times = _in_order(events, times, SETTINGS.together * period)
-    return FollowedEvents(events, times, period, max(room, 0.0), section_room)
+    return FollowedEvents(events, times, period, max(distance, 0.0), section_distance)
 
 
 def _image(event: OrbitEvent, model: Model, images: Sequence[int]) -> OrbitEvent:
@@ -107,55 +107,45 @@ def _image(event: OrbitEvent, model: Model, images: Sequence[int]) -> OrbitEvent
     return OrbitEvent(event.kind, sum(1 << image for i, image in enumerate(images) if event.parts >> i & 1), mode)
 
 
-Row = tuple[OrbitEvent, float, float]  # an event, its time, and the least speed at which it closes a contact
-
-
-def _listed(motion: Motion) -> list[Row]:
-    """All events that change the mode."""
-    found = motion.events
-    chosen = np.isin(found.codes[:, 0], CHANGES)
-    alone = np.array([np.count_nonzero(found.times == time) == 1 for time in found.times], dtype=bool)
-    # rest is told apart from the event that brings it, and at the start of a motion
-    chosen &= (alone & (found.times > motion.start)) | (found.codes[:, 0] != EventCode.RESTING)
-    if not chosen.any():
-        return []
-    assert motion.dense is not None
-    times, codes = found.times[chosen], found.codes[chosen]
-    modes = motion.dense.states(times)[2]
-    speeds = np.full(len(times), math.inf)
+def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
+    """The events that change the mode but for impacts that die away, their times, and how fast each closes a contact."""
+    found, dense = motion.events, motion.dense
+    times, codes, speeds = found.times, found.codes, np.full(len(found), math.inf)
     speeds[codes[:, 0] == EventCode.IMPACT] = impact_speeds(motion)
-    return [
-        (OrbitEvent(int(kind), int(parts), int(mode)), float(time), float(speed))
-        for (kind, parts), mode, time, speed in zip(codes, modes, times, speeds, strict=True)
-    ]
+    # rest is told apart from the event that brings it, and at the start of a motion
+    alone = (np.searchsorted(times, times, side="right") - np.searchsorted(times, times) == 1) & (times > motion.start)
+    chosen = np.isin(codes[:, 0], CHANGES) & (alone | (codes[:, 0] != EventCode.RESTING))
+    chosen[chosen] = ~_dying(codes[chosen], speeds[chosen])
+    times, codes = times[chosen], codes[chosen]
+    if dense is None or not times.size:
+        return [], times, speeds[chosen]
+    modes = dense.side[np.searchsorted(dense.start, times, side="right") - 1]
+    events = [OrbitEvent(*numbers) for numbers in np.column_stack([codes, modes]).tolist()]
+    return events, times, speeds[chosen]
 
 
 def impact_speeds(motion: Motion) -> np.ndarray:
     """The least speed at which each impact closes one of its contacts, (n,)."""
-    impacts, contacts = motion.impacts, motion.system.model.contacts
-    names, speeds = motion.system.model.coordinates, []
-    for hit, before in zip(impacts.side, impacts.velocity_before, strict=True):
-        rates = [abs(before[names.index(c.coordinate)]) for i, c in enumerate(contacts) if int(hit) >> i & 1]
-        speeds.append(min(rates, default=0.0))
-    return np.array(speeds)
+    impacts, names = motion.impacts, motion.system.model.coordinates
+    speeds = np.full(len(impacts), math.inf)
+    for i, contact in enumerate(motion.system.model.contacts):
+        rates = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])
+        speeds = np.where(impacts.side >> i & 1 == 1, np.minimum(speeds, rates), speeds)
+    return speeds
 
 
-def _without_trains(rows: list[Row]) -> list[Row]:
-    """Events without the impacts of a contact that die away until it is held: there are infinitely many.
+def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    """Which events are impacts of a contact that die away until it is held, (n,): there are infinitely many.
 
     They die away after the last one that is slower than the one after it.
     """
-    kept: list[Row] = []
-    for row in rows:
-        train: list[Row] = []
-        if row[0].kind in (EventCode.HELD, EventCode.RESTING):
-            while kept and kept[-1][0].kind == EventCode.IMPACT and not kept[-1][0].parts & ~row[0].parts:
-                train.insert(0, kept.pop())
-        speeds = np.array([impact[2] for impact in train])
-        growing = np.flatnonzero(speeds[1:] > (1.0 + SETTINGS.grows) * speeds[:-1])
-        kept += train[: growing[-1] + 1] if growing.size else []
-        kept.append(row)
-    return kept
+    dying = np.zeros(len(codes), dtype=bool)
+    for last in np.flatnonzero(np.isin(codes[:, 0], (EventCode.HELD, EventCode.RESTING))):
+        others = (codes[:last, 0] != EventCode.IMPACT) | (codes[:last, 1] & ~codes[last, 1] != 0)
+        first = 1 + int(np.flatnonzero(others)[-1]) if others.any() else 0
+        growing = np.flatnonzero(speeds[first + 1 : last] > (1.0 + SETTINGS.grows) * speeds[first : last - 1])
+        dying[first + growing[-1] + 1 if growing.size else first : last] = True
+    return dying
 
 
 def _in_order(
@@ -170,7 +160,7 @@ def _in_order(
     return tuple(events[i] for i in places), tuple(times[i] for i in places)
 
 
-def _section_room(motion: Motion, period: float) -> float:
+def _section_distance(motion: Motion, period: float) -> float:
     times = motion.events.times[np.isin(motion.events.codes[:, 0], CHANGES)]
     if not times.size:
         return 0.5

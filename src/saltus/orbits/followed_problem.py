@@ -8,13 +8,13 @@ derivatives of its end. What contacts hold at the section has the derivatives 0,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from saltus.errors import SaltusError
-from saltus.flow import Motion, Sensitivities, sensitivities, state_rates
+from saltus.flow import Motion, MotionRequest, Program, Sensitivities, derivatives_of, limits_of, program, state_rates
 from saltus.flow import segments as at
 from saltus.orbits.followed_events import FollowedEvents, events_of, impact_speeds
 from saltus.orbits.problem import Equations, Problem
@@ -31,11 +31,16 @@ class FollowedEquations(Equations):
     """The problem at one point, with the events on the way round."""
 
     followed: FollowedEvents | None  # None if extremes were not asked for
+    middle: np.ndarray | None  # the state after half of the time; None likewise
 
 
 class FollowedProblem(Problem):
     """The equations x = Phi(x) of a system with contacts or frictions; of a symmetric orbit, x is the image of Phi(x) of half a
     period."""
+
+    stray = 0.5  # Where the map jumps, the corrector wanders: ten times as far as a step may end from where it was predicted.
+    # The last place at which they were evaluated, and what was found: it is often asked for again, with more of it.
+    _latest: tuple[np.ndarray, tuple[Motion, FollowedEquations] | None] | None = None
 
     @property
     def size(self) -> int:
@@ -65,13 +70,30 @@ class FollowedProblem(Problem):
         return self.start_state(unknowns, self.at(values)), float(self.signature.section or 0.0) / self.frequency(values)
 
     def evaluate(self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False) -> FollowedEquations | None:
+        place = np.append(unknowns, values)
+        if self._latest is None or not np.array_equal(self._latest[0], place):
+            self._latest = place, self._evaluated(unknowns, values)
+        _, found = self._latest
+        if found is None or not with_extremes:
+            return None if found is None else found[1]
+        motion, equations = found
+        if equations.followed is None:
+            sampled, half = SampledMotion.of(motion), motion.at(0.5 * (motion.start + motion.time))
+            events = events_of(motion, sampled, self.images if self.signature.symmetric else None)
+            middle, extremes = np.concatenate([np.atleast_1d(part) for part in half]), self._extremes(sampled)
+            equations = replace(equations, extremes=extremes, followed=events, middle=middle)
+            self._latest = place, (motion, equations)
+        return equations
+
+    def _evaluated(self, unknowns: np.ndarray, values: np.ndarray) -> tuple[Motion, FollowedEquations] | None:
+        """The motion over the time that the equations cover, and these without extremes; None where it cannot be followed."""
         frequency = self.frequency(values)
         if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
             return None
         phase = float(self.signature.section or 0.0)
         try:
             system = self.at(values)
-            found = self._followed(system, self.start_state(unknowns, system), phase / frequency)
+            found = self._followed(system, self.start_state(unknowns, system), phase / frequency, values)
         except SaltusError:  # such parameters or such a state are refused, or the motion is
             return None
         motion, parameters = found.motion, found.parameters.copy()
@@ -85,18 +107,39 @@ class FollowedProblem(Problem):
         if self.signature.symmetric:
             after, state, parameters = (image_of(system.model, numbers.T).T for numbers in (after, state, parameters))
         here, there = state[None], -np.eye(len(after))[None]
-        sampled = SampledMotion.of(motion) if with_extremes else None
-        events = None if sampled is None else events_of(motion, sampled, self.images if self.signature.symmetric else None)
         residual, impacts = after - unknowns, self._impacts(motion)
-        return FollowedEquations(residual, here, there, parameters, impacts, self._extremes(sampled), events)
+        return motion, FollowedEquations(residual, here, there, parameters, impacts, self._extremes(None), None, None)
 
-    def _followed(self, system: System, state: np.ndarray, time: float) -> Sensitivities:
+    def half_way(self, unknowns: np.ndarray, values: np.ndarray, equations: Equations) -> np.ndarray | None:
+        assert isinstance(equations, FollowedEquations)
+        if equations.middle is None:
+            return super().half_way(unknowns, values, equations)
+        middle = equations.middle
+        return np.asarray((image_of(self.system.model, middle) if self.signature.period % 2 else middle) - unknowns)
+
+    @cached_property
+    def _program(self) -> Program:
+        return program(self.system, limits_of(self.system, ()), self.paths)
+
+    def _followed(self, system: System, state: np.ndarray, time: float, values: np.ndarray) -> Sensitivities:
         """The motion over the time that the equations cover, with its derivatives."""
         names, own = system.model.coordinates, self.own
-        start: dict[str, Any] = dict(zip(names, state[:own].tolist(), strict=True))
-        velocity: Any = float(state[own]) if own == 1 else tuple(state[own:].tolist())
-        more: dict[str, Any] = {"parameters": self.paths, "periods": self.signature.span, "time": time, "tol": self.tol}
-        return sensitivities(system, **start, velocity=velocity, **more)
+        parameters = self._values.copy()
+        parameters[self._places] = values
+        request = MotionRequest(
+            system=system,
+            coordinates=dict(zip(names, state[:own].tolist(), strict=True)),
+            velocity=float(state[own]) if own == 1 else tuple(state[own:].tolist()),
+            periods=self.signature.span,
+            duration=None,
+            tol=self.tol,
+            time=time,
+            side=None,
+            stop_at=(),
+            dense=True,
+            sensitivities=self.paths,
+        )
+        return derivatives_of(request, self._program.at(parameters, self._records))
 
     def _impacts(self, motion: Motion) -> np.ndarray:
         """Times and least speeds of the impacts that do not die away, (n, 2)."""

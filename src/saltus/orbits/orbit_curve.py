@@ -43,8 +43,8 @@ class OrbitPoint(Point):
         if problem.signature.sides or problem.signature.closed or (odd and (sides or not self.curve.symmetric)):
             return None
         n = problem.size
-        equations = problem.halved.evaluate(self.place[:n], self.place[n:])
-        return None if equations is None else equations.residual
+        half_way: np.ndarray | None = problem.half_way(self.place[:n], self.place[n:], self.equations)
+        return half_way
 
     @property
     def residual(self) -> float:
@@ -65,6 +65,11 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
     def count(self) -> int:  # type: ignore[override]
         """How many parameters there are."""
         return len(self.scales)
+
+    @property
+    def stray(self) -> float:  # type: ignore[override]
+        """How far from the predicted one a point may be looked for."""
+        return self.problem.stray
 
     @cached_property
     def weights(self) -> np.ndarray:

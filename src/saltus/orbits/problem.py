@@ -107,6 +107,8 @@ class FollowedSegments(NamedTuple):
 class Problem:
     """The equations of one signature of a system, as functions of the unknowns and of the parameters at `paths`."""
 
+    stray: float = math.inf  # see `EquationCurve`
+
     def __init__(self, system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> None:
         if system.load.frequency is None:
             raise ParameterError(
@@ -205,6 +207,11 @@ class Problem:
     def pressing(self, unknowns: np.ndarray, equations: Equations) -> float:
         """Below 0 there is no orbit, as a contact would open that is taken for closed; inf where none is."""
         return math.inf
+
+    def half_way(self, unknowns: np.ndarray, values: np.ndarray, equations: Equations) -> np.ndarray | None:
+        """Of an orbit without impacts its image half a period later less itself; None where its motion cannot be followed."""
+        found = self.halved.evaluate(unknowns, values)
+        return None if found is None else found.residual
 
     def repeated(self, unknowns: np.ndarray) -> np.ndarray:
         """The unknowns of an orbit with impacts over twice the time that the equations cover."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,14 @@ from saltus.systems import reactions, stick_margins
 
 SAMPLES = 33  # of each step, between which the least values are those of parabolas, to the fourth power of the distance
 NEWTON_STEPS = 4  # from the largest sample of a coordinate to its extremum, whose error each of them squares
+NARROWER = (0.3, 1e-3)  # shares of the distance of samples: so far beside its least value a force is looked at, in turn
+MOST_ORDER = 24  # of a step's series
+
+SHARES = np.linspace(0.0, 1.0, SAMPLES)
+ORDERS = np.arange(MOST_ORDER + 1)
+POWERS = SHARES ** ORDERS[:, None]  # of a series over a step of length 1, then of its derivatives
+SLOPES = ORDERS[:, None] * SHARES ** np.maximum(ORDERS - 1, 0)[:, None]
+BENDS = (ORDERS * (ORDERS - 1))[:, None] * SHARES ** np.maximum(ORDERS - 2, 0)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,16 +44,34 @@ class SampledMotion:
         dense = motion.dense
         assert dense is not None
         steps = np.flatnonzero(dense.length > 0.0)
-        tau = dense.length[steps, None] * np.linspace(0.0, 1.0, SAMPLES)
-        series, powers = dense.series[steps], np.arange(dense.series.shape[2])
-        exponents = tau[:, :, None] ** powers
-        position = np.einsum("sdk,spk->dsp", series, exponents)
-        velocity = np.einsum("sdk,spk->dsp", series[:, :, 1:] * powers[1:], exponents[:, :, :-1])
-        acceleration = np.einsum("sdk,spk->dsp", series[:, :, 2:] * (powers[2:] * powers[1:-1]), exponents[:, :, :-2])
-        begins = np.isin(dense.start[steps], motion.events.times)
-        return cls(
-            motion, series, tau, dense.start[steps, None] + tau, position, velocity, acceleration, dense.side[steps], begins
+        length, count = dense.length[steps, None, None], dense.series.shape[2]
+        scaled = (dense.series[steps] * length ** ORDERS[:count]).transpose(1, 0, 2)
+        position, velocity, acceleration = (scaled @ table[:count] for table in (POWERS, SLOPES, BENDS))
+        tau, start, each = length[:, 0] * SHARES, dense.start[steps], length[:, 0]
+        begins = np.isin(start, motion.events.times)
+        velocity, acceleration, time = velocity / each, acceleration / each**2, start[:, None] + tau
+        return cls(motion, dense.series[steps], tau, time, position, velocity, acceleration, dense.side[steps], begins)
+
+    def only(self, steps: np.ndarray) -> SampledMotion:
+        """The samples of some of the steps."""
+        position, velocity, acceleration = self.position[:, steps], self.velocity[:, steps], self.acceleration[:, steps]
+        series, tau, side = self.series[steps], self.tau[steps], self.side[steps]
+        return SampledMotion(
+            self.motion, series, tau, self.time[steps], position, velocity, acceleration, side, self.begins[steps]
         )
+
+    def at(self, step: int, tau: np.ndarray) -> SampledMotion:
+        """One step at other instants since its start."""
+        powers, c, orders = (
+            np.vander(tau, self.series.shape[2], increasing=True).T,
+            self.series[step],
+            ORDERS[: self.series.shape[2]],
+        )
+        position, velocity = (c @ powers)[:, None], ((c * orders)[:, 1:] @ powers[:-1])[:, None]
+        acceleration = ((c * orders * (orders - 1))[:, 2:] @ powers[:-2])[:, None]
+        time, one = (self.time[step, :1] - self.tau[step, :1] + tau)[None], [step]
+        side, begins = self.side[one], self.begins[one]
+        return SampledMotion(self.motion, c[None], tau[None], time, position, velocity, acceleration, side, begins)
 
     def _state(self) -> tuple[Any, Any, Any]:
         """Coordinates, velocities and accelerations as a model takes them."""
@@ -54,11 +81,15 @@ class SampledMotion:
 
     def lowest(self) -> float:
         """The least value of any coordinate."""
-        return _turning(self.series, self.position, self.tau)
+        coordinate, step, sample = np.unravel_index(int(np.argmin(self.position)), self.position.shape)
+        turned = _turned(self.series[step, coordinate], float(self.tau[step, sample]), self.tau[step])
+        return min(turned, float(self.position[coordinate, step, sample]))
 
     def highest(self) -> float:
         """The largest value of any coordinate."""
-        return -_turning(-self.series, -self.position, self.tau)
+        coordinate, step, sample = np.unravel_index(int(np.argmax(self.position)), self.position.shape)
+        turned = _turned(-self.series[step, coordinate], float(self.tau[step, sample]), self.tau[step])
+        return -min(turned, -float(self.position[coordinate, step, sample]))
 
     def margins(self) -> dict[str, float]:
         """The least value of each of the model's margins."""
@@ -77,59 +108,83 @@ class SampledMotion:
         least = [np.inf]
         for i, contact in enumerate(model.contacts):
             place, is_open = names.index(contact.coordinate), closed >> i & 1 == 0
-            gap, rate = contact.gap(self.position[place]), contact.sign * self.velocity[place]
-            least.append(self._turning_of(gap, rate, is_open))
+            course = contact.sign * self.series[:, place]
+            course[:, 0] -= contact.sign * float(contact.position)
+            least.append(self._turning_of(course, contact.sign * self.velocity[place], is_open))
         for friction, s in zip(model.frictions, slides, strict=True):
             place = names.index(friction.coordinate)
-            speed = s[:, None] * (self.velocity[place] - float(friction.ground_speed))
-            least.append(self._turning_of(speed, s[:, None] * self.acceleration[place], s != 0))
-        return float(min([*least, *self._holding(closed, slides)]))
+            course = s[:, None] * (self.series[:, place] * ORDERS[: self.series.shape[2]])[:, 1:]
+            course[:, 0] -= s * float(friction.ground_speed)
+            least.append(self._turning_of(course, s[:, None] * self.acceleration[place], s != 0))
+        holds = [closed >> i & 1 == 1 for i in range(len(model.contacts))]
+        sticks = [s == 0 for s in slides for _ in range(2)]
+        for chosen, forces in ((holds, reactions), (sticks, stick_margins)):
+            steps = np.flatnonzero(np.any(chosen, axis=0)) if chosen else np.empty(0, dtype=int)
+            if steps.size:
+                least.append(self.only(steps)._dip(steps, [mask[steps] for mask in chosen], forces))
+        return float(min(least))
 
-    def _holding(self, closed: np.ndarray, slides: list[np.ndarray]) -> list[float]:
-        """The least inner minima of what holds closed contacts, and what sticks."""
-        system, (q, v, _) = self.motion.system, self._state()
-        model, accelerations = system.model, list(self.acceleration)
-        masks = [closed >> i & 1 == 1 for i in range(len(model.contacts))]
-        forces = list(reactions(model, self.time, q, v, accelerations, system.load)) if any(map(np.any, masks)) else []
-        masks = masks if forces else []
-        if any((s == 0).any() for s in slides):
-            forces += stick_margins(model, self.time, q, v, accelerations, system.load)
-            masks += [s == 0 for s in slides for _ in range(2)]
-        return [self._dip(force, mask) for force, mask in zip(forces, masks, strict=True)]
-
-    def _turning_of(self, values: np.ndarray, rates: np.ndarray, chosen: np.ndarray) -> float:
-        """The least value (steps, samples) where it turns from falling to rising within one of the chosen steps."""
+    def _turning_of(self, course: np.ndarray, rates: np.ndarray, chosen: np.ndarray) -> float:
+        """The least value of series (steps, orders) where their rates turn from falling to rising within the chosen steps."""
         low, high = rates[:, :-1], rates[:, 1:]
         turns = (low < 0.0) & (high >= 0.0) & chosen[:, None]
         turns[self.begins, 0] = False  # there the value leaves 0, with rates that are 0 to rounding
         step, sample = np.nonzero(turns)
         if not step.size:
             return np.inf
-        ahead = low[step, sample] / (low[step, sample] - high[step, sample]) * np.diff(self.tau[step, :2], axis=1)[:, 0]
-        return float((values[step, sample] + 0.5 * low[step, sample] * ahead).min())
+        begin, end = self.tau[step, sample], self.tau[step, sample + 1]
+        when = begin + low[step, sample] / (low[step, sample] - high[step, sample]) * (end - begin)
+        powers = when[:, None] ** ORDERS[: course.shape[1]]
+        least = int(np.argmin((course[step] * powers).sum(axis=1)))
+        return _turned(course[step[least]], float(when[least]), np.array([begin[least], end[least]]))
 
-    def _dip(self, force: Any, chosen: np.ndarray) -> float:
-        """The least inner minimum of a force over each stretch of chosen steps, or its value just after the event before it."""
-        values = np.broadcast_to(np.asarray(force, dtype=float), self.time.shape)
-        least = np.inf
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]])))
-        for first, last in edges.reshape(-1, 2):
-            course = np.append(values[first:last, :-1].ravel(), values[last - 1, -1])
-            least = min(least, course[0]) if self.begins[first] else least
-            inner = (course[1:-1] <= course[:-2]) & (course[1:-1] < course[2:])
-            least = min(least, course[1:-1][inner].min(initial=np.inf))
+    def _dip(self, steps: np.ndarray, chosen: list[np.ndarray], forces: Callable[..., list[Any]]) -> float:
+        """The least inner minimum of any of some forces over each stretch of its chosen steps, or the value just after the event
+        before it; `steps` are the numbers of these steps in the whole motion.
+        """
+        least, lowest, where = np.inf, np.inf, (0, 0, 0)
+        for number, (values, mask) in enumerate(zip(self._forces(forces), chosen, strict=True)):
+            follows = np.append(False, mask[:-1] & (np.diff(steps) == 1))
+            stretch = np.cumsum(mask & ~follows)
+            for each in range(1, int(stretch[-1]) + 1):
+                rows = np.flatnonzero(mask & (stretch == each))
+                course = np.append(values[rows, :-1].ravel(), values[rows[-1], -1])
+                least = min(least, float(course[0])) if self.begins[rows[0]] else least
+                inner = 1 + np.flatnonzero((course[1:-1] <= course[:-2]) & (course[1:-1] < course[2:]))
+                if inner.size and course[inner].min() < lowest:
+                    place = int(inner[np.argmin(course[inner])])
+                    row, sample = divmod(place, SAMPLES - 1)
+                    lowest, where = float(course[place]), (number, int(rows[row]), sample)
+        return min(least, lowest if lowest == np.inf else self._narrowed(*where, forces))
+
+    def _forces(self, forces: Callable[..., list[Any]]) -> list[np.ndarray]:
+        """What `forces` of the systems gives along the samples, (steps, samples) each."""
+        q, v, _ = self._state()
+        values = forces(self.motion.system.model, self.time, q, v, list(self.acceleration), self.motion.system.load)
+        return [np.broadcast_to(np.asarray(value, dtype=float), self.time.shape) for value in values]
+
+    def _narrowed(self, number: int, step: int, sample: int, forces: Callable[..., list[Any]]) -> float:
+        """The minimum of a force near a sample: of parabolas through three instants that lie ever closer together."""
+        middle, apart, least = float(self.tau[step, sample]), float(self.tau[step, 1]), np.inf
+        for share in NARROWER:
+            offset = share * apart
+            instants = self.at(step, middle + offset * np.array([-1.0, 0.0, 1.0]))
+            low, here, high = instants._forces(forces)[number][0]
+            bend, slope = high - 2.0 * here + low, 0.5 * (high - low)
+            ahead = float(np.clip(-slope / bend, -1.0 / share, 1.0 / share)) if bend > 0.0 else 0.0
+            middle, least = middle + ahead * offset, here + 0.5 * slope * ahead
         return float(least)
 
 
-def _turning(series: np.ndarray, values: np.ndarray, tau: np.ndarray) -> float:
-    """The least value of series (steps, coordinates, orders), from samples (coordinates, steps, samples) by Newton's method."""
-    coordinate, step, sample = np.unravel_index(int(np.argmin(values)), values.shape)
-    q = np.polynomial.Polynomial(series[step, coordinate])
-    v, a, t = q.deriv(), q.deriv(2), float(tau[step, sample])
+def _turned(c: np.ndarray, t: float, between: np.ndarray) -> float:
+    """The least value of a series, from an instant near it, by Newton's method on its slope."""
+    orders = ORDERS[: len(c)]
+    slope, bend = (c * orders)[1:], (c * orders * (orders - 1))[2:]
     for _ in range(NEWTON_STEPS):
-        bend = float(a(t))
-        t = float(np.clip(t - v(t) / bend, tau[step, 0], tau[step, -1])) if bend > 0.0 else t
-    return min(float(q(t)), float(values.min()))
+        powers = t**orders
+        curved = float(bend @ powers[:-2])
+        t = min(max(t - float(slope @ powers[:-1]) / curved, float(between[0])), float(between[-1])) if curved > 0.0 else t
+    return float(c @ t**orders)
 
 
 def _least(values: np.ndarray) -> float:

@@ -24,7 +24,7 @@ from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
 
-Order = tuple[OrbitEvent, ...]
+EventSequence = tuple[OrbitEvent, ...]
 TINY = float(np.finfo(float).tiny)  # less than 0 by this is beyond a change, where nothing else tells by how much
 
 
@@ -36,6 +36,7 @@ class OtherSideSettings:
     beside: tuple[float, ...] = (1e-9, 1e-8, 1e-7)
     # Distances at which an orbit is solved for on the other side: there the next event to change must not come before.
     probes: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+    near: float = 3.0  # How far from the point such an orbit may be, in these distances.
     # Where the map is continuous its residual so near to an orbit is no larger than this, a square root included.
     jump: float = 5e-3
     together: float = 1e-2  # Events of two orbits beside one another that are nearer than this are the same.
@@ -58,25 +59,25 @@ def events_at(point: OrbitPoint) -> FollowedEvents:
 
 def same_events(reference: OrbitPoint) -> TestFunction:
     """How far an orbit is from having other events than a reference, or from an event at its section; below 0 where it has."""
-    order = events_at(reference).order
+    sequence = events_at(reference).sequence
 
     def value(point: OrbitPoint) -> float:
         found = events_at(point)
-        if found.order != order:
-            return -max(found.room, TINY)
-        return float(min(found.room, found.section_room - EVENTS.section_room))
+        if found.sequence != sequence:
+            return -max(found.distance, TINY)
+        return float(min(found.distance, found.section_distance - EVENTS.section_distance))
 
-    return TestFunction(SpecialKind.SW, value, 1e-15)
+    return TestFunction(SpecialKind.SW, value, 1e-12, one_sided=True)
 
 
 def change_at(zero: Zero, reference: OrbitPoint) -> Cut:
     """The cut at a zero of `same_events`, with the kind of change; without a special point where none happens."""
     if _stands(zero.point):
         return Cut(zero.point, SpecialPoint(SpecialKind.AS, zero.point, zero.evidence))
-    if events_at(zero.point).order == events_at(reference).order and _section_is_near(zero.point):
+    if events_at(zero.point).sequence == events_at(reference).sequence and _section_is_near(zero.point):
         return Cut(zero.point, None)
-    order = events_at(reference).order
-    other = next(_beside(zero.point, order), None)
+    sequence = events_at(reference).sequence
+    other = next(_beside(zero.point, sequence), None)
     if other is None:
         kind: SpecialKind | None = SpecialKind.SW
     elif _is_discontinuous(other):
@@ -99,12 +100,12 @@ def refused_beyond(point: OrbitPoint, step: float, bounds: Bounds) -> End | None
 
 def stalled_at(point: OrbitPoint, step: float) -> Cut | None:
     """The cut at a point beyond which no step leads, if events change there: the branch turns round or ends."""
-    order = events_at(point).order
-    beside = next(_beside(point, order), None)
+    sequence = events_at(point).sequence
+    beside = next(_beside(point, sequence), None)
     if beside is None:
         return None
     test, width = same_events(point), step * np.abs(np.array(point.curve.scales))
-    there = -max(events_of_equations(beside).room, TINY)
+    there = -max(events_of_equations(beside).distance, TINY)
     evidence = Evidence(point.residual, tuple(map(float, width)), test.value(point), there, test.value(point))
     return change_at(SpecialPoint(SpecialKind.SW, point, evidence), point)
 
@@ -119,18 +120,18 @@ def beyond(cut: Cut, before: OrbitPoint) -> OrbitPoint | End:
     """Where a branch goes on beyond a cut: with other events, or from another section."""
     if _stands(cut.point):
         return End(OrbitEnd.STICKS, cut.point.parameter)
-    order = events_at(before).order
+    sequence = events_at(before).sequence
     if cut.special is not None and cut.special.kind == SpecialKind.CH:
         return End(OrbitEnd.REST_VANISHES, cut.point.parameter)
-    if events_at(cut.point).order == order and _section_is_near(cut.point):
+    if events_at(cut.point).sequence == sequence and _section_is_near(cut.point):
         return _from_another_section(cut.point) or End(OrbitEnd.NO_SECTION, cut.point.parameter)
-    return other_events(cut.point, order)
+    return other_events(cut.point, sequence)
 
 
-def other_events(point: OrbitPoint, order: Order) -> OrbitPoint | End:
+def other_events(point: OrbitPoint, sequence: EventSequence) -> OrbitPoint | End:
     """An orbit beside a point that has other events than these, with the direction away from it; or why there is none."""
     reason, detail = OrbitEnd.NO_OTHER_EVENTS, ""
-    for equations in _beside(point, order):
+    for equations in _beside(point, sequence):
         if _is_discontinuous(equations):
             reason, detail = OrbitEnd.NOT_CONTINUOUS, f"{np.abs(equations.residual).max():.3g}"
             continue
@@ -138,8 +139,8 @@ def other_events(point: OrbitPoint, order: Order) -> OrbitPoint | End:
         tangent = curve.along_kernel(Corrected(point.place, equations, 0)).tangent
         for probe in SETTINGS.probes:
             for direction in (tangent, -tangent):
-                ahead: OrbitPoint | None = curve.solve(point.place + probe * direction, direction)
-                if ahead is not None and events_at(ahead).order != order and _leads_away(point, ahead, probe):
+                ahead: OrbitPoint | None = curve.solve_within(point.place + probe * direction, direction, SETTINGS.near * probe)
+                if ahead is not None and events_at(ahead).sequence != sequence and _leads_away(point, ahead, probe):
                     return ahead
     return End(reason, point.parameter, detail=detail)
 
@@ -147,7 +148,7 @@ def other_events(point: OrbitPoint, order: Order) -> OrbitPoint | End:
 def _leads_away(point: OrbitPoint, ahead: OrbitPoint, probe: float) -> bool:
     """Whether a solution is near where it was looked for, and its tangent leads on."""
     chord = ahead.place - point.place
-    return point.curve.norm(chord) < 3.0 * probe and float(ahead.tangent @ (point.curve.weights**2 * chord)) > 0.0
+    return point.curve.norm(chord) < SETTINGS.near * probe and float(ahead.tangent @ (point.curve.weights**2 * chord)) > 0.0
 
 
 def _is_discontinuous(equations: FollowedEquations) -> bool:
@@ -155,13 +156,19 @@ def _is_discontinuous(equations: FollowedEquations) -> bool:
     return bool(np.abs(equations.residual).max() > SETTINGS.jump)
 
 
-def _beside(point: OrbitPoint, order: Order) -> Iterator[FollowedEquations]:
-    """The equations at places beside a point, not solved, at which the events are others than these or come at other times."""
+def _beside(point: OrbitPoint, sequence: EventSequence) -> Iterator[FollowedEquations]:
+    """The equations at places beside a point, not solved, at which the events are others than these or come at other times:
+    one for each other sequence at each distance."""
     axes = np.eye(len(point.place)) / point.curve.weights
     for distance in SETTINGS.beside:
+        known = set()
         for direction in (point.tangent, -point.tangent, *axes, *-axes):
             equations = point.curve.evaluate(point.place + distance * direction, thorough=True)
-            if equations is not None and (events_of_equations(equations).order != order or _is_discontinuous(equations)):
+            if equations is None:
+                continue
+            kind = events_of_equations(equations).sequence, _is_discontinuous(equations)
+            if kind != (sequence, False) and kind not in known:
+                known.add(kind)
                 yield equations
 
 
@@ -172,7 +179,7 @@ def events_of_equations(equations: FollowedEquations) -> FollowedEvents:
 
 
 def _section_is_near(point: OrbitPoint) -> bool:
-    return events_at(point).section_room < 2.0 * EVENTS.section_room
+    return events_at(point).section_distance < 2.0 * EVENTS.section_distance
 
 
 def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
@@ -198,7 +205,7 @@ def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
 
 def kind_between(before: FollowedEvents, after: FollowedEvents) -> SpecialKind | None:
     """What changes between two orbits beside one another; None where nothing does but the count of impacts that die away."""
-    kinds = [Counter(event.kind for event in found.order) for found in (before, after)]
+    kinds = [Counter(event.kind for event in found.sequence) for found in (before, after)]
     more = {kind: kinds[1][kind] - kinds[0][kind] for kind in {*kinds[0], *kinds[1]} if kinds[1][kind] != kinds[0][kind]}
     sticks, reversals = more.get(EventCode.STICK, 0), more.get(EventCode.REVERSAL, 0)
     if reversals:
@@ -213,7 +220,7 @@ def kind_between(before: FollowedEvents, after: FollowedEvents) -> SpecialKind |
         return SpecialKind.CH if impacts * rests < 0 else SpecialKind.RL
     if set(more) != {EventCode.IMPACT}:
         return SpecialKind.SW
-    return SpecialKind.GR if min(before.room, after.room) < SETTINGS.slow else None
+    return SpecialKind.GR if min(before.distance, after.distance) < SETTINGS.slow else None
 
 
 def first_change(before: FollowedEvents, after: FollowedEvents) -> SpecialKind:

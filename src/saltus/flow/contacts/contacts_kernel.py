@@ -14,6 +14,10 @@ rows behind those of the contacts (`frictions.py`) and are decided on together w
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from saltus.flow.contacts.contact_decisions import decide_contacts
 from saltus.flow.contacts.contact_impacts import (
     closed_bits,
@@ -57,6 +61,12 @@ from saltus.flow.steps import expand, forget, move, next_target, record_step, wo
 from saltus.taylor import cached_jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
+
+# A step to the next impact on the same contact.
+FAST_IMPACT = 0.3  # After a faster impact the series that is usual is needed to reach the next one.
+RADIUS = 0.5  # A series of order n is taken to reach as far as this times the n-th root of the tolerance.
+LEAST_ORDER = 6  # Of fewer coefficients the last ones may all vanish by symmetry.
+WORTH = 0.8  # The share of the usual order below which a lower one is tried.
 
 
 @lean_jit
@@ -130,15 +140,41 @@ def together(where, model, contacts, work, solver, hit, tau):
 
 
 @lean_jit
-def contact_arc(where, state, settings, env, model, contacts, frictions, work, solver, steps, events, origin, target):
-    """One smooth step, up to the first zero of a guard or of a margin. Returns PAUSED, or why the motion ends."""
-    order, t, count, margins = where[Where.ORDER], state[State.TIME], contacts.shape[0], where[Where.MARGINS]
+def short_order(where, state, settings, env, model, contacts, work, t, origin):
+    """The order of series that reach the next impact of a contact that has just impacted: a lower one than usual if that does.
+
+    Until then its gap is about a parabola, of which the duration is known. Most impacts that die away are that near to the next.
+    """
+    order, first, flight = where[Where.ORDER], State.COORDINATES + where[Where.DOF], np.inf
+    for i in range(contacts.shape[0]):
+        rate = model[ContactPart.SIGNS][i] * state[first + contacts[i, ContactColumn.COORDINATE]]
+        if contacts[i, ContactColumn.CLOSED] == 0 and contacts[i, ContactColumn.SKIP] == 1 and 0.0 < rate < FAST_IMPACT:
+            if flight == np.inf:
+                expand(where, state, env, model, work, t, origin, 1.0, 0)
+            pull = model[ContactPart.SIGNS][i] * work[Work.ACCELERATIONS][contacts[i, ContactColumn.COORDINATE], 0]
+            if pull < 0.0:
+                flight = min(flight, -2.0 * rate / pull)
+    if not flight < RADIUS:
+        return order
+    lower = max(LEAST_ORDER, math.ceil(math.log(settings[Setting.TOLERANCE]) / math.log(flight / RADIUS)))
+    return lower if lower < WORTH * order else order
+
+
+@lean_jit
+def seek_event(where, state, settings, env, model, contacts, frictions, work, solver, t, origin, target):
+    """Expand the motion, and find the first zero of a guard or of a margin within a step.
+
+    Returns the length of the step, and how long it might be by the series; the contact, the friction and the margin whose zero
+    is the first, or -1; which of the friction's guards it is; and the share of the step at which it happens.
+    """
+    order, count, margins = where[Where.ORDER], contacts.shape[0], where[Where.MARGINS]
     size = expand(where, state, env, model, work, t, origin, 1.0, order)
     natural = contact_step_size(where, settings, env, model, contacts, work, t, origin, target, size)
     natural = friction_step_size(where, settings, frictions, count, work, natural)
     h = min(natural, target - t)
-    hit, first, shorter = first_guard(where, model, contacts, work, solver, h, h == natural)
-    rubs, first_rub, which, shorter_rub = first_friction(where, frictions, count, work, solver, h, h == natural)
+    whole = h == natural
+    hit, first, shorter = first_guard(where, model, contacts, work, solver, h, whole)
+    rubs, first_rub, which, shorter_rub = first_friction(where, frictions, count, work, solver, h, whole)
     if rubs >= 0 and first_rub < first:
         hit, first = -1, first_rub
     else:
@@ -154,13 +190,35 @@ def contact_arc(where, state, settings, env, model, contacts, frictions, work, s
         hit, rubs, first = -1, -1, first_limit
     else:
         limit = -1
+    return h, natural, hit, rubs, limit, which, first
+
+
+@lean_jit
+def contact_arc(where, state, settings, env, model, contacts, frictions, work, solver, steps, events, origin, target):
+    """One smooth step, up to the first zero of a guard or of a margin. Returns PAUSED, or why the motion ends."""
+    order, t, count = where[Where.ORDER], state[State.TIME], contacts.shape[0]
+    held = count + 2 * frictions.shape[0]
+    where[Where.ORDER] = short_order(where, state, settings, env, model, contacts, work, t, origin)
+    h, natural, hit, rubs, limit, which, first = seek_event(
+        where, state, settings, env, model, contacts, frictions, work, solver, t, origin, target
+    )
+    if where[Where.ORDER] < order and hit < 0:  # the impact does not come as soon as it seemed
+        where[Where.ORDER] = order
+        h, natural, hit, rubs, limit, which, first = seek_event(
+            where, state, settings, env, model, contacts, frictions, work, solver, t, origin, target
+        )
     found = hit >= 0 or rubs >= 0
     tau = first * h if found or limit >= 0 else h
-    record_step(where, steps, where[Where.SIDE], t, tau, work[Work.POSITIONS])
     bits = 0
     if hit >= 0 and contacts[hit, ContactColumn.CLOSED] == 0:
         bits = together(where, model, contacts, work, solver, hit, tau)
-    if not move(where, state, work[Work.POSITIONS], work[Work.VELOCITIES], tau) or not h >= 0.0:
+    finite = move(where, state, work[Work.POSITIONS], work[Work.VELOCITIES], tau)
+    for i in range(where[Where.OWN]):
+        for k in range(where[Where.ORDER] + 2, order + 2):
+            work[Work.POSITIONS][i, k] = 0.0
+    where[Where.ORDER] = order
+    record_step(where, steps, where[Where.SIDE], t, tau, work[Work.POSITIONS])
+    if not finite or not h >= 0.0:
         return Status.NOT_FINITE
     state[State.TIME] = target if not found and limit < 0 and h == target - t else t + tau
     for i in range(count):
