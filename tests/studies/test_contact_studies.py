@@ -9,7 +9,7 @@ import pytest
 import saltus
 from saltus import branch_of
 from saltus.errors import ParameterError
-from saltus.orbits import initial_states, search_orbits
+from saltus.orbits import initial_states, orbits_near_returns, search_orbits, solved_near
 from saltus.plots import draw_diagram, draw_stability_chart
 from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
 from saltus.studies.diagram.chaos_search import BandSearch
@@ -19,6 +19,7 @@ from saltus.studies.diagram.simulated import followed
 from saltus.systems import (
     BeltOscillator,
     Harmonic,
+    ImpactPair,
     Load,
     Metainterface,
     NewtonImpact,
@@ -159,3 +160,20 @@ def test_what_has_no_equations_for_several_contacts_is_refused_by_name():
     both = layers(TwoLayer)
     with pytest.raises(ParameterError, match="borders of a chart"):
         bordered_chart(both, horizontal=[0.1, 0.2], vertical=[-0.5])
+
+
+def test_orbits_of_a_loose_mass_that_no_wall_touches_are_a_continuum_and_no_branch():
+    """The case moves as Z exp(i Omega t), Z = F / (1 - Omega^2 + i c Omega), and the mass stands still at any place between the
+    walls: each is an orbit with the multiplier 1 twice. A near return leads to one of them, and none of them is followed."""
+    frequency, damping, force = 0.6, 0.02, 0.05
+    load = Load(frequency=frequency, force=Harmonic(amplitude=force, phase=math.pi / 2))
+    pair = System(model=ImpactPair(mass_ratio=0.1, damping=damping), load=load, impact=NewtonImpact(e=0.6))
+    peak = force / (1 - frequency**2 + 1j * damping * frequency)
+    z, velocity = peak.real, (1j * frequency * peak).real
+    state = np.array([z, 0.1 - z, velocity, -velocity])
+    orbit = solved_near(pair, "load.frequency", state, 1)
+    assert orbit is not None
+    np.testing.assert_allclose(np.sort(np.abs(orbit.multipliers - 1.0))[:2], 0.0, atol=1e-9)
+    shift = 1e-3 * np.array([1.0, -1.0, 0.0, 0.0])
+    returns = np.stack([state + shift, state + 0.5 * shift])[None, None]
+    assert orbits_near_returns(pair, "load.frequency", np.array([frequency]), returns, [np.empty((0, 4))], 1) == []

@@ -180,7 +180,7 @@ class DiagramSearch:
         return Place.ELSEWHERE if orbit.stable else Place.UNSTABLE
 
     def repel(self, max_period: int) -> None:
-        """Follow repelling orbits near which motions return, at some values of the grid."""
+        """Follow repelling orbits near which motions return, at some values of the grid: in chaos there is no end of them."""
         grid = self.grid[np.unique(np.linspace(0, len(self.grid) - 1, self.effort.repelling_values).astype(int))]
         begin = starts_at(self.system, grid, self.effort.starts, self.window, self.seed)
         columns = {self.path: np.repeat(grid, self.effort.starts)}
@@ -193,8 +193,12 @@ class DiagramSearch:
         known = [motions.only((motions.value == value) & motions.periodic).states.reshape(-1, d) for value in grid]
         known = [states[np.isfinite(states).all(axis=1)] for states in known]
         orbits = orbits_near_returns(self.system, self.path, grid, states, known, max_period)
+        most = len(self.branches.placed) + self.effort.branches
         for orbit in sorted(orbits, key=lambda orbit: orbit.period):
-            self.branches.follow(orbit)
+            if len(self.branches.placed) < most:
+                self.branches.follow(orbit)
+            else:
+                self.branches.left += 1
 
     def carry_on(self, progress: Progress) -> None:
         """Start motions from those of neighbouring values and from the ends of stable parts of branches until nothing is new."""

@@ -27,7 +27,8 @@ class EffortSettings:
     starts: int  # Initial states at each of them: what attracts less than 1 of these many states may be missed there.
     periods: int  # Forcing periods that a motion is given to settle; slow ones have 8 times as many.
     repelling_values: int  # Values at which repelling orbits are searched for: they are followed from one to the others.
-    branches: int  # With this number of branches, no more are followed that no simulated motion leads to.
+    # With this number of branches, no more are followed that are born on others; and so many at most of orbits that repel.
+    branches: int
     jumps: int  # Rounds in which motions are started beyond the ends of stable parts of branches, to see where they fall to.
     sample: int  # Motions of the sample that tells what share of the states ends on something that the diagram has not.
     # Samples at most: what one shows to be missing is followed, and the next one begins anew, until one shows nothing missing.
