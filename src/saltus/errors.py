@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from typing import Any
 
@@ -112,6 +111,8 @@ def near(name: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
 
     Names in `also` are proposed where they are near, and are not listed otherwise.
     """
+    import difflib
+
     known = sorted(str(name) for name in known)  # the repr of an enumeration's member is not what a user writes
     close = difflib.get_close_matches(name[:LONGEST_NAME], [*known, *also], n=3, cutoff=0.6)
     if close:

@@ -14,7 +14,7 @@ import pytest
 
 from saltus.taylor import cache
 from saltus.taylor.cache import cache_directory, load_module
-from saltus.taylor.private_numba import _sound
+from saltus.taylor.private_numba import undamaged
 
 SOURCE = """
 from numba import types
@@ -24,6 +24,7 @@ from saltus.taylor.private_numba import cached_jit
 def doubled(x):
     return 2.0 * x
 """
+COMPILED = (".nbc", ".nbi", ".bytecode")
 SCRIPT = f"""
 import logging; logging.basicConfig(format="%(message)s")
 from saltus.taylor.cache import load_module
@@ -173,9 +174,9 @@ def test_numba_s_own_setting_of_a_folder_is_not_followed(home):
     elsewhere.mkdir()
     assert run(home, NUMBA_CACHE_DIR=str(elsewhere)) == (6.0, "")
     assert not [path for path in elsewhere.rglob("*") if path.is_file()]
-    compiled = {path for path in kept(home) if path.suffix in (".nbc", ".nbi")}
+    compiled = {path for path in kept(home) if path.suffix in COMPILED}
     assert {path.parent for path in compiled} == {home / "cache" / "kernels" / "__pycache__"}
-    assert len(compiled) == 2
+    assert len(compiled) == len(COMPILED)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +185,7 @@ def test_numba_s_own_setting_of_a_folder_is_not_followed(home):
 def test_compiled_code_of_somebody_else_is_not_read(home, change):
     """As was planted while the folder was open to all, with a digest that is right."""
     assert run(home) == (6.0, "")
-    for path in [path for path in kept(home) if path.suffix in (".nbc", ".nbi")]:
+    for path in [path for path in kept(home) if path.suffix in COMPILED]:
         target = home / "forged" if change == "link" else path
         forged(target, home / "planted")
         if change == "link":
@@ -209,19 +210,26 @@ def test_a_folder_that_everybody_can_exchange_is_not_used(home):
 
 
 def test_any_flipped_bit_of_compiled_code_is_noticed(home, caplog):
-    """2000 bits of compiled code and of its index, each alone."""
+    """3000 bits of numba's compiled code, of its index and of Python's, each alone."""
     load_module("safety", SOURCE)
     rng = random.Random(0)
-    for path in [*cache_directory().rglob("*.nbc"), *cache_directory().rglob("*.nbi")]:
+    for path in [path for path in kept(home) if path.suffix in COMPILED]:
         content = path.read_bytes()
-        assert _sound(str(path))
+        assert undamaged(str(path)) == content[:-32]  # what stands before the digest
         for _ in range(1000):
             place, flipped = rng.randrange(8 * len(content)), bytearray(content)
             flipped[place // 8] ^= 1 << place % 8
             path.write_bytes(flipped)
-            assert not _sound(str(path))
+            assert undamaged(str(path)) is None
             assert not path.exists()
     del sys.modules[cache.module_name("safety", SOURCE)]
+
+
+def test_a_cache_that_was_moved_is_read_where_it_is(home):
+    assert run(home) == (6.0, "")
+    (home / "cache").rename(home / "moved")
+    assert run(home, SALTUS_CACHE_DIR=str(home / "moved")) == (6.0, "")
+    assert not (home / "cache").exists()
 
 
 class Planted:

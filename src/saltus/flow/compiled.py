@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -52,6 +51,7 @@ from saltus.taylor import (
     number,
     pointer,
     shared_constants,
+    source_of,
     substitute,
     tape,
 )
@@ -63,7 +63,7 @@ import numpy as np
 
 from saltus.flow.function_types import *
 from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit
-# types of {digest(inspect.getsource(function_types))}
+# types of {digest(source_of(function_types))}
 """
 ENV = {"parameter": ("parameters", 0), "constant": ("constants", 0), "record": ("table", 0)}
 LEAVES = ENV | {"time": ("t", 0), "origin": ("origin", 0), "side": ("side", 0)}
@@ -85,13 +85,13 @@ class Structure:
     def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """The arguments `env` and `model` of the kernel for given numbers (see `kernel.py`)."""
         constants, geometry = np.zeros(self.module.CONSTANT_COUNT), np.zeros(3)
-        self.module.constants(parameters, constants)
+        entry_point(self.module.constants)(parameters, constants)
         if self.several:
             modes = np.append(np.zeros(self.frictions), np.ones(self.module.OWN))
             env = (np.append(parameters, modes), constants, *records)
             return env, (*self.functions[:2], np.array(self.signs, dtype=float), *self.functions[2:])
         env = (parameters, constants, *records)
-        self.module.geometry(env, geometry)
+        entry_point(self.module.geometry)(env, geometry)
         return env, (*self.functions[:4], geometry, self.functions[4])
 
     @property

@@ -13,7 +13,8 @@ from .model import MarginKind, Model
 from .newton_impact import NewtonImpact, energy_gain, energy_gains
 from .parameter_tables import broadcast_arrays, check_parameters, finite_array, parameter_table
 from .parameters import children, is_number, numbers, substitute
-from .pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Pulse, Ramp, Ricker
+from .pulse import Pulse
+from .pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Ramp, Ricker
 from .registry import IMPACTS, MODELS, register
 from .reversed import reversed_system
 from .rocking_block import RockingBlock

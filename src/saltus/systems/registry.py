@@ -12,7 +12,8 @@ from saltus.systems.impact_pair import ImpactPair
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model, check_sides
 from saltus.systems.newton_impact import NewtonImpact
-from saltus.systems.pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Pulse, Ramp, Ricker
+from saltus.systems.pulse import Pulse
+from saltus.systems.pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Ramp, Ricker
 from saltus.systems.rocking_block import RockingBlock
 from saltus.systems.two_layer import TwoLayer
 from saltus.systems.two_stops import TwoStops

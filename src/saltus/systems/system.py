@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,7 +18,6 @@ from saltus.systems.load import Load
 from saltus.systems.mirror import check_mirror, contact_images
 from saltus.systems.model import Model, check_sides
 from saltus.systems.parameters import children, numbers, replace
-from saltus.systems.serial import from_dict, to_dict
 
 
 @answering("__init__", "with_", "get", "from_dict", "from_json", "from_toml")
@@ -151,6 +149,8 @@ class System:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain nested dictionaries, as written to JSON and TOML."""
+        from saltus.systems.serial import to_dict  # which needs all models, impact laws and pulses
+
         return {"model": to_dict(self.model), "load": to_dict(self.load), "impact": to_dict(self.impact)}
 
     @classmethod
@@ -162,6 +162,8 @@ class System:
         data
             What `to_dict` gave.
         """
+        from saltus.systems.serial import from_dict
+
         if not isinstance(data, Mapping):
             raise ParameterError(f"a system is a table with a model, a load and an impact law, got {shown(data)}", "data")
         unknown = set(data) - {"model", "load", "impact"}
@@ -213,6 +215,8 @@ class System:
         ParameterError
             Text that is no TOML, or no system.
         """
+        import tomllib
+
         return cls.from_dict(_parsed(text, tomllib.loads, "TOML"))
 
 

@@ -1,4 +1,4 @@
-from .cache import cache_directory, compiled_part, digest, is_compiled, load_module, module_name
+from .cache import cache_directory, compiled_part, digest, is_compiled, load_module, module_name, source_of
 from .common_form import CommonForm
 from .derivatives import FREQUENCY, derivative_along, partial_derivative, tangent_leaves, time_derivative
 from .equations import equations_of
@@ -105,6 +105,7 @@ __all__ = [
     "rough_root",
     "select",
     "shared_constants",
+    "source_of",
     "splat",
     "store",
     "structure_key",

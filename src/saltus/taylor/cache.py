@@ -3,7 +3,7 @@
 Numbers never compile anything. A file's name is a digest of all of its source and of the compiler's options, so that a change
 of either makes a new file. A file appears in one move, so that processes that compile at the same time do not disturb each other.
 What is found there is run only from a folder of the user's own, and only if it is what was written: a source is compared with the
-text that is wanted, and compiled code with its digest. What is damaged is made again, with a remark.
+text that is wanted, and compiled code, Python's and numba's, with its digest. What is damaged is made again, with a remark.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from __future__ import annotations
 import atexit
 import contextlib
 import hashlib
-import inspect
 import logging
+import marshal
 import os
 import re
 import shutil
@@ -23,8 +23,11 @@ import threading
 from collections.abc import Iterator
 from enum import IntEnum
 from functools import cache
+from importlib.abc import InspectLoader
+from importlib.util import MAGIC_NUMBER
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
+from typing import cast
 
 from saltus.files import lock
 from saltus.taylor import private_numba
@@ -40,9 +43,7 @@ def cache_directory() -> Path:
 
     Code that is found there is run, so it belongs to the user alone: no link, nobody else's, and nobody else may write to it.
     """
-    from platformdirs import user_cache_dir
-
-    wanted = Path(os.environ.get("SALTUS_CACHE_DIR") or user_cache_dir("saltus", appauthor=False)) / "kernels"
+    wanted = Path(os.environ.get("SALTUS_CACHE_DIR") or _user_cache()) / "kernels"
     user = os.getuid() if hasattr(os, "getuid") else "user"
     for folder in (wanted, Path(tempfile.gettempdir()) / f"saltus-kernels-{user}"):
         problem = _problem(folder)
@@ -55,6 +56,12 @@ def cache_directory() -> Path:
 
 
 _remarked: set[tuple[Path, str]] = set()
+
+
+def _user_cache() -> str:
+    from platformdirs import user_cache_dir
+
+    return user_cache_dir("saltus", appauthor=False)
 
 
 @cache
@@ -115,6 +122,11 @@ def _shared(found: os.stat_result) -> str | None:
     return "other users may write to it" if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else None
 
 
+def source_of(module: ModuleType) -> str:
+    """The text of a module, from its loader: `inspect` looks through all modules first."""
+    return str(cast(InspectLoader, module.__loader__).get_source(module.__name__))
+
+
 def compiled_part(module: ModuleType) -> str:
     """The compiled part of a source file: what stands below its marker, with members of `IntEnum`s written as their numbers."""
     numbers = {
@@ -123,7 +135,7 @@ def compiled_part(module: ModuleType) -> str:
         if isinstance(kind, type) and issubclass(kind, IntEnum)
         for member in kind
     }
-    text = "\n" + inspect.getsource(module).split(MARKER, 1)[1].split("\n", 1)[1]
+    text = "\n" + source_of(module).split(MARKER, 1)[1].split("\n", 1)[1]
     return re.sub(r"\b[A-Z]\w*\.[A-Z_]+\b", lambda found: numbers.get(found[0], found[0]), text)
 
 
@@ -134,7 +146,7 @@ def digest(*texts: str) -> str:
 
 def module_name(kind: str, text: str) -> str:
     """The name of a generated source's module, with a digest of all that its compiled code depends on."""
-    return f"saltus_{kind}_{digest(text, inspect.getsource(private_numba))}"
+    return f"saltus_{kind}_{digest(text, source_of(private_numba))}"
 
 
 def is_compiled(name: str) -> bool:
@@ -153,7 +165,7 @@ def load_module(kind: str, text: str) -> ModuleType:
                 if not _holds(path, text):
                     if path.exists():
                         log.warning("%s is damaged; it is written again", path)
-                    _write(path, text)
+                    _write(path, text.encode())
                 _execute(name, path, text)
         return sys.modules[name]
 
@@ -182,18 +194,32 @@ def _execute(name: str, path: Path, text: str) -> None:
     sys.modules[name] = module  # numba finds the functions of a cached module through here
     try:
         with private_numba.pointers():
-            exec(compile(text, str(path), "exec"), vars(module))
+            exec(_bytecode(path, text), vars(module))
     except BaseException:  # interrupted while compiling: the next call starts afresh
         del sys.modules[name]
         raise
 
 
-def _write(path: Path, text: str) -> None:
+def _bytecode(path: Path, text: str) -> CodeType:
+    """A source's bytecode, which is kept beside numba's code: Python would take longer over the text than numba over the rest."""
+    file = path.parent / "__pycache__" / f"{path.stem}.{MAGIC_NUMBER.hex()}.bytecode"
+    content = private_numba.undamaged(str(file))
+    if content is not None:
+        kept: CodeType = marshal.loads(content)
+        if kept.co_filename == str(path):  # the folder has not been moved
+            return kept
+    code = compile(text, str(path), "exec")
+    with contextlib.suppress(OSError):
+        _write(file, private_numba.with_digest(marshal.dumps(code)))
+    return code
+
+
+def _write(path: Path, content: bytes) -> None:
     """Write a file that appears in one move; all have the same time, as numba trusts what it kept for a file of the same time."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
     try:
-        with os.fdopen(handle, "w") as file:
-            file.write(text)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
         os.utime(temporary, (0, 0))
         os.replace(temporary, path)
     except BaseException:

@@ -45,14 +45,6 @@ def normal_form(root: Expr, leaves: Mapping[Expr, Form] | None = None) -> Form:
     return forms[id(root)]
 
 
-def provably_equal(one: Expr, other: Expr, leaves: Mapping[Expr, Form] | None = None) -> bool:
-    """Whether two expressions are the same function of the leaves that are left; False means that no proof was found."""
-    try:
-        return normal_form(one, leaves) == normal_form(other, leaves)
-    except NoNormalForm:
-        return False
-
-
 def constant(value: float) -> Form:
     """A number, exactly as it is stored."""
     if not math.isfinite(value):

@@ -28,7 +28,7 @@ def record_table(system: System, rows: list[tuple[str, int]]) -> tuple[np.ndarra
         i, in ascending powers of the time since breakpoint i - 1 (the first piece: since breakpoint 0). Scales are left out.
     """
     breaks, tables = record_tables(system, rows, {})
-    return np.unique(breaks[0]), tables[0]
+    return breaks[0], tables[0]
 
 
 def record_tables(

@@ -116,21 +116,26 @@ def _with_digests() -> Any:
             content = io.BytesIO()
             yield content
             with super()._open_for_write(filepath) as file:
-                file.write(content.getvalue() + hashlib.sha256(content.getvalue()).digest())
+                file.write(with_digest(content.getvalue()))
 
         def _load_index(self) -> Any:
-            return super()._load_index() if _sound(self._index_path) else {}
+            return {} if undamaged(self._index_path) is None else super()._load_index()
 
         def _load_data(self, name: str) -> Any:
-            if not _sound(self._data_path(name)):
+            if undamaged(self._data_path(name)) is None:
                 raise OSError("damaged")  # as if it were not there: it is compiled again
             return super()._load_data(name)
 
     return CheckedFile
 
 
-def _sound(path: str) -> bool:
-    """Whether a file is there, the user's own, and ends with the digest of its bytes; any other is removed, with a remark.
+def with_digest(content: bytes) -> bytes:
+    """What a file of compiled code holds: the code, and the digest of its bytes behind it."""
+    return content + hashlib.sha256(content).digest()
+
+
+def undamaged(path: str) -> bytes | None:
+    """What stands before the digest in a file of the user's own, or None; a file that is not so is removed, with a remark.
 
     Anybody can make a digest: a file of another user, or a link, was planted while others could write to the folder.
     """
@@ -139,13 +144,13 @@ def _sound(path: str) -> bool:
         own = stat.S_ISREG(found.st_mode) and (not hasattr(os, "getuid") or found.st_uid == os.getuid())
         content = Path(path).read_bytes() if own else b""
     except OSError:
-        return False
-    if own and hashlib.sha256(content[:-DIGEST]).digest() == content[-DIGEST:]:
-        return True
+        return None
+    if own and with_digest(content[:-DIGEST]) == content:
+        return content[:-DIGEST]
     log.warning("%s is %s; it is compiled again", path, "damaged" if own else "not the user's own")
     with suppress(OSError):
         os.unlink(path)
-    return False
+    return None
 
 
 def _compiled(signature: Any, **options: Any) -> Callable[[Any], Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import subprocess
 import sys
 from collections.abc import Callable
@@ -47,10 +46,11 @@ from saltus.taylor import (
     module_name,
     pointer,
     records,
+    source_of,
 )
 
 _TYPES = (scalar_types, function_types, contact_function_types, lane_vectors)
-_WRITTEN_BY = digest(*(inspect.getsource(module) for module in _TYPES))
+_WRITTEN_BY = digest(*(source_of(module) for module in _TYPES))
 _SIGNATURES = f"""
 from saltus.flow.ensemble.function_types import *
 from saltus.taylor.lane_vectors import *
