@@ -5,9 +5,9 @@ A room imports another one only through these names. Nothing is loaded before it
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -35,7 +35,7 @@ def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[
             if package in FOR_USERS or name in vars(sys.modules["saltus"]).get("__all__", ()):
                 found = vars(sys.modules[package])[name] = _answering(found)  # lazy_loader 0.6 keeps there what it has loaded
             return found
-        if Path(file).with_name(f"{name}.py").exists():
+        if os.path.exists(os.path.join(os.path.dirname(file), f"{name}.py")):
             raise AttributeError(name)  # asked for by Python, which then imports the file
         raise AttributeError(f"{package} has no {name!r}; {near(name, public)}")
 

@@ -14,7 +14,6 @@ import io
 import json
 import os
 import pickle
-import secrets
 import signal
 import subprocess
 import sys
@@ -56,7 +55,7 @@ def write_durably(path: Path, content: bytes) -> None:
         With the name of the file.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{secrets.token_hex(6)}{PART}")
+    part = path.with_name(f".{path.name}.{os.urandom(6).hex()}{PART}")
     try:
         with part.open("xb") as file:
             lock(file)  # by which `sweep_up` knows that somebody still writes it

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import io
 import sys
 from collections.abc import Mapping
@@ -29,4 +28,6 @@ def show_below_cell(figure: Any) -> None:
 
 
 def _text(value: Any) -> str:
+    import html
+
     return html.escape(f"{value:.9g}" if isinstance(value, float) else str(value))

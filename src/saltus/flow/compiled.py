@@ -78,20 +78,21 @@ class Structure:
     # What the kernel calls: series, contact_series, reset, contact_damping, tangent; with several contacts series, matrices,
     # matrix_slopes, tangent.
     functions: tuple[Any, ...]
-    several: bool = False  # whether it has contacts or frictions that hold single coordinates
+    constants: Callable[..., None]
+    geometry: Callable[..., None] | None  # of the one contact
     signs: tuple[int, ...] = ()  # of these contacts
     frictions: int = 0
 
     def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """The arguments `env` and `model` of the kernel for given numbers (see `kernel.py`)."""
         constants, geometry = np.zeros(self.module.CONSTANT_COUNT), np.zeros(3)
-        entry_point(self.module.constants)(parameters, constants)
-        if self.several:
+        self.constants(parameters, constants)
+        if self.geometry is None:
             modes = np.append(np.zeros(self.frictions), np.ones(self.module.OWN))
             env = (np.append(parameters, modes), constants, *records)
             return env, (*self.functions[:2], np.array(self.signs, dtype=float), *self.functions[2:])
         env = (parameters, constants, *records)
-        entry_point(self.module.geometry)(env, geometry)
+        self.geometry(env, geometry)
         return env, (*self.functions[:4], geometry, self.functions[4])
 
     @property
@@ -148,7 +149,12 @@ def load_structure(trace: Trace) -> Structure:
     several = ("series", "matrices", "matrix_slopes", "tangent")
     names = several if trace.several else ("series", "contact_series", "reset", "contact_damping", "tangent")
     return Structure(
-        module, tuple(pointer(getattr(module, name)) for name in names), trace.several, trace.signs, len(trace.rubbed)
+        module,
+        tuple(pointer(getattr(module, name)) for name in names),
+        entry_point(module.constants),
+        None if trace.several else entry_point(module.geometry),
+        trace.signs,
+        len(trace.rubbed),
     )
 
 

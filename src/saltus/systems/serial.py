@@ -9,7 +9,6 @@ from typing import Any
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.load import Load
 from saltus.systems.pulse import Pulse
-from saltus.systems.registry import PULSES, find
 from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
 
 
@@ -46,6 +45,8 @@ def from_dict(kind: str, data: Any) -> Any:
     name = fields.pop("type")
     if not isinstance(name, str):
         raise ParameterError(f"{kind}.type must be a name in quotes, got {shown(name)}", f"{kind}.type")
+    from saltus.systems.registry import find  # of all models, impact laws and pulses, none of which is needed to write one
+
     return build(find(kind, name), fields, kind)
 
 
@@ -71,6 +72,8 @@ def signal_class(data: Mapping[str, Any], where: str) -> type[Signal]:
     """
     if "type" not in data:
         return Record if "time" in data or "value" in data else Harmonic
+    from saltus.systems.registry import PULSES
+
     name = data["type"]
     if not isinstance(name, str) or name not in PULSES:
         hint = f"{near(str(name), PULSES)} (a harmonic and a record have no type)"

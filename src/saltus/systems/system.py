@@ -18,6 +18,7 @@ from saltus.systems.load import Load
 from saltus.systems.mirror import check_mirror, contact_images
 from saltus.systems.model import Model, check_sides
 from saltus.systems.parameters import children, numbers, replace
+from saltus.systems.serial import from_dict, to_dict
 
 
 @answering("__init__", "with_", "get", "from_dict", "from_json", "from_toml")
@@ -149,8 +150,6 @@ class System:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain nested dictionaries, as written to JSON and TOML."""
-        from saltus.systems.serial import to_dict  # which needs all models, impact laws and pulses
-
         return {"model": to_dict(self.model), "load": to_dict(self.load), "impact": to_dict(self.impact)}
 
     @classmethod
@@ -162,8 +161,6 @@ class System:
         data
             What `to_dict` gave.
         """
-        from saltus.systems.serial import from_dict
-
         if not isinstance(data, Mapping):
             raise ParameterError(f"a system is a table with a model, a load and an impact law, got {shown(data)}", "data")
         unknown = set(data) - {"model", "load", "impact"}

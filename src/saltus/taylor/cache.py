@@ -122,11 +122,13 @@ def _shared(found: os.stat_result) -> str | None:
     return "other users may write to it" if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else None
 
 
+@cache
 def source_of(module: ModuleType) -> str:
     """The text of a module, from its loader: `inspect` looks through all modules first."""
     return str(cast(InspectLoader, module.__loader__).get_source(module.__name__))
 
 
+@cache
 def compiled_part(module: ModuleType) -> str:
     """The compiled part of a source file: what stands below its marker, with members of `IntEnum`s written as their numbers."""
     numbers = {

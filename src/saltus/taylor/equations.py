@@ -12,6 +12,8 @@ from saltus.taylor.system_structure import structure_key
 from saltus.taylor.tapes import tape
 from saltus.taylor.tracing import Trace, trace
 
+MOST_KNOWN = 64  # of the systems whose digests are kept: a study asks again and again for the same
+
 
 def equations_of(system: System) -> dict[str, str]:
     """A digest of each part of a system's equations, its numbers left out: `System.to_json` has these.
@@ -27,14 +29,25 @@ def equations_of(system: System) -> dict[str, str]:
         A model that cannot be traced.
     """
     key = structure_key(system)
-    if key not in _digests:
-        _digests[key] = _traced_parts(system)
-    mirrored, model = system.mirrored(), system.model
-    names = (model.coordinates, model.units, model.channels, model.sides, model.stops)
-    return _digests[key] | {"mirror": digest(repr(mirrored and mirrored.to_dict()["load"])), "names": digest(repr(names))}
+    with_numbers = key, system.to_json()
+    if with_numbers not in _known:
+        if key not in _digests:
+            _digests[key] = _traced_parts(system)
+        if len(_known) >= MOST_KNOWN:
+            _known.clear()
+        _known[with_numbers] = _digests[key] | _other_parts(system)
+    return dict(_known[with_numbers])
 
 
 _digests: dict[Any, dict[str, str]] = {}  # of structures, as their compiled code is kept
+_known: dict[Any, dict[str, str]] = {}  # of systems with their numbers, on which the mirror image may depend
+
+
+def _other_parts(system: System) -> dict[str, str]:
+    """The digests of what is not traced."""
+    mirrored, model = system.mirrored(), system.model
+    names = (model.coordinates, model.units, model.channels, model.sides, model.stops)
+    return {"mirror": digest(repr(mirrored and mirrored.to_dict()["load"])), "names": digest(repr(names))}
 
 
 def _traced_parts(system: System) -> dict[str, str]:

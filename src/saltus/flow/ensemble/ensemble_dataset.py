@@ -121,7 +121,8 @@ def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends, contacts: tuple[Contact, 
         writer.add(rate, ends.states[:, rows + i], writer.units[rate], f"d {name} / d tau at the end")
     length, local = jobs.numbers[:, JobNumber.PERIOD_LENGTH], ends.numbers[:, EndNumber.TIME]
     writer.add("time", ends.of(EndLabel.PERIOD) * length + local, "1", "dimensionless time tau at the end")
-    held = np.isin(ends.of(EndLabel.MODE), (Mode.REST, Mode.CHATTER))
+    mode = ends.of(EndLabel.MODE)
+    held = (mode == Mode.REST) | (mode == Mode.CHATTER)
     side, names = ends.of(EndLabel.SIDE), [contact.name for contact in contacts]
     if names:
         writer.add("closed_contacts", (side - 1).astype(np.int16), "1", "contacts that are closed at the end", **_masks(names))

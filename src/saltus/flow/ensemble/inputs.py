@@ -30,7 +30,7 @@ class Inputs:
     @property
     def size(self) -> int:
         """How many trajectories there are."""
-        return int(np.prod(self.shape, dtype=int))
+        return math.prod(self.shape)
 
     @property
     def parameters(self) -> dict[str, np.ndarray]:

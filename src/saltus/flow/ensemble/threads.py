@@ -136,7 +136,7 @@ class Lanes:
     @property
     def several(self) -> bool:
         """Whether the model has contacts or frictions that hold single coordinates."""
-        return self.program.structure.several
+        return self.program.trace.several
 
     @property
     def own(self) -> int:
