@@ -175,8 +175,8 @@ def test_the_ledger_counts_section_by_section_in_the_papers_order():
         ("5", "2", "1", "1", "0", "1", "–"),
     ]
     assert tally(claims) == (
-        "5 statements of the paper: 2 hold as printed, 1 fail as printed and are corrected by an erratum, 1 are undecided, "
-        "0 are not checked, 1 disagree. Of 0 checks of our own 0 hold."
+        "5 statements of the paper: as printed 2, corrected by an erratum 1, undecided 1, not checked 0, in disagreement 1. "
+        "Checks of our own that hold: 0 of 0."
     )
 
 

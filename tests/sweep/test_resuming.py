@@ -5,6 +5,7 @@ import random
 import signal
 import threading
 import time
+import warnings
 
 import pytest
 import sweep_script
@@ -179,3 +180,11 @@ def test_where_there_are_no_locks_two_runs_write_the_same(tree, tmp_path, monkey
         thread.join()
     assert tree(tmp_path / "both") == tree(tmp_path / "alone")
     assert status(tmp_path / "both").running is None
+
+
+def test_a_store_is_made_without_a_warning(tmp_path):
+    """Zarr's own function for consolidated metadata warns, which could not be silenced in one of several threads alone."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run(sweep_script.long_plan(3, pause=0.0, quick=-2.0), tmp_path / "store")
+    assert status(tmp_path / "store").done == 3

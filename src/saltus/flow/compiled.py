@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from types import ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -94,6 +94,13 @@ class Structure:
         env = (parameters, constants, *records)
         self.geometry(env, geometry)
         return env, (*self.functions[:4], geometry, self.functions[4])
+
+    @cached_property
+    def tables(self) -> tuple[Any, ...]:
+        """`constants`, and `geometry` or with several contacts `matrices`, as the lanes' driver calls them."""
+        return tuple(
+            pointer(getattr(self.module, name)) for name in ("constants", "matrices" if self.geometry is None else "geometry")
+        )
 
     @property
     def sizes(self) -> tuple[int, ...]:

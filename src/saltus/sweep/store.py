@@ -8,7 +8,6 @@ import logging
 import os
 import shutil
 import tempfile
-import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -329,15 +328,17 @@ def _make(plan: Plan, folder: Path) -> None:
             compressors=codecs,
             attributes=dict(variable.attrs),
         )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that Zarr's specification does not have consolidated metadata yet; xarray reads it
-        zarr.consolidate_metadata(store)
-    _sort(folder / files.METADATA)
+    _consolidate(folder, sorted((*plan.axes, *plan.variables)))
     files.write_checksums(folder)
 
 
-def _sort(metadata: Path) -> None:
-    """Give the arrays' metadata an order: Zarr before 3.1.3 takes them as the disk lists them, which is another each time."""
-    group = json.loads(metadata.read_text(encoding="utf-8"))
-    group["consolidated_metadata"]["metadata"] = dict(sorted(group["consolidated_metadata"]["metadata"].items()))
-    write_durably(metadata, json.dumps(group, indent=2).encode())
+def _consolidate(folder: Path, names: list[str]) -> None:
+    """Copy the metadata of all arrays into the group's, where xarray reads them at once.
+
+    Zarr's own function for it warns that its specification does not have them yet, and Python cannot be told in one thread alone
+    not to show a warning.
+    """
+    group = json.loads((folder / files.METADATA).read_text(encoding="utf-8"))
+    arrays = {name: json.loads((folder / name / files.METADATA).read_text(encoding="utf-8")) for name in names}
+    group["consolidated_metadata"] = {"kind": "inline", "must_understand": False, "metadata": arrays}
+    write_durably(folder / files.METADATA, json.dumps(group, indent=2).encode())

@@ -18,7 +18,7 @@ from saltus.flow.ensemble.lane_layout import EndLabel, EndNumber, Size
 from saltus.flow.kernel_layout import CHATTER_SPEED, SHORTEST, SLOW
 from saltus.flow.structures import Program, taylor_order
 from saltus.progress import Progress, silent
-from saltus.taylor import CACHE_LINE, WIDTH, pointer
+from saltus.taylor import CACHE_LINE, WIDTH
 
 WHAT = "following the motions"  # for the progress
 
@@ -172,8 +172,7 @@ class Lanes:
         """What every call of the driver is given: functions, sizes, places and settings."""
         structure, trace = self.program.structure, self.program.trace
         module, scalar = structure.module, self.program.model if self.several else structure.functions
-        geometry = pointer(module.matrices if self.several else module.geometry)
-        code = (*self.functions[:3], pointer(module.constants), geometry, *self.functions[3:])
+        code = (*self.functions[:3], *structure.tables, *self.functions[3:])
         contacts = np.array([len(trace.signs), *trace.held, *trace.signs, *trace.rubbed], dtype=np.int64)
         sizes = np.concatenate([np.zeros(Size.CONTACTS, dtype=np.int64), contacts])
         given = {

@@ -57,10 +57,10 @@ def tally(claims: Iterable[Claim]) -> str:
     total = ledger(claims)[-1]
     paper, ours = total.paper, total.ours
     return (
-        f"{paper.total()} statements of the paper: {paper[ClaimVerdict.AS_PRINTED]} hold as printed, "
-        f"{paper[ClaimVerdict.CORRECTED]} fail as printed and are corrected by an erratum, "
-        f"{paper[ClaimVerdict.UNDECIDED]} are undecided, {paper[ClaimVerdict.NOT_CHECKED]} are not checked, "
-        f"{paper[ClaimVerdict.DISAGREES]} disagree. Of {ours.total()} checks of our own {ours[ClaimVerdict.HOLDS]} hold."
+        f"{paper.total()} statements of the paper: as printed {paper[ClaimVerdict.AS_PRINTED]}, "
+        f"corrected by an erratum {paper[ClaimVerdict.CORRECTED]}, undecided {paper[ClaimVerdict.UNDECIDED]}, "
+        f"not checked {paper[ClaimVerdict.NOT_CHECKED]}, in disagreement {paper[ClaimVerdict.DISAGREES]}. "
+        f"Checks of our own that hold: {ours[ClaimVerdict.HOLDS]} of {ours.total()}."
     )
 
 
