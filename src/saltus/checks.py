@@ -295,6 +295,24 @@ def check_along(system: Any, path: str, values: Iterable[float], name: str) -> N
             raise ParameterError(f"{name} reach beyond what the system allows: {error}", name) from None
 
 
+def check_reached(model: Any, coordinate: str, values: Any, name: str) -> None:
+    """Refuse values of a coordinate that a contact does not let it reach.
+
+    Raises
+    ------
+    ParameterError
+        Of the argument `name`, with the first such value and the contact.
+    """
+    given = np.atleast_1d(values)
+    gaps = {repr(c.name): (c.gap(given), c.position) for c in model.contacts if c.coordinate == coordinate}
+    if model.sides and coordinate == model.coordinates[0]:
+        gaps[""] = np.max([np.asarray(model.gap(given, side)) for side in model.sides], axis=0), model.contact
+    for contact, (gap, position) in gaps.items():
+        if (beyond := given[np.asarray(gap) < 0.0]).size:
+            where = f"the contact {contact}".strip() + f" at {coordinate} = {float(position):g}"
+            raise ParameterError(f"{coordinate} = {beyond[0]:g} lies beyond {where}; leave such values out", name)
+
+
 def check_names(name: str, values: Any, meaning: str) -> tuple[str, ...]:
     """The texts of a list, or a single one.
 

@@ -18,6 +18,7 @@ from saltus.systems import (
     TwoLayer,
     TwoStops,
     VelocityReduction,
+    WallOscillator,
 )
 from saltus.window import check_window
 
@@ -148,3 +149,18 @@ def test_an_attractor_of_both_layers_is_followed_along_a_parameter():
     assert found["attractor"].values.tolist() == [1]
     _, reduced = both_and_reduced(0.14)
     assert float(found["amplitude"][2, 0]) == pytest.approx(find_attractors(reduced, starts=12).of(1).amplitude, abs=1e-9)
+
+
+def test_starts_beyond_a_contact_are_refused_in_one_sentence():
+    (both, _), stops = both_and_reduced(0.1), System(model=TwoStops(), load=Load(frequency=1.0), impact=NewtonImpact(e=0.5))
+    wall = System(model=WallOscillator(), load=Load(frequency=1.0), impact=VelocityReduction(0.5))  # x <= 1
+    for ask, words in (
+        (lambda: basins_of_attraction(stops, x=[0.5, 1.5], velocity=[0, 1]), "x = 1.5 lies beyond the contact 'right' at x = 1"),
+        (lambda: basins_of_attraction(both, theta_1=[-0.3, 0.1], theta_2=[-0.3, -0.2]), "beyond the contact 'lower'"),
+        (lambda: basins_of_attraction(both, theta_1=[0.1, 0.2], theta_1_velocity=[0, 1], theta_2=0.2), "'upper' at theta_2 = 0"),
+        (lambda: basins_of_attraction(wall, x=[0.5, 1.5], velocity=[0, 1]), "x = 1.5 lies beyond the contact at x = 1"),
+        (lambda: find_attractors(both, starts=1, also=[[-0.1, -0.1, 0, 0]]), "theta_1 = -0.1 lies beyond"),
+    ):
+        with pytest.raises(ParameterError) as refused:
+            ask()
+        assert words in str(refused.value)

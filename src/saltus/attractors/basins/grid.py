@@ -23,6 +23,7 @@ from saltus.checks import (
     check_count,
     check_memory,
     check_number,
+    check_reached,
     check_work,
 )
 from saltus.errors import ParameterError
@@ -70,6 +71,9 @@ def _check(
     **coordinates: Any,
 ) -> None:
     grid = _grid(with_clock(system), velocity, coordinates, found)
+    axes = dict(zip(grid.plane, (grid.horizontal, grid.vertical), strict=True))
+    for name in system.model.coordinates:
+        check_reached(system.model, name, axes.get(name, grid.fixed[name]), name)
     check_count("periods", periods, 32)
     check_number("within", within, above=0.0)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
