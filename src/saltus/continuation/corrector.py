@@ -16,6 +16,7 @@ class NewtonSettings:
     converged: float = 5e-14  # residual relative to the unknowns: a few dozen roundings of what it is computed from
     stalled: float = 1e-10  # residual that is accepted where rounding keeps it above `converged`
     slowdown: float = 0.3  # rounding does so where a step leaves more than this share of the residual before it
+    circling: float = 0.5  # share of the residual that two steps leave where the method goes round between two smooth parts
     diverged: float = 1e6  # residual above which the iteration is given up
     longest: float = 1.0  # largest component of a step: beyond it the equations are far from linear
     last: float = 1e-6  # residual after which one step is expected to be enough, as it squares it: then all is evaluated

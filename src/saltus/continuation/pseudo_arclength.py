@@ -35,11 +35,16 @@ class EquationCurve(Curve[P]):
         return self.solve_within(guess, direction, math.inf)
 
     def solve_within(self, guess: np.ndarray, direction: np.ndarray, reach: float) -> P | None:
-        """`solve`, given up where Newton's method leads farther than `reach` from the guess."""
-        normal = direction * self.weights**2
+        """`solve`, given up where Newton's method leads farther than `reach` from the guess or, if that is finite, in circles."""
+        normal, errors = direction * self.weights**2, list[float]()
 
         def evaluate(place: np.ndarray, thorough: bool) -> Evaluation | None:
-            return self.evaluate(place, thorough) if self.norm(place - guess) <= reach else None
+            found = self.evaluate(place, thorough) if self.norm(place - guess) <= reach else None
+            if found is not None and reach < math.inf:
+                errors.append(float(np.abs(found.residual).max()))
+                if len(errors) > 2 and NEWTON.stalled < errors[-1] > NEWTON.circling * errors[-3]:
+                    return None
+            return found
 
         def linear(found: Evaluation, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return bordered(found.derivatives(), normal), -bordered(found.residual, normal @ (place - guess))
