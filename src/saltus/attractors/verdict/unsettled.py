@@ -62,7 +62,7 @@ class JudgementSettings:
     apart: float = 1e-7
     longest_period: int = 128  # The longest period looked for in a regular motion that has not settled, in forcing periods.
     patience: int = 4000  # Forcing periods for which such a motion is followed, so that multipliers up to 0.99 may settle.
-    tol: float = 1e-10  # The error of a step.
+    tol: float = 1e-8  # The error of a step: what is judged are averages over many motions, which shadow true ones.
 
 
 JUDGEMENT = JudgementSettings()
@@ -154,7 +154,7 @@ def judge_unsettled(
         open_chaos = run.positive & ~run.lasts & run.may_last(settings.rounds - i)
         run.open &= open_chaos | (~run.positive & ~run.negative & (run.gone > 0))
         run.follow(settings.round_periods, part_of(progress, 0.3 + 0.7 * i / settings.rounds, 1.0, "judging"))
-    run.look_for_long_periods()
+    run.look_for_long_periods(~run.all_gone)
     progress(1.0, "judging")
     return run.judged()
 
@@ -177,6 +177,7 @@ class _Judgement:
     exposure: np.ndarray  # (n,): forcing periods of companions in all
     before: np.ndarray  # (n,): those of the rounds up to the last one in which any settled
     all_gone: np.ndarray  # (n,): whether no companion is left
+    looked: np.ndarray  # (n,): whether a long period was looked for
     settled: SettledLater = field(default_factory=SettledLater)
 
     @classmethod
@@ -189,14 +190,14 @@ class _Judgement:
         for row, given in enumerate(states):
             chosen[row] = _companions(system, given[np.isfinite(given).all(axis=-1)], settings)
         columns = {path: np.broadcast_to(np.asarray(values, dtype=float), n) for path, values in parameters.items()}
-        flags = (np.zeros(n, dtype=bool) for _ in range(3))
+        flags = (np.zeros(n, dtype=bool) for _ in range(4))
         zeros = (np.zeros(n, dtype=int) for _ in range(4))
-        positive, negative, all_gone = flags
+        positive, negative, all_gone, looked = flags
         period, gone, exposure, before = zeros
         empty = np.full((2, n), np.nan)
         return cls(
             system, columns, settings, chosen, np.ones(n, dtype=bool), positive, negative, empty[0], empty[1],
-            period, gone, exposure, before, all_gone,
+            period, gone, exposure, before, all_gone, looked,
         )  # fmt: skip
 
     def take(self, earlier: Earlier) -> None:
@@ -260,21 +261,27 @@ class _Judgement:
         self.settled = self.settled.joined(SettledLater(question, ends.last[here], ends.period[here]))
 
     def measure(self) -> None:
-        """The exponents of some survivors, by ever longer runs as long as these leave open whether they are positive."""
+        """The exponents of some survivors, by ever longer runs as long as these leave open whether they are positive.
+
+        The longest run is spared where a motion repeats itself after a long period and the exponent is hardly above 0.
+        """
         count = min(self.settings.measured, self.settings.companions)
         chosen = np.linspace(0, self.settings.companions - 1, count).astype(int)
-        rows = np.flatnonzero(self.open)
-        columns = {path: values[rows] for path, values in self.parameters.items()}
-        given = self.states[rows][:, chosen]
-        found = largest_exponents(self.system, given, columns, runs=self.settings.runs, tol=self.settings.tol)
-        for name in ("exponent", "error", "positive", "negative"):
-            getattr(self, name)[rows] = getattr(found, name)
+        for runs in (self.settings.runs[:-1], self.settings.runs[-1:]):
+            rows = np.flatnonzero(self.open & ~self.positive & ~self.negative & (self.period == 0))
+            columns = {path: values[rows] for path, values in self.parameters.items()}
+            given = self.states[rows][:, chosen]
+            found = largest_exponents(self.system, given, columns, runs=runs, tol=self.settings.tol)
+            for name in ("exponent", "error", "positive", "negative"):
+                getattr(self, name)[rows] = getattr(found, name)
+            self.look_for_long_periods(self.open & (self.exponent < 0.0))
 
-    def look_for_long_periods(self) -> None:
-        """Follow what is not surely chaotic, and has not settled, until it does: near bifurcations exponents are near 0."""
-        rows = np.flatnonzero(~self.positive & ~self.all_gone)
+    def look_for_long_periods(self, chosen: np.ndarray) -> None:
+        """Follow those of the chosen (n,) that are not surely chaotic until they settle: near bifurcations exponents are near 0."""
+        rows = np.flatnonzero(chosen & ~self.positive & ~self.all_gone & ~self.looked)
         if not rows.size:
             return
+        self.looked[rows] = True
         longest = self.settings.longest_period
         options = {"max_period": longest, "kept": 2 * longest + 2}
         ends = self._ends(rows, self.states[rows, :1], self.settings.patience, silent, **options)

@@ -18,6 +18,7 @@ from saltus.studies.checks import check_diagram
 from saltus.studies.diagram.bands import Bands, Tried, bands_of
 from saltus.studies.diagram.chaos_settings import SETTINGS, ChaosSettings
 from saltus.studies.diagram.diagram_work import DiagramWork
+from saltus.studies.diagram.effort import EFFORTS, read_effort
 from saltus.studies.diagram.searched_value import SearchedValue
 from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
@@ -41,9 +42,11 @@ def _check(
     window: object,
     seed: int,
     special: object,
+    effort: str,
     progress: object,
 ) -> None:
     check_diagram(system, path, bounds, starts=starts, seed=seed)
+    read_effort(effort)
     check_count("count", count, 2)
     check_window(window, system)
 
@@ -59,6 +62,7 @@ def chaotic_bands(
     window: Box | None = None,
     seed: int = 0,
     special: Iterable[BandOrigin] = (),
+    effort: str = "standard",
     progress: Progress = silent,
 ) -> Bands:
     """Where motions are chaotic along a parameter, first from `starts` states at each of `count` values.
@@ -68,7 +72,7 @@ def chaotic_bands(
     not settled after 300 forcing periods is judged by `judge_unsettled`. The edges of bands, and of windows of periodic motion
     within them, are then halved to brackets of 1e-4 of the range, with motions begun on the chaos of the inner side. Windows
     narrower than a thousandth of the range are seen by chance only; attractors whose basins hold no start, and that end before
-    the next value, are not.
+    the next value, are not. `effort="quick"` halves to 4e-3 and 1e-3 of the range, and judges once; "thorough" to 5e-4 and 5e-5.
 
     Parameters
     ----------
@@ -82,6 +86,8 @@ def chaotic_bands(
         Initial states, as `search_orbits` takes them.
     special
         Special points of branches, beside which more is looked for.
+    effort
+        How finely bands are resolved, and how surely they are none of transients, see `Effort`.
     progress
         Called with the fraction done.
 
@@ -100,8 +106,8 @@ def chaotic_bands(
     states = starts_at(system, values, starts, area, seed).reshape(-1, system.dimension)
     first = part_of(progress, 0.0, 0.2, "looking for chaos")
     work = DiagramWork(system, path)
-    search = BandSearch(work, (float(bounds[0]), float(bounds[1])))
-    search.look(work.simulate(np.repeat(values, starts), states, SETTINGS.settling, first), special, part_of(progress, 0.2, 1.0))
+    search = BandSearch(work, (float(bounds[0]), float(bounds[1])), EFFORTS[read_effort(effort)].chaos)
+    search.look(work.simulate(np.repeat(values, starts), states, search.settings.settling, first), special, part_of(progress, 0.2, 1.0))
     return search.bands
 
 
@@ -300,13 +306,13 @@ class BandSearch:
         return [run[i] for i in np.unique(np.linspace(0, len(run) - 1, count).astype(int))]
 
     def _beside_windows(self, run: list[SearchedValue]) -> list[SearchedValue]:
-        """Where there are, beside chaos, motions that settle over a narrow part of a band: it may be a window."""
-        extents: dict[tuple[int, int], list[float]] = {}
+        """Ends and middles of narrow parts of a band in which motions of one kind settle beside chaos: they may be windows."""
+        extents: dict[tuple[int, int], list[SearchedValue]] = {}
         for place in run:
             for kind in place.kinds:
-                extents.setdefault(kind, []).append(place.value)
-        narrow = {kind for kind, values in extents.items() if values[-1] - values[0] <= self.settings.every * self.span}
-        return [place for place in run if place.kinds & narrow]
+                extents.setdefault(kind, []).append(place)
+        narrow = [some for some in extents.values() if some[-1].value - some[0].value <= self.settings.every * self.span]
+        return [place for some in narrow for place in (some[0], some[len(some) // 2], some[-1])]
 
     def tried(self) -> Tried:
         """What became of motions at all values."""
