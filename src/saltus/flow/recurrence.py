@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.enumerations import NumberedSentence
-from saltus.flow.ensemble.dataset_reading import stop_names, stroboscopic
-from saltus.flow.ensemble.ensemble import simulate_many
-from saltus.flow.ensemble.ensemble_dataset import extrema_names
+from saltus.flow.ensemble.ensemble import run_ensemble, simulate_many
+from saltus.flow.ensemble.ensemble_result import EnsembleResult
+from saltus.flow.ensemble.inputs import read_inputs
+from saltus.flow.ensemble.wanted import Sample, Until, Wanted, read_threads
 from saltus.flow.load_release import load_releases
 from saltus.flow.motion_dataset import state_names
 from saltus.flow.stops import Stop
+from saltus.flow.structures import limits_of
 from saltus.progress import Progress, silent
 from saltus.systems import System
 
@@ -182,31 +184,34 @@ def find_recurrence(
     progress
         Called with the fraction done.
     """
-    wanted = {"state": kept != 0, "extrema": extrema, "impact_count": impact_count, "speed": speed}
+    sampled = {Sample.STATE: kept != 0, Sample.EXTREMA: extrema, Sample.IMPACT_COUNT: impact_count, Sample.SPEED: speed}
     size = periods if kept is None else kept
-    result = motions_from(
-        system,
-        states,
-        parameters=parameters,
-        periods=periods,
-        until=("rest", "settled") if stop_early else (),
-        sample=tuple(name for name, chosen in wanted.items() if chosen),
-        last=max(1, min(max(size, max_period if extrema or impact_count or speed else 1), periods)),
+    wanted = Wanted(
         tol=tol,
-        threads=threads,
-        progress=progress,
+        periods=periods,
+        limits=limits_of(system, ()),
+        sample=tuple(name for name, chosen in sampled.items() if chosen),
+        until=(Until.REST, Until.SETTLED) if stop_early else (),
     )
-    found = _read(system, result, kept != 0)
-    found = replace(found, outcome=_outcome(system, result, parameters is not None))
-    return _with_periods(found, result["recurrence_period"].values if stop_early else None, max_period, settings)
+    last = max(1, min(max(size, max_period if extrema or impact_count or speed else 1), periods))
+    coordinates, velocity = _as_arguments(system, states)
+    inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
+    result = run_ensemble(system, inputs, wanted, read_threads(threads), progress, last=last)
+    found = replace(_read(result), outcome=_outcome(result, parameters is not None))
+    return _with_periods(found, result.recurrence_period if stop_early else None, max_period, settings)
 
 
 def motions_from(system: System, states: np.ndarray, **options: Any) -> xarray.Dataset:
     """`simulate_many` from states (n, d) at phase 0."""
+    coordinates, velocity = _as_arguments(system, states)
+    return simulate_many(system, **coordinates, velocity=velocity, **options)
+
+
+def _as_arguments(system: System, states: np.ndarray) -> tuple[dict[str, Any], Any]:
+    """States (n, d) as `simulate_many` takes them: coordinates by name, and the velocity."""
     names = system.model.coordinates
     velocities = tuple(states[:, len(names) + i] for i in range(len(names)))
-    start: dict[str, Any] = {name: states[:, i] for i, name in enumerate(names)}
-    return simulate_many(system, **start, velocity=velocities[0] if len(names) == 1 else velocities, **options)
+    return {name: states[:, i] for i, name in enumerate(names)}, velocities[0] if len(names) == 1 else velocities
 
 
 def last_states(system: System, result: xarray.Dataset) -> np.ndarray:
@@ -234,31 +239,31 @@ def nearest_return(states: np.ndarray, max_period: int) -> int:
     return 1 + int(np.argmin(return_distances(states, max_period)))
 
 
-def _read(system: System, result: xarray.Dataset, with_states: bool) -> Recurrence:
+def _read(result: EnsembleResult) -> Recurrence:
     """What was recorded of the motions, whose outcomes are not known yet."""
-    names, last = extrema_names(system.model.coordinates), last_states(system, result)
-    extrema = np.stack([result[name].values for name in names], axis=-1) if names[0] in result else None
+    last, samples = result.last, result.samples
+    assert result.periods is not None
+    columns = {kind: samples[kind][:, :, 0] if kind in samples else None for kind in (Sample.IMPACT_COUNT, Sample.SPEED)}
     return Recurrence(
         outcome=np.full(len(last), Outcome.MOVING, dtype=np.int8),
         period=np.zeros(len(last), dtype=int),
-        periods=result["periods"].values,
+        periods=result.periods,
         last=last,
-        states=stroboscopic(system, result) if with_states else np.empty((len(last), 0, last.shape[1])),
-        extrema=extrema,
-        impact_counts=result["period_impact_count"].values if "period_impact_count" in result else None,
-        speeds=result["least_speed"].values if "least_speed" in result else None,
+        states=samples.get(Sample.STATE, np.empty((len(last), 0, last.shape[1]))),
+        extrema=samples.get(Sample.EXTREMA),
+        impact_counts=columns[Sample.IMPACT_COUNT],
+        speeds=columns[Sample.SPEED],
     )
 
 
-def _outcome(system: System, result: xarray.Dataset, varied: bool) -> np.ndarray:
+def _outcome(result: EnsembleResult, varied: bool) -> np.ndarray:
     """The outcomes that do not follow from a period."""
-    stop = stop_names(result)
-    outcome = np.full(stop.shape, Outcome.MOVING, dtype=np.int8)
-    held = (result["side"].values == 0) & np.isin(stop, (Stop.HORIZON, Stop.REST))
+    outcome = np.full(len(result.stops), Outcome.MOVING, dtype=np.int8)
+    held = result.held & result.stopped(Stop.HORIZON, Stop.REST)
     if held.any():
-        outcome[held] = Outcome.HELD if varied or not _rest_lasts(system) else Outcome.REST
-    outcome[stop == Stop.CAPTURED] = Outcome.REST
-    outcome[~np.isin(stop, (Stop.HORIZON, Stop.REST, Stop.SETTLED, Stop.CAPTURED))] = Outcome.ENDED
+        outcome[held] = Outcome.HELD if varied or not _rest_lasts(result.system) else Outcome.REST
+    outcome[result.stopped(Stop.CAPTURED)] = Outcome.REST
+    outcome[~result.stopped(Stop.HORIZON, Stop.REST, Stop.SETTLED, Stop.CAPTURED)] = Outcome.ENDED
     return outcome
 
 

@@ -62,7 +62,7 @@ class JudgementSettings:
     apart: float = 1e-7
     longest_period: int = 128  # The longest period looked for in a regular motion that has not settled, in forcing periods.
     patience: int = 4000  # Forcing periods for which such a motion is followed, so that multipliers up to 0.99 may settle.
-    tol: float = 1e-8  # The error of a step: what is judged are averages over many motions, which shadow true ones.
+    tol: float = 1e-10  # The error of a step: with 1e-8, some motions that have settled do not come back near enough to be seen.
 
 
 JUDGEMENT = JudgementSettings()
@@ -277,7 +277,7 @@ class _Judgement:
             self.look_for_long_periods(self.open & (self.exponent < 0.0))
 
     def look_for_long_periods(self, chosen: np.ndarray) -> None:
-        """Follow those of the chosen (n,) that are not surely chaotic until they settle: near bifurcations exponents are near 0."""
+        """Follow those of the chosen, (n,), not surely chaotic until they settle: near bifurcations exponents are near 0."""
         rows = np.flatnonzero(chosen & ~self.positive & ~self.all_gone & ~self.looked)
         if not rows.size:
             return

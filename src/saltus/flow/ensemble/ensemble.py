@@ -12,6 +12,7 @@ from saltus.checks import check_memory, check_number, check_work
 from saltus.errors import ParameterError
 from saltus.flow.ensemble.compiled_lanes import compile_beside, compile_driver_aside, load_lane_functions
 from saltus.flow.ensemble.ensemble_dataset import to_dataset
+from saltus.flow.ensemble.ensemble_result import EnsembleResult
 from saltus.flow.ensemble.inputs import Inputs, read_inputs
 from saltus.flow.ensemble.lane_layout import JobLabel, JobNumber
 from saltus.flow.ensemble.threads import Jobs, Lanes
@@ -106,20 +107,21 @@ def simulate_many(
     )
     side, threads = read_side(side), read_threads(threads)
     inputs = read_inputs(system, velocity, time, parameters, coordinates)
-    return _run(system, inputs, wanted, duration, side, last, threads, progress)
+    return to_dataset(run_ensemble(system, inputs, wanted, threads, progress, duration=duration, side=side, last=last))
 
 
-def _run(
+def run_ensemble(
     system: System,
     inputs: Inputs,
     wanted: Wanted,
-    duration: float | None,
-    side: int,
-    last: int | str,
     threads: int,
     progress: Progress,
-) -> xarray.Dataset:
-    """Compile what is not there yet, run the trajectories, and write their dataset."""
+    *,
+    duration: float | None = None,
+    side: int = 0,
+    last: int | str = 1,
+) -> EnsembleResult:
+    """Compile what is not there yet, and run the trajectories."""
     driver = compile_driver_aside(system.model.held)
     run = program(system, wanted.limits, wanted.paths)
     if system.model.sides:
@@ -136,7 +138,7 @@ def _run(
     if driver is not None:
         compile_beside(driver, system.model.held)
     ends = lanes.run(jobs, threads, progress, total=float(np.sum(spans + 1)))
-    return to_dataset(system, inputs, wanted, jobs, ends)
+    return EnsembleResult(system, inputs, wanted, jobs, ends)
 
 
 def _capture(system: System, columns: dict[str, np.ndarray], limits: tuple[str, ...]) -> Any:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.flow.ensemble.lane_layout import EndLabel, EndNumber, JobLabel, JobNumber
-from saltus.flow.ensemble.wanted import Sample, Until, Wanted
+from saltus.flow.ensemble.lane_layout import EndLabel, EndNumber, JobNumber
+from saltus.flow.ensemble.wanted import Sample, Until
 from saltus.flow.kernel_layout import Mode, Status
 from saltus.flow.motion_dataset import rate_name, state_names
 from saltus.flow.stops import Stop
@@ -19,22 +19,9 @@ from saltus.taylor import FREQUENCY
 if TYPE_CHECKING:
     import xarray
 
+    from saltus.flow.ensemble.ensemble_result import EnsembleResult
     from saltus.flow.ensemble.inputs import Inputs
-    from saltus.flow.ensemble.threads import Ends, Jobs
-    from saltus.systems import Contact, Model, System
-
-STOPS = {
-    Status.DONE: Stop.HORIZON,
-    Status.LIMITED: Stop.LIMIT,
-    Status.CAPTURED: Stop.CAPTURED,
-    Status.SETTLED: Stop.SETTLED,
-    Status.NOT_UNIQUE: Stop.NOT_UNIQUE,
-    Status.NO_IMPACT: Stop.NO_IMPACT,
-    Status.NOT_FINITE: Stop.NOT_FINITE,
-    Status.STALLED: Stop.STALLED,
-    Status.OUTSIDE: Stop.OUTSIDE,
-    Status.UNRESOLVED: Stop.UNRESOLVED,
-}  # by the driver's reason; a motion that is DONE at rest ends with Stop.REST
+    from saltus.systems import Model, System
 
 # What a dataset has besides the coordinates and velocities of the model and what is called after those.
 FIXED = (
@@ -75,20 +62,21 @@ def result_names(names: tuple[str, ...]) -> set[str]:
     return {*FIXED, *DIMENSIONS, *states, *extrema, *further}
 
 
-def to_dataset(system: System, inputs: Inputs, wanted: Wanted, jobs: Jobs, ends: Ends) -> xarray.Dataset:
+def to_dataset(result: EnsembleResult) -> xarray.Dataset:
     """The ends of all trajectories and what was sampled of them."""
     import xarray
 
+    system, inputs = result.system, result.inputs
     writer = _Writer(system.model, inputs)
-    _add_ends(writer, jobs, ends, system.model.contacts)
-    _add_stops(writer, ends, wanted, bool(system.model.singularity))
+    _add_ends(writer, result)
+    _add_stops(writer, result)
     if system.model.contacts:
         _add_gains(writer, system, inputs)
-    _add_samples(writer, ends, wanted.sample)
-    if wanted.paths is not None:
-        _add_derivatives(writer, jobs, ends, wanted.paths, wanted.periods)
+    _add_samples(writer, result)
+    if result.wanted.paths is not None:
+        _add_derivatives(writer, result, result.wanted.paths)
     known: dict[str, Any] = {"kind": "ensemble", "Conventions": "CF-1.8"}
-    attributes = {"title": "ensemble computed by saltus"} | provenance(system, tol=wanted.tol, **known)
+    attributes = {"title": "ensemble computed by saltus"} | provenance(system, tol=result.wanted.tol, **known)
     attributes |= _add_inputs(writer, inputs)
     return xarray.Dataset(writer.variables, writer.coords, attributes)
 
@@ -113,26 +101,22 @@ class _Writer:
         self.variables[name] = xarray.Variable((*self.dims, *extra), reshaped, attributes, fastpath=True)
 
 
-def _add_ends(writer: _Writer, jobs: Jobs, ends: Ends, contacts: tuple[Contact, ...]) -> None:
+def _add_ends(writer: _Writer, result: EnsembleResult) -> None:
     """The states at the end, and what happened until then."""
-    rows = jobs.states.shape[1] // 2
+    ends, last, own = result.ends, result.last, len(writer.names)
     for i, (name, rate) in enumerate(zip(writer.names, writer.rates, strict=True)):
-        writer.add(name, ends.states[:, i], writer.units[name], f"{name} at the end")
-        writer.add(rate, ends.states[:, rows + i], writer.units[rate], f"d {name} / d tau at the end")
-    length, local = jobs.numbers[:, JobNumber.PERIOD_LENGTH], ends.numbers[:, EndNumber.TIME]
-    writer.add("time", ends.of(EndLabel.PERIOD) * length + local, "1", "dimensionless time tau at the end")
-    mode = ends.of(EndLabel.MODE)
-    held = (mode == Mode.REST) | (mode == Mode.CHATTER)
-    side, names = ends.of(EndLabel.SIDE), [contact.name for contact in contacts]
+        writer.add(name, last[:, i], writer.units[name], f"{name} at the end")
+        writer.add(rate, last[:, own + i], writer.units[rate], f"d {name} / d tau at the end")
+    writer.add("time", result.time, "1", "dimensionless time tau at the end")
+    side, names = ends.of(EndLabel.SIDE), [contact.name for contact in result.system.model.contacts]
     if names:
         writer.add("closed_contacts", (side - 1).astype(np.int16), "1", "contacts that are closed at the end", **_masks(names))
         side = np.ones_like(side)
-    writer.add("side", np.where(held, 0, side).astype(np.int8), "1", "side at the end, 0 at rest")
+    writer.add("side", np.where(result.held, 0, side).astype(np.int8), "1", "side at the end, 0 at rest")
     writer.add("impact_count", ends.of(EndLabel.IMPACTS), "1", "impacts")
     writer.add("grazings", ends.of(EndLabel.GRAZINGS), "1", "touches of the contact without an impact")
-    if (length > 0).all():
-        part = (local - jobs.numbers[:, JobNumber.START_TIME]) / length
-        writer.add("periods", _periods(jobs, ends) + part, "1", "forcing periods from the start to the end")
+    if result.periods is not None:
+        writer.add("periods", result.periods, "1", "forcing periods from the start to the end")
     text = "speed of the gap after impacts too small to be followed, else 0"
     writer.add("chatter_speed", ends.numbers[:, EndNumber.CHATTER_SPEED], "1", text)
 
@@ -150,12 +134,6 @@ def _add_gains(writer: _Writer, system: System, inputs: Inputs) -> None:
     for i, gain in enumerate(gains.values()):
         which |= np.where(gain > GAIN_ROUNDING, 1 << i, 0).astype(np.int16)
     writer.add("gaining_contacts", which, "1", "contacts at which impacts may gain energy", **_masks(list(gains)))
-
-
-def _periods(jobs: Jobs, ends: Ends) -> np.ndarray:
-    """How many forcing periods later a trajectory ended than it began, by their numbers; (n,)."""
-    periods: np.ndarray = ends.of(EndLabel.PERIOD) - jobs.labels[:, JobLabel.FIRST_PERIOD]
-    return periods
 
 
 def _add_inputs(writer: _Writer, inputs: Inputs) -> dict[str, float]:
@@ -179,23 +157,17 @@ def _is_coordinate(name: str, values: np.ndarray, inputs: Inputs) -> bool:
     return bool(np.array_equal(values_there.values.reshape(-1), values))
 
 
-def _add_stops(writer: _Writer, ends: Ends, wanted: Wanted, singular: bool) -> None:
+def _add_stops(writer: _Writer, result: EnsembleResult) -> None:
     """Why each trajectory ended."""
-    reasons, members = ends.of(EndLabel.STATUS), tuple(Stop)
-    codes = np.full(reasons.shape, -1, dtype=np.int8)
-    for reason, stop in STOPS.items():
-        codes[reasons == reason] = members.index(stop)
-    codes[(reasons == Status.DONE) & (ends.of(EndLabel.MODE) == Mode.REST)] = members.index(Stop.REST)
-    if singular:  # the model says what it means that its steps shrink to nothing
-        codes[reasons == Status.STALLED] = members.index(Stop.SINGULAR)
-    comment = "; ".join(f"{stop}: {stop.meaning}" for stop in Stop)
-    writer.add("stop", codes, "1", "why it ended", **_flags(members), comment=comment)
+    members, wanted, ends = tuple(Stop), result.wanted, result.ends
+    comment = "; ".join(f"{stop}: {stop.meaning}" for stop in members)
+    writer.add("stop", result.stops, "1", "why it ended", **_flags(members), comment=comment)
     if wanted.limits:
-        which = np.where(reasons == Status.LIMITED, ends.of(EndLabel.DETAIL), -1).astype(np.int8)
+        which = np.where(ends.of(EndLabel.STATUS) == Status.LIMITED, ends.of(EndLabel.DETAIL), -1).astype(np.int8)
         writer.add("limit", which, "1", "the margin that ended it, -1 for none", **_flags(wanted.limits))
     if Until.SETTLED in wanted.until:
-        period = np.where(reasons == Status.SETTLED, ends.of(EndLabel.DETAIL), 0)
-        writer.add("recurrence_period", period, "1", "forcing periods after which it repeats itself, 0 where it has not settled")
+        text = "forcing periods after which it repeats itself, 0 where it has not settled"
+        writer.add("recurrence_period", result.recurrence_period, "1", text)
 
 
 def _flags(names: tuple[str, ...]) -> dict[str, Any]:
@@ -203,14 +175,9 @@ def _flags(names: tuple[str, ...]) -> dict[str, Any]:
     return {"flag_values": np.arange(len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
 
 
-def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
-    """What was kept of the last forcing periods, in the order of time, nan where there were fewer; and of the whole motion."""
-    kept, done = ends.samples.shape[1], ends.of(EndLabel.PERIODS_DONE)
-    order = (done[:, None] + np.arange(kept)) % kept  # the oldest first
-    missing = np.arange(kept)[None, :] < (kept - done)[:, None]
-    samples = np.take_along_axis(ends.samples, order[:, :, None], axis=1)
-    samples[missing] = np.nan
-    first, column, extrema = writer.names[0], 0, extrema_names(writer.names)
+def _add_samples(writer: _Writer, result: EnsembleResult) -> None:
+    """What was kept of the last forcing periods, and the same of the whole motion."""
+    first, extrema, sample, numbers = writer.names[0], extrema_names(writer.names), result.wanted.sample, result.ends.numbers
     slowest = "the least speed before an impact, inf without impacts"
     unit = writer.units[first]
     meant = [f"the {which} {first if len(writer.names) == 1 else 'of all coordinates'}" for which in ("largest", "smallest")]
@@ -222,41 +189,38 @@ def _add_samples(writer: _Writer, ends: Ends, sample: tuple[str, ...]) -> None:
         Sample.SPEED: [("least_speed", unit, f"{slowest}, in the forcing period")],
         Sample.IMPACT_COUNT: [("period_impact_count", "1", "impacts in the forcing period")],
     }
-    for kind in Sample:
-        if kind in sample:
-            for variable, its_unit, text in variables[kind]:
-                writer.add(variable, np.ascontiguousarray(samples[:, :, column]), its_unit, text, "period")
-                column += 1
+    for kind, values in result.samples.items():
+        for column, (variable, its_unit, text) in enumerate(variables[kind]):
+            writer.add(variable, np.ascontiguousarray(values[:, :, column]), its_unit, text, "period")
     if Sample.EXTREMA in sample:
         for i, (name, text) in enumerate(zip(extrema, meant, strict=True)):
-            writer.add(f"overall_{name}", ends.numbers[:, EndNumber.HIGHEST + i], unit, f"{text} from the start to the end")
+            writer.add(f"overall_{name}", numbers[:, EndNumber.HIGHEST + i], unit, f"{text} from the start to the end")
     if Sample.SPEED in sample:
-        writer.add("overall_least_speed", ends.numbers[:, EndNumber.LEAST_SPEED], unit, f"{slowest}, from the start to the end")
+        writer.add("overall_least_speed", numbers[:, EndNumber.LEAST_SPEED], unit, f"{slowest}, from the start to the end")
 
 
-def _add_derivatives(writer: _Writer, jobs: Jobs, ends: Ends, paths: tuple[str, ...], periods: float | None) -> None:
+def _add_derivatives(writer: _Writer, result: EnsembleResult, paths: tuple[str, ...]) -> None:
     """The derivatives of the end state to the initial one and to parameters, (..., state, column).
 
     The time at the start is fixed. The time at the end is, too, but for two: where periods were asked for and the motion
     ends after n of them, start + n 2 pi / W moves with the frequency W; and where a margin ends it, with the margin.
     """
     states = [*writer.names, *writer.rates]
-    own, rows, columns = len(writer.names), jobs.states.shape[1] // 2, [*states, *paths]
+    ends, own, rows, columns = result.ends, len(writer.names), result.rows, [*states, *paths]
     q = ends.states[:, own:rows].reshape(-1, len(columns), own)
     v = ends.states[:, rows + own :].reshape(-1, len(columns), own)
     derivative = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
     rates = ends.numbers[:, EndNumber.RATES : EndNumber.RATES + own]
     shifts = ends.numbers[:, EndNumber.RATES + own :]
-    slope = np.concatenate([ends.states[:, rows : rows + own], rates], axis=1)
+    slope = np.concatenate([result.last[:, own:], rates], axis=1)
     limited = ends.of(EndLabel.STATUS) == Status.LIMITED
     with np.errstate(invalid="ignore"):  # the instant of a margin met without speed has no derivative
         derivative[limited] += slope[limited, :, None] * shifts[limited, None, :]
-    if periods is not None and FREQUENCY in paths:
+    if result.wanted.periods is not None and FREQUENCY in paths:
         at_period_end = np.isin(ends.of(EndLabel.STATUS), (Status.DONE, Status.SETTLED))
         moving = at_period_end & (ends.of(EndLabel.MODE) == Mode.ARC)
-        length = jobs.numbers[:, JobNumber.PERIOD_LENGTH]
-        local = ends.numbers[:, EndNumber.TIME] - jobs.numbers[:, JobNumber.START_TIME]
-        span = _periods(jobs, ends) * length + local
+        length = result.jobs.numbers[:, JobNumber.PERIOD_LENGTH]
+        span = result.whole_periods * length + result.elapsed
         shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # of the end, -span / W
         derivative[:, :, columns.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)
     writer.coords |= {"state": ("state", states), "column": ("column", columns)}

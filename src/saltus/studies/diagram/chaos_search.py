@@ -107,7 +107,9 @@ def chaotic_bands(
     first = part_of(progress, 0.0, 0.2, "looking for chaos")
     work = DiagramWork(system, path)
     search = BandSearch(work, (float(bounds[0]), float(bounds[1])), EFFORTS[read_effort(effort)].chaos)
-    search.look(work.simulate(np.repeat(values, starts), states, search.settings.settling, first), special, part_of(progress, 0.2, 1.0))
+    search.look(
+        work.simulate(np.repeat(values, starts), states, search.settings.settling, first), special, part_of(progress, 0.2, 1.0)
+    )
     return search.bands
 
 
