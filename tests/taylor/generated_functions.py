@@ -3,13 +3,13 @@
 from functools import cache
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 
 from saltus.flow import function_types
 from saltus.flow.compiled import load_structure
 from saltus.systems.parameters import numbers
 from saltus.taylor import record_table, trace
-from saltus.taylor.private_numba import pointers
+from saltus.taylor.private_numba import function_type, pointers
 
 
 @cache
@@ -20,7 +20,7 @@ def caller(name):
     scope = {}
     exec(f"def call(f, {arguments}):\n    return f({arguments})", scope)
     with pointers():
-        return njit(signature.return_type(types.FunctionType(signature), *signature.args))(scope["call"])
+        return njit(signature.return_type(function_type(signature), *signature.args))(scope["call"])
 
 
 class Generated:

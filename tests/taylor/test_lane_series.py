@@ -58,7 +58,7 @@ class LaneSeries:
         self.run = program(system)
         self.slots, (self.function, *_) = load_lane_functions(self.run.trace)
         with jit.pointers():
-            kind = types.FunctionType(LANE_SERIES)
+            kind = jit.function_type(LANE_SERIES)
             self.call = njit(types.void(kind, types.float64[::1], types.int64))(_call)
 
     def coefficients(self, states, order):

@@ -42,7 +42,7 @@ def partly(name, *more):
     return whole(name, *more)
 importlib.import_module = partly
 from saltus.taylor import private_numba as p
-assert not any((p.CPU_OPTIONS, p.FUNCTION_CACHE, p.RUNTIME, p.CONTEXT, p.LIBRARY, p.ADDRESS_PROTOCOL, p.EXPERIMENTAL))
+assert not any((p.CPU_OPTIONS, p.FUNCTION_CACHE, p.RUNTIME, p.CONTEXT, p.LIBRARY, p.EXPERIMENTAL))
 """
 
 
@@ -155,3 +155,28 @@ def test_motions_are_the_same_on_every_numba_allowed(which, tmp_path):
     assert version.startswith(f"{oldest}.") if which == "oldest" else version >= numba.__version__
     there = run(BOTH, tmp_path / "cache", tmp_path / "packages")
     assert there == pytest.approx(run(BOTH, cache_directory().parent), rel=1e-12, abs=1e-12)
+
+
+POINTED = """
+import importlib, sys
+whole = importlib.import_module
+def partly(name, *more):
+    if name.startswith(sys.argv[1]):
+        raise ImportError(name)
+    return whole(name, *more)
+importlib.import_module = partly
+import json
+from numba import float64, njit
+from saltus.taylor.private_numba import FUNCTION_MODEL, function_type, pointer, pointers
+with pointers():
+    square = njit(float64(float64))(lambda x: x * x)
+    twice = njit(float64(function_type(float64(float64)), float64))(lambda f, x: f(f(x)))
+    print(json.dumps([FUNCTION_MODEL is None, twice(pointer(square), 3.0)]))
+"""
+
+
+@pytest.mark.parametrize("missing", ["numba.experimental", "nothing"])
+def test_a_function_is_called_through_its_address_or_in_numba_s_own_way(missing):
+    result = subprocess.run([sys.executable, "-c", POINTED, missing], capture_output=True, text=True, check=True)
+    assert json.loads(result.stdout) == [missing == "numba.experimental", 81.0]
+    assert not result.stderr

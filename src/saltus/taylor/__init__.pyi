@@ -32,7 +32,7 @@ from .lane_vectors import (
 )
 from .load_tables import record_table, record_tables
 from .memory import Places
-from .private_numba import entry_point, pointer, pointers
+from .private_numba import entry_point, function_type, pointer, pointers
 from .records import anchor, expand_record, own_records
 from .rules import FUNCTIONS
 from .series import Rows
@@ -74,6 +74,7 @@ __all__ = [
     "first_lane",
     "fma",
     "function_text",
+    "function_type",
     "generated_header",
     "get",
     "inline_jit",

@@ -12,8 +12,8 @@ plain answer where a numba lacks it:
   that numba could compile, and `IndexDataCacheFile`, whose files get a digest: then numba's own `cache=True`;
 * what a function's library and context do when it has been compiled (`CPUContext`, `JITCodeLibrary`): machine code is made of
   those functions only that are called from outside: then it is made of all, which takes twice as long;
-* `WrapperAddressProtocol` and a compile result's `library` and `entry_point`, with which a function's address is looked up once
-  and calls skip numba's dispatch: then numba looks it up, at every call.
+* `FunctionModel` and a compile result's `library` and `entry_point`, with which a function's address is looked up once, is given
+  as a number, and calls skip numba's dispatch: then numba looks it up by Python code, at every call, and a Ctrl-C there is lost.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba import njit, types
-from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
+from numba.extending import NativeValue, intrinsic, lower_builtin, models, register_model, type_callable, typeof_impl, unbox
 
 
 def _private(module: str, name: str) -> Any:
@@ -53,7 +53,7 @@ RUNTIME = _private("numba.core.runtime", "rtsys")
 CONTEXT = _private("numba.core.cpu", "CPUContext")
 LIBRARY = _private("numba.core.codegen", "JITCodeLibrary")
 MAKE_FUNCTION = _private("numba._dynfunc", "make_function")
-ADDRESS_PROTOCOL = _private("numba.core.types", "WrapperAddressProtocol")
+FUNCTION_MODEL = _private("numba.experimental.function_type", "FunctionModel")
 EXPERIMENTAL = _private("numba.core.errors", "NumbaExperimentalFeatureWarning")
 
 DIGEST = hashlib.sha256().digest_size  # bytes
@@ -244,14 +244,42 @@ def entry_point(function: Any) -> Callable[..., Any]:
 
 
 def pointer(function: Any) -> Any:
-    """A compiled function as an argument for another one; its address is looked up once, not at every call."""
-    if ADDRESS_PROTOCOL is None:
+    """A compiled function as an argument of a `function_type` for another one."""
+    if FUNCTION_MODEL is None:
         return function
     (signature,) = function.nopython_signatures
     result = function.get_compile_result(signature)
-    address = int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
-    methods = {"__wrapper_address__": lambda self: address, "signature": lambda self: signature}
-    return type("Pointer", (ADDRESS_PROTOCOL,), methods)()
+    address = Pointer(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+    address.kind = function_type(signature)
+    return address
+
+
+def function_type(signature: Any) -> types.FunctionType:
+    """The type of arguments that are functions of this signature."""
+    return (types.FunctionType if FUNCTION_MODEL is None else PointedFunction)(signature)
+
+
+class Pointer(int):
+    """The address of a compiled function."""
+
+    kind: types.FunctionType
+
+
+class PointedFunction(types.FunctionType):
+    """A function that is given by its address."""
+
+
+def _address(kind: PointedFunction, given: Any, boundary: Any) -> NativeValue:
+    """A `Pointer` in compiled code."""
+    made = boundary.context.make_helper(boundary.builder, kind)  # all of its members are 0
+    made.c_addr = boundary.pyapi.long_as_voidptr(given)
+    return NativeValue(made._getvalue())
+
+
+if FUNCTION_MODEL is not None:
+    register_model(PointedFunction)(FUNCTION_MODEL)
+    typeof_impl.register(Pointer)(lambda given, context: given.kind)
+    unbox(PointedFunction)(_address)
 
 
 # --- code that is written for LLVM -----------------------------------------------------------------------------------------

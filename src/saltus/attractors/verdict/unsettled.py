@@ -263,12 +263,14 @@ class _Judgement:
     def measure(self) -> None:
         """The exponents of some survivors, by ever longer runs as long as these leave open whether they are positive.
 
-        The longest run is spared where a motion repeats itself after a long period and the exponent is hardly above 0.
+        The longest run is spared where the exponent seems to be below 0 and a motion repeats itself after a long period.
         """
         count = min(self.settings.measured, self.settings.companions)
         chosen = np.linspace(0, self.settings.companions - 1, count).astype(int)
         for runs in (self.settings.runs[:-1], self.settings.runs[-1:]):
             rows = np.flatnonzero(self.open & ~self.positive & ~self.negative & (self.period == 0))
+            if not runs or not rows.size:
+                continue
             columns = {path: values[rows] for path, values in self.parameters.items()}
             given = self.states[rows][:, chosen]
             found = largest_exponents(self.system, given, columns, runs=runs, tol=self.settings.tol)

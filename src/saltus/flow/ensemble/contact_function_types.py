@@ -16,7 +16,7 @@ from saltus.flow.ensemble.function_types import (
     TURNING_RANGE,
 )
 from saltus.flow.function_types import ADVANCE_CONTACTS, CONSTANTS, CONTACT_MODEL, MATRICES
-from saltus.taylor import pointers
+from saltus.taylor import function_type, pointers
 
 _f, _i = types.float64, types.int64
 _f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
@@ -27,10 +27,10 @@ _SOLVER = types.Tuple((_f1, *4 * (_f2,), *12 * (_f1,), _f2))
 SPACE = types.Tuple((_f1, _f1, _i1, _f1, _i2, _SOLVER))
 with pointers():
     _functions = (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS, MATRICES, LANE_ONE_FREE)
-    CODE = types.Tuple([types.FunctionType(s) for s in _functions])
-    SCALAR = types.Tuple((types.FunctionType(ADVANCE_CONTACTS), CONTACT_MODEL))
+    CODE = types.Tuple([function_type(s) for s in _functions])
+    SCALAR = types.Tuple((function_type(ADVANCE_CONTACTS), CONTACT_MODEL))
     SCALAR_MOTION = types.UniTuple(_i, 2)(_i, SCALAR, _i1, _i1, _f1, _i1, _f1, LANES, _f2, TABLES, _f1, _i1)
     CONTACTS_IMPACT = _i(_i, _i, SCALAR, _i1, _i1, _f1, _f1, LANES, _f2, TABLES, SPACE)
     _helpers = (LANE_ROOT, TURNING_RANGE, SCALAR_MOTION, CONTACTS_IMPACT)
-    HELPERS = types.Tuple([types.FunctionType(signature) for signature in _helpers])
+    HELPERS = types.Tuple([function_type(signature) for signature in _helpers])
 RUN_LANES = types.void(CODE, SCALAR, HELPERS, _i1, _i1, _f1, _f1, JOBS, TABLES, RESULTS, _i1)

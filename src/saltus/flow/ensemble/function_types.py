@@ -5,7 +5,7 @@ from __future__ import annotations
 from numba import types
 
 from saltus.flow.function_types import ADVANCE, CONSTANTS, GEOMETRY, MODEL
-from saltus.taylor import pointers
+from saltus.taylor import function_type, pointers
 
 _f, _i = types.float64, types.int64
 _f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
@@ -21,8 +21,8 @@ LANES = types.Tuple((_i2, _f2, _f2, _f2, _f3, _i2))  # what goes with each lane 
 RESULTS = types.Tuple((_f2, _f2, _i2, _f3))  # states; numbers; labels; samples
 with pointers():
     _functions = (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS, GEOMETRY)
-    CODE = types.Tuple([types.FunctionType(signature) for signature in _functions])
-    SCALAR = types.Tuple((types.FunctionType(ADVANCE), types.Tuple(tuple(MODEL.types[i] for i in (0, 1, 2, 3, 5)))))
+    CODE = types.Tuple([function_type(signature) for signature in _functions])
+    SCALAR = types.Tuple((function_type(ADVANCE), types.Tuple(tuple(MODEL.types[i] for i in (0, 1, 2, 3, 5)))))
     SCALAR_MOTION = types.UniTuple(_i, 2)(_i, SCALAR, _i1, _i1, _f1, _i1, _f1, LANES, _f2, TABLES, _f1, _i1)
-    HELPERS = types.Tuple([types.FunctionType(signature) for signature in (LANE_ROOT, TURNING_RANGE, SCALAR_MOTION)])
+    HELPERS = types.Tuple([function_type(signature) for signature in (LANE_ROOT, TURNING_RANGE, SCALAR_MOTION)])
 RUN_LANES = types.void(CODE, SCALAR, HELPERS, _i1, _i1, _f1, _f1, JOBS, TABLES, RESULTS, _i1)
