@@ -250,7 +250,7 @@ def pointer(function: Any) -> Any:
     (signature,) = function.nopython_signatures
     result = function.get_compile_result(signature)
     address = Pointer(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
-    address.kind = function_type(signature)
+    address.signature = signature
     return address
 
 
@@ -262,7 +262,7 @@ def function_type(signature: Any) -> types.FunctionType:
 class Pointer(int):
     """The address of a compiled function."""
 
-    kind: types.FunctionType
+    signature: Any
 
 
 class PointedFunction(types.FunctionType):
@@ -278,7 +278,7 @@ def _address(kind: PointedFunction, given: Any, boundary: Any) -> NativeValue:
 
 if FUNCTION_MODEL is not None:
     register_model(PointedFunction)(FUNCTION_MODEL)
-    typeof_impl.register(Pointer)(lambda given, context: given.kind)
+    typeof_impl.register(Pointer)(lambda given, context: function_type(given.signature))
     unbox(PointedFunction)(_address)
 
 

@@ -54,7 +54,8 @@ class EnsembleResult:
     @property
     def held(self) -> np.ndarray:
         """Which are held at the contact at the end, at rest or by impacts too small to be followed, (n,)."""
-        return np.isin(self.ends.of(EndLabel.MODE), (Mode.REST, Mode.CHATTER))
+        mode = self.ends.of(EndLabel.MODE)
+        return np.asarray((mode == Mode.REST) | (mode == Mode.CHATTER))
 
     @property
     def time(self) -> np.ndarray:
