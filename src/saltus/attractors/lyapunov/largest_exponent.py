@@ -10,9 +10,8 @@ import numpy as np
 from scipy.special import stdtrit
 
 from saltus.attractors.lyapunov.averages import resolution
-from saltus.attractors.lyapunov.neighbours import SETTINGS, Neighbours
+from saltus.attractors.lyapunov.neighbours import Neighbours
 from saltus.attractors.lyapunov.stretching import stretched
-from saltus.flow import motions_from
 from saltus.systems import System
 
 FEWEST = 4  # motions of which a scatter is taken
@@ -57,8 +56,8 @@ def largest_exponents(
     attractor, so that their scatter gives the error, by Student's t. Motions that are lost are left out, and so are those whose
     perturbations surely shrink where others surely grow. A perturbation is given a quarter of a run to turn to the direction that
     grows. Its growth is that of `simulate_many`'s derivatives, of which each run takes its own: along that direction they are
-    accurate however far it grows. Where contacts hold single coordinates and impacts are many, as those are that die away, it is
-    the parting of two neighbouring motions (`Neighbours`); a run then goes on from the one before, and is twice as long.
+    accurate however far it grows. With several contacts it is the parting of two neighbouring motions (`Neighbours`); a run then
+    goes on from the one before, and is twice as long.
 
     The resolution is 2 ln(t) / t for the time t of one motion, as regular ones may part like t^2.
 
@@ -71,29 +70,13 @@ def largest_exponents(
     """
     groups = len(states)
     frequency = parameters.get("load.frequency", np.array(system.load.frequency, dtype=float))
-    lengths, found = np.broadcast_to(2.0 * math.pi / frequency, groups), Largest.unknown(groups)
-    many = _have_many_impacts(system, states, parameters, runs[0] // 4, tol)
-    for rows, measured in ((many, _by_neighbours), (~many, _by_derivatives)):
-        if rows.any():
-            columns = {path: values[rows] for path, values in parameters.items()}
-            found.put(np.flatnonzero(rows), measured(system, states[rows], columns, lengths[rows], runs, tol))
-    return found
-
-
-def _have_many_impacts(
-    system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray], periods: int, tol: float
-) -> np.ndarray:
-    """Of which groups of motions neighbours are followed sooner than derivatives are, (groups,)."""
-    groups, size, d = states.shape
-    if not system.model.contacts:
-        return np.zeros(groups, dtype=bool)
-    columns = {path: np.repeat(values, size) for path, values in parameters.items()}
-    ends = motions_from(system, states.reshape(-1, d), parameters=columns, periods=periods, sample=(), tol=tol)
-    return np.asarray(ends["impact_count"].values.reshape(groups, size).mean(axis=1) > SETTINGS.many_impacts * periods)
+    lengths = np.broadcast_to(2.0 * math.pi / frequency, groups)
+    measured = _by_neighbours if system.model.contacts else _by_derivatives
+    return measured(system, states, parameters, lengths, runs, tol)
 
 
 def _by_neighbours(
-    system: System, states: np.ndarray, columns: dict[str, np.ndarray], lengths: np.ndarray, runs: Sequence[int], tol: float
+    system: System, states: np.ndarray, columns: Mapping[str, np.ndarray], lengths: np.ndarray, runs: Sequence[int], tol: float
 ) -> Largest:
     """The exponents of groups from one run that is doubled as long as their signs are open."""
     neighbours, found = Neighbours(system, states, columns, lengths, runs[0] // 4, tol), Largest.unknown(len(states))
@@ -105,7 +88,7 @@ def _by_neighbours(
 
 
 def _by_derivatives(
-    system: System, states: np.ndarray, columns: dict[str, np.ndarray], lengths: np.ndarray, runs: Sequence[int], tol: float
+    system: System, states: np.ndarray, columns: Mapping[str, np.ndarray], lengths: np.ndarray, runs: Sequence[int], tol: float
 ) -> Largest:
     """The exponents of groups from a run of its own after another, as long as their signs are open."""
     found, (size, d) = Largest.unknown(len(states)), states.shape[1:]

@@ -1,4 +1,4 @@
-"""The largest exponents of many motions from pairs of neighbours, in lanes, for models whose contacts hold coordinates.
+"""The largest exponents of many motions from pairs of neighbours, in lanes, for models with several contacts.
 
 A derivative of such a motion to its start is moved through every event by the scalar kernel, with a column for each variable of
 the state, while two motions go on in lanes, also through impacts that die away.
@@ -30,9 +30,6 @@ class NeighbourSettings:
     # The factor by which a pair may come together and still say by how much: its distance is then 100 times the error of a step.
     # What shrinks more is measured by derivatives.
     least: float = 1e-4
-    # Number of impacts in a forcing period from which pairs take less time than derivatives: with 5 both take about the same,
-    # with 50 derivatives three times as much.
-    many_impacts: int = 10
 
 
 SETTINGS = NeighbourSettings()

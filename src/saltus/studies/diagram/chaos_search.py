@@ -220,7 +220,11 @@ class BandSearch:
 
     def beside_special_points(self, special: Sequence[BandOrigin]) -> None:
         """Begin motions on the orbits of special points at values beside these."""
-        values = [(origin.value + share * self.span, origin.state) for origin in special for share in self.settings.beside]
+        chosen: list[BandOrigin] = []
+        for origin in sorted(special, key=lambda origin: origin.value):
+            if not chosen or origin.value - chosen[-1].value >= self.settings.apart * self.span:
+                chosen.append(origin)
+        values = [(origin.value + share * self.span, origin.state) for origin in chosen for share in self.settings.beside]
         inside = [(value, state) for value, state in values if self.bounds[0] <= value <= self.bounds[1]]
         self.follow([value for value, _ in inside], [np.array([state]) for _, state in inside])
 

@@ -46,7 +46,9 @@ EFFORTS = {
         jumps=0,
         sample=300,
         samples=1,
-        chaos=replace(CHAOS, step=4e-3, fine_step=2e-3, edge=1e-3, judgements=CHAOS.judgements[:1]),
+        chaos=replace(
+            CHAOS, step=4e-3, fine_step=2e-3, edge=1e-3, judgements=CHAOS.judgements[:1], beside=(-4e-4, 4e-4), apart=1e-2
+        ),
     ),
     Effort.STANDARD: EffortSettings(
         values=201, starts=24, periods=400, repelling_values=25, branches=30, jumps=2, sample=1000, samples=3
