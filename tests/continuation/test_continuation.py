@@ -252,3 +252,41 @@ def test_newton_takes_what_rounding_leaves_and_refuses_what_diverges():
     assert newton(evaluate, linear, np.array([1.0, 3.0]), 2) is None
     assert newton(evaluate, linear, np.array([0.0, 1.0]), 12) is None
     assert newton(lambda place, thorough: None, linear, np.array([1.0]), 12) is None
+
+
+@pytest.mark.parametrize("power", [0.5, 0.6, 1.0, 3.0])
+def test_a_zero_is_located_from_the_side_on_which_the_function_is_a_power(power):
+    """Beyond it the function says no more than its sign, and still few points are asked for."""
+    zero, asked = 0.3712345678901234, []
+
+    def value(point: Point) -> float:
+        away = zero - float(point.place[0])
+        asked.append(away)
+        return away**power * (2.0 + away) if away > 0.0 else -1e-300
+
+    line = Explicit(lambda place: place[1], lambda place: np.array([0.0, 1.0]))
+    begin, end = (line.solve(np.array([x, 0.0]), np.array([1.0, 0.0])) for x in (0.0, 1.0))
+    found = located(Function("border", value, 1e-12, one_sided=True), begin, end)
+    assert abs(found.point.place[0] - zero) < 1e-12
+    assert found.evidence.bracket < 2e-12
+    assert len(asked) < 26  # bisection to this width takes 40
+
+
+def test_a_corrector_that_goes_round_at_a_kink_is_given_up():
+    """Newton's method jumps to and fro between both branches of 1 + abs(x), which has no zero, until it is told not to."""
+    asked = []
+
+    def kinked(place: np.ndarray) -> float:
+        asked.append(place)
+        return 1e-3 * (1.0 + abs(place[0] / 1e-3 - 0.5))
+
+    curve = Explicit(kinked, lambda place: np.array([np.sign(place[0] / 1e-3 - 0.5), 0.0]))
+    guess, along = np.array([0.0, 0.0]), np.array([0.0, 1.0])
+    assert curve.solve_within(guess, along, 1.0) is None
+    assert len(asked) <= 3
+    asked.clear()
+    assert curve.solve(guess, along) is None
+    assert len(asked) == curve.iterations + 1
+    asked.clear()
+    assert curve.solve_within(guess, along, 1e-4) is None  # farther than it may go
+    assert len(asked) == 1
