@@ -156,6 +156,13 @@ def test_a_picture_is_beside_its_data_unless_another_folder_is_named(saltus, tmp
     assert saltus("plot", "motion.nc").stdout == "The picture is in .: motion.png, motion.pdf\n"
 
 
+def test_a_picture_s_name_in_the_place_of_a_folder_is_refused(refused, tmp_path):
+    """It would become a folder with the name of a picture."""
+    said = refused("plot", tmp_path / "motion.nc", "-o", tmp_path / "mine.png")
+    assert "--output names a folder, in which the picture is motion.png" in said
+    assert not (tmp_path / "mine.png").exists()
+
+
 def test_a_folder_that_cannot_be_written_to_is_told(refused, tmp_path):
     netcdf(tmp_path / "a.nc", {"kind": "motion"}, x=("day", [1.0]))
     assert "a.nc is a file; name another with --output" in refused("plot", tmp_path / "a.nc", "-o", tmp_path / "a.nc")

@@ -16,12 +16,14 @@ def plot_store(path: Path, output: Path | None) -> None:
     Raises
     ------
     ParameterError
-        There is no result of saltus at `path`, a sweep is not complete, a folder cannot be written to.
+        There is no result of saltus at `path`, a sweep is not complete, `output` is no folder or cannot be written to.
     """
     from saltus.config import open_result
     from saltus.files import UNCHECKED, check_writable, has_checksum
 
     folder = path.parent if output is None else output
+    if folder.suffix in (".png", ".pdf") and not folder.is_dir():
+        raise ParameterError(f"--output names a folder, in which the picture is {path.stem}.png, got {folder}; leave out the file")
     check_writable(folder)
     data = open_result(path)
     _check_sizes(path, data)
