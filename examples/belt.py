@@ -1,5 +1,5 @@
 """A mass on a belt: stick-slip, and where dry friction takes the energy of a forced oscillator
-===========================================================================================
+============================================================================================
 
 On a belt that moves at w a mass on a spring sticks until the spring pulls with mu_s N, then slips on a circle about
 x = mu_k N / k until it has the belt's speed again. On a belt that stands still friction bounds the resonance of a forced
