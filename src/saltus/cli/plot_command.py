@@ -23,7 +23,7 @@ def plot_store(path: Path, output: Path | None) -> None:
 
     folder = path.parent if output is None else output
     if folder.suffix in (".png", ".pdf") and not folder.is_dir():
-        raise ParameterError(f"--output names a folder, in which the picture is {path.stem}.png, got {folder}; leave out the file")
+        raise ParameterError(f"--output names a folder, in which the picture is {path.stem}.png, got {folder}")
     check_writable(folder)
     data = open_result(path)
     _check_sizes(path, data)
