@@ -133,9 +133,9 @@ class BandSearch:
         """Look where these motions and special points are, which it has not seen; returns the motions that it has begun."""
         known, fresh = len(self.further), list[BandOrigin]()
         for origin in special:
-            if not any(self._is_same(origin, other) for other in (*self.special, *fresh)):
+            if not self._is_known(origin):
                 fresh.append(origin)
-        self.special = sorted([*self.special, *fresh], key=lambda origin: origin.value)
+                insort(self.special, origin, key=lambda other: other.value)
         self.take(begun)
         self.spread()
         self.beside_special_points(fresh)
@@ -147,10 +147,11 @@ class BandSearch:
         further = self.further[known + 1 :]
         return further[0].joined(*further[1:]) if further else begun.only(slice(0))
 
-    def _is_same(self, one: BandOrigin, other: BandOrigin) -> bool:
-        """Whether two special points are one: that of a branch is found again on the one that is born at it."""
-        near = self.settings.same * self.span
-        return abs(one.value - other.value) <= near and np.allclose(one.state, other.state, rtol=0.0, atol=self.settings.same)
+    def _is_known(self, origin: BandOrigin) -> bool:
+        """Whether a special point is one that is known: that of a branch is found again on the one that is born at it."""
+        near, same = self.settings.same * self.span, self.settings.same
+        ends = (bisect_left(self.special, origin.value + side, key=lambda other: other.value) for side in (-near, near))
+        return any(np.allclose(origin.state, other.state, rtol=0.0, atol=same) for other in self.special[slice(*ends)])
 
     @property
     def bands(self) -> Bands:
@@ -211,8 +212,9 @@ class BandSearch:
     def spread(self) -> None:
         """Carry what goes on to neighbouring values: motions begun on it, as long as they find more."""
         while True:
-            pairs = [pair for a, b in pairwise(self.places) for pair in ((a, b), (b, a))]
-            fresh = [(a, b) for a, b in pairs if a.goes_on and not b.goes_on and (a.value, b.value) not in self.carried]
+            marked = [(place, place.goes_on) for place in self.places]
+            pairs = [(a, b) if on else (b, a) for (a, on), (b, other) in pairwise(marked) if on != other]
+            fresh = [(a, b) for a, b in pairs if (a.value, b.value) not in self.carried]
             if not fresh:
                 return
             self.carried.update((a.value, b.value) for a, b in fresh)

@@ -274,8 +274,10 @@ class DiagramSearch:
 
     def _in_bands(self, values: np.ndarray) -> np.ndarray:
         """Which values lie in a band of chaos, (n,)."""
-        bands = () if self.chaos is None else self.chaos.bands
-        return np.array([any(band.low <= value <= band.high for band in bands) for value in values.tolist()], dtype=bool)
+        inside = np.zeros(len(values), dtype=bool)
+        for band in () if self.chaos is None else self.chaos.bands:
+            inside |= (values >= band.low) & (values <= band.high)
+        return inside
 
 
 def _middle(run: np.ndarray) -> int:
