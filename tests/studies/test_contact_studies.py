@@ -12,7 +12,7 @@ from saltus.errors import ParameterError
 from saltus.orbits import initial_states, orbits_near_returns, search_orbits, solved_near
 from saltus.plots import draw_diagram, draw_stability_chart
 from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
-from saltus.studies.diagram.chaos_search import BandSearch
+from saltus.studies.diagram.chaos_search import BandOrigin, BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EFFORTS, Effort
 from saltus.studies.diagram.simulated import followed
@@ -177,3 +177,21 @@ def test_orbits_of_a_loose_mass_that_no_wall_touches_are_a_continuum_and_no_bran
     shift = 1e-3 * np.array([1.0, -1.0, 0.0, 0.0])
     returns = np.stack([state + shift, state + 0.5 * shift])[None, None]
     assert orbits_near_returns(pair, "load.frequency", np.array([frequency]), returns, [np.empty((0, 4))], 1) == []
+
+
+def test_a_stored_diagram_of_two_stops_is_the_one_without_a_store_and_is_found_again(tmp_path):
+    few = {"values": [0.52, 0.62], "starts": 4, "max_period": 1, "effort": "quick", "repelling": 0, "switch": False}
+    plain = bifurcation_diagram(stops(), FORCE, (0.5, 0.65), **few)
+    for _ in range(2):  # computed, then read
+        kept = bifurcation_diagram(stops(), FORCE, (0.5, 0.65), **few, store=tmp_path / "diagram.zarr")
+        for name in ("points", "attractors", "special", "bands"):
+            assert kept[name].to_dataset().identical(plain[name].to_dataset())
+
+
+def test_of_special_points_that_crowd_only_some_are_looked_beside(monkeypatch):
+    begun = []
+    settings = replace(EFFORTS[Effort.QUICK].chaos, beside=(0.0,), apart=0.1)
+    search = BandSearch(DiagramWork(stops(), FORCE), (1.0, 2.0), settings)
+    monkeypatch.setattr(search, "follow", lambda values, starts: begun.extend(values))
+    search.beside_special_points([BandOrigin("LP", value, (0.0, 0.5)) for value in (1.3, 1.0, 1.05, 1.125)])
+    assert begun == [1.0, 1.125, 1.3]
