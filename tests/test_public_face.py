@@ -317,7 +317,7 @@ def alone(monkeypatch, tmp_path):
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(simulation, "follow", begun)
-    monkeypatch.setattr(ensemble, "_run", begun)
+    monkeypatch.setattr(ensemble, "compile_driver_aside", begun)
     monkeypatch.setattr(problem.Problem, "evaluate", begun)
 
 

@@ -68,7 +68,7 @@ def asked(saltus, tmp_path, monkeypatch):
     monkeypatch.setattr(command, "computed", begun)
     monkeypatch.setattr("saltus.cli.simulate_command.simulate_study", begun)
     monkeypatch.setattr(simulation, "follow", computed)
-    monkeypatch.setattr(ensemble, "_run", computed)
+    monkeypatch.setattr(ensemble, "compile_driver_aside", computed)
 
     def ask(part, key, value):
         kind = part if part in ASKS else "simulate"

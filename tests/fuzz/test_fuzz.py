@@ -37,7 +37,7 @@ def nothing_is_computed(monkeypatch):
         raise Computed
 
     monkeypatch.setattr(simulation, "follow", begun)
-    monkeypatch.setattr(ensemble, "_run", begun)
+    monkeypatch.setattr(ensemble, "compile_driver_aside", begun)
     monkeypatch.setattr(problem.Problem, "evaluate", begun)
 
 
