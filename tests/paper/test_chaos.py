@@ -147,7 +147,11 @@ def test_chaos_is_a_collision_where_orbits_meet_at_most_edges_about_the_resonanc
     assert verdicts(chaos_measures.force_spectra({0.2: panel(), 3.0: tree}))["fig09-collision"] is verdict
 
 
-ROUTES = {"both": (("cascade", "cascade"), ("grazing", "crisis")), "cascades": (("cascade", "crisis"), ("cascade", "fold"))}
+ROUTES = {
+    "both": (("cascade", "grazing"), ("grazing", "crisis")),
+    "cascades": (("cascade", "crisis"), ("cascade", "fold")),
+    "later": (("cascade", "crisis"), ("grazing", "fold")),
+}
 
 
 @pytest.mark.parametrize(
@@ -155,6 +159,7 @@ ROUTES = {"both": (("cascade", "cascade"), ("grazing", "crisis")), "cascades": (
     [
         (ROUTES["both"], ROUTES["both"], ClaimVerdict.AS_PRINTED),
         (ROUTES["both"], ROUTES["cascades"], ClaimVerdict.CORRECTED),  # no grazing leads to chaos in one of them
+        (ROUTES["both"], ROUTES["later"], ClaimVerdict.CORRECTED),  # nor to the first chaos here
         (ROUTES["cascades"], ROUTES["cascades"], ClaimVerdict.DISAGREES),  # nor anywhere
         (ROUTES["both"], (("unknown", "grazing"), ("fold", "fold")), ClaimVerdict.DISAGREES),  # nor a cascade
     ],

@@ -178,26 +178,31 @@ def force_diagrams(panels: Panels) -> dict[str, Measured | None]:
 
 
 def _route(panels: Panels) -> Measured:
-    """As printed: in every panel chaos is reached by cascades and by grazings. Erratum 39: in one of them by cascades alone, as
-    far as it is known what happens at the edges of its bands."""
-    rows = []
+    """As printed: in every panel chaos is reached by cascades and by grazings. Erratum 39: in one of them the first chaos is
+    reached by a cascade alone, as a band that begins at the end of one ends before any edge is at a grazing."""
+    rows, alone = [], []
     for frequency, tree in panels.items():
         born = [branch for _, branch in branches_of(tree) if "PD" in branch.attrs["end_kinds"]]
         periods = sorted({int(branch["period"][0]) for branch in born})
-        edges = [str(kind) for edge in ("low_edge", "high_edge") for kind in tree["bands"][edge].values]
+        bands = tree["bands"]
+        edges = [str(kind) for edge in ("low_edge", "high_edge") for kind in bands[edge].values]
+        at = np.concatenate([bands["low"].values, bands["high"].values])
         number = {kind: edges.count(kind) for kind in EDGES}
+        first = {kind: at[np.array(edges) == kind].min(initial=np.inf) for kind in ("cascade", "grazing")}
+        alone.append(bool(np.any((bands["low_edge"].values == "cascade") & (bands["high"].values < first["grazing"]))))
         rows.append(
             {
                 "frequency": frequency,
                 "unknown": len(edges) - sum(number.values()),
                 "periods": [{"period": q} for q in periods],
                 "grazings": count(tree, "GR"),
+                **{f"first_{kind}": [{"load": load}] * bool(number[kind]) for kind, load in first.items()},
                 **number,
             }
         )
     cascades = bool(rows) and all(row["cascade"] for row in rows)
     grazes = [bool(row["grazing"]) for row in rows]
-    return measured(cascades and all(grazes), cascades and any(grazes) and not all(grazes), panels=rows)
+    return measured(cascades and all(grazes) and not any(alone), cascades and any(grazes) and any(alone), panels=rows)
 
 
 def two_regions(panels: Panels) -> Measured:
