@@ -80,6 +80,16 @@ def test_the_brackets_of_edges_are_narrow(quasi_periodic_band):
             assert not tried.chaotic[tried.values == edge.outer].any()
 
 
+def test_a_quick_effort_halves_brackets_less_far():
+    """To a thousandth of the range where "standard" goes on to a tenth of that; the edge is that of the band above."""
+    low, high = 0.35, 0.37
+    found = chaotic_bands(forced(0.2), FREQUENCY, (low, high), count=5, starts=4, window=WINDOW, effort="quick")
+    widest = max(found.bands, key=lambda band: band.high - band.low)
+    assert 0.36 < widest.low < 0.365
+    bracket = abs(widest.lower.outer - widest.lower.inner) / (high - low)
+    assert 1e-4 < bracket <= 1.0001e-3
+
+
 def test_plain_simulation_agrees_with_the_bands_at_random_values(quasi_periodic_band):
     """Motions that no band or window knows of, 2000 periods each, at values away from the edges by more than their brackets."""
     values = np.random.default_rng(5).uniform(0.35, 0.43, 60)

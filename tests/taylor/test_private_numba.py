@@ -167,16 +167,22 @@ def partly(name, *more):
 importlib.import_module = partly
 import json
 from numba import float64, njit
-from saltus.taylor.private_numba import FUNCTION_MODEL, function_type, pointer, pointers
+from saltus.taylor.private_numba import FUNCTION_MODEL, entry_point, function_type, pointer, pointers
 with pointers():
     square = njit(float64(float64))(lambda x: x * x)
     twice = njit(float64(function_type(float64(float64)), float64))(lambda f, x: f(f(x)))
-    print(json.dumps([FUNCTION_MODEL is None, twice(pointer(square), 3.0)]))
+    call, address, begun = entry_point(twice), pointer(square), []
+    sys.setprofile(lambda frame, event, argument: begun.append(event))
+    called = call(address, 3.0)
+    sys.setprofile(None)
+    print(json.dumps([FUNCTION_MODEL is None, "call" in begun, called, twice(address, 3.0)]))
 """
 
 
 @pytest.mark.parametrize("missing", ["numba.experimental", "nothing"])
 def test_a_function_is_called_through_its_address_or_in_numba_s_own_way(missing):
+    """Through its address without a line of Python, in which a Ctrl-C would become another error."""
     result = subprocess.run([sys.executable, "-c", POINTED, missing], capture_output=True, text=True, check=True)
-    assert json.loads(result.stdout) == [missing == "numba.experimental", 81.0]
+    own_way = missing == "numba.experimental"
+    assert json.loads(result.stdout) == [own_way, own_way, 81.0, 81.0]
     assert not result.stderr

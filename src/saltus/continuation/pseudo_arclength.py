@@ -19,9 +19,8 @@ class EquationCurve(Curve[P]):
 
     iterations = 7  # of Newton's method in a hyperplane: where it takes more the step is too long
     iterations_at = 12  # and at a fixed number, where the guess may be farther away
-    stray: float = (
-        math.inf
-    )  # Share of a step: a corrector that leads farther than this from where a step was predicted is given up.
+    # Share of a step: a corrector that leads farther than this from where the step was predicted is given up.
+    stray: float = math.inf
 
     @abstractmethod
     def evaluate(self, place: np.ndarray, thorough: bool) -> Evaluation | None:

@@ -36,7 +36,7 @@ class NearReturnSettings:
     still: float = 1e-6  # An orbit no larger than this is rest.
     # An orbit with a multiplier this near to 1 is one of a continuum at its value of the parameter, such as those of a mass that
     # no wall and no spring holds: it has no branch. Those of a fold are as near within 1e-14 of its value alone.
-    alone: float = 1e-7
+    isolated: float = 1e-7
     tol: float = 1e-11  # The error of a step.
 
 
@@ -70,7 +70,7 @@ def orbits_near_returns(
                 continue
             known[row] = np.concatenate([known[row], state[None]])
             orbit = solved_near(system.with_({path: float(values[row])}), path, state, period)
-            if orbit is not None and _is_alone(orbit) and not any(same_orbit(orbit, o) for place, o in found if place == row):
+            if orbit is not None and _is_isolated(orbit) and not any(same_orbit(orbit, o) for place, o in found if place == row):
                 found.append((row, orbit))
     return [orbit for _, orbit in found]
 
@@ -86,9 +86,9 @@ def solved_near(system: System, path: str, state: np.ndarray, period: int) -> Pe
     return orbit if orbit is not None and orbit.admissible and orbit.amplitude > SETTINGS.still else None
 
 
-def _is_alone(orbit: PeriodicOrbit) -> bool:
+def _is_isolated(orbit: PeriodicOrbit) -> bool:
     """Whether there is no other orbit at once beside one."""
-    return bool((np.abs(orbit.multipliers - 1.0) > SETTINGS.alone).all())
+    return bool((np.abs(orbit.multipliers - 1.0) > SETTINGS.isolated).all())
 
 
 def _guesses(states: np.ndarray, period: int) -> np.ndarray:

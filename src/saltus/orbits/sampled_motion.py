@@ -62,11 +62,8 @@ class SampledMotion:
 
     def at(self, step: int, tau: np.ndarray) -> SampledMotion:
         """One step at other instants since its start."""
-        powers, c, orders = (
-            np.vander(tau, self.series.shape[2], increasing=True).T,
-            self.series[step],
-            ORDERS[: self.series.shape[2]],
-        )
+        c = self.series[step]
+        powers, orders = np.vander(tau, c.shape[1], increasing=True).T, ORDERS[: c.shape[1]]
         position, velocity = (c @ powers)[:, None], ((c * orders)[:, 1:] @ powers[:-1])[:, None]
         acceleration = ((c * orders * (orders - 1))[:, 2:] @ powers[:-2])[:, None]
         time, one = (self.time[step, :1] - self.tau[step, :1] + tau)[None], [step]

@@ -20,7 +20,7 @@ from saltus.studies import chaotic_bands
 WINDOWS = {"a": (0.35, 0.42), "b": (0.405, 0.475)}  # Omega
 TITLES = {"a": r"load (i), $\widehat{\mathcal{H}}=0.2$", "b": r"load (ii), $\widehat{\zeta}=0.5$"}
 COUNT, STARTS = 57, 4
-EFFORT = "quick"  # steps of 4e-3 of these windows: a tenth of those of Figs. 9 and 10
+EFFORT = "quick"  # steps of 4e-3 of these windows: less than a tenth of those of Figs. 9 and 10
 
 
 def panels(windows: Mapping[str, tuple[float, float]] = WINDOWS, count: int = COUNT, starts: int = STARTS) -> Panels:
