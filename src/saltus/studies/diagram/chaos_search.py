@@ -258,24 +258,27 @@ class BandSearch:
 
     def locate_edges(self) -> None:
         """Halve the brackets of all edges and judge their chaotic sides with care; where these are none, those near them, too."""
-        for i in range(self.settings.confirmations):
+        for _ in range(self.settings.confirmations):
             self._halve()
             runs = [(run, self._some_of(run)) for run in self._runs()]
             failed = self._confirm((place for run, some in runs for place in some + self._beside_windows(run)), 1)
-            leaving = [a for a, b in self._edges() if b.life >= self.settings.lasting]
+            leaving = [a for a, b in self._edges() if self.settings.lasting <= b.life < np.inf]
             leaving += [place for _, some in runs for place in _beside_settled(some)]
             leaving += [place for place in self.places if place.settled and place.care == 1]
             failed += self._confirm(leaving, 2)
             if not failed:
                 return
-            self._confirm_near(failed, self.settings.near * 2**i)
+            self._confirm_near(failed)
 
-    def _confirm_near(self, failed: list[SearchedValue], count: int) -> None:
-        """Judge so much chaos on each side of values that have turned out to have none as these were judged."""
-        chaotic = [place for place in self.places if place.chaotic]
+    def _confirm_near(self, failed: list[SearchedValue]) -> None:
+        """Judge chaos on each side of values that turned out to have none as these were judged, and beside those that fail."""
         for care in {place.care for place in failed}:
-            at = [bisect_left(chaotic, place) for place in failed if place.care == care]
-            self._confirm((place for i in at for place in chaotic[max(0, i - count) : i + count]), care)
+            beside, reach = [place.value for place in failed if place.care == care], self.settings.near
+            while beside:
+                chaotic = [place for place in self.places if place.chaotic]
+                at = [bisect_left(chaotic, SearchedValue(value)) for value in beside]
+                near = {place.value: place for i in at for place in chaotic[max(0, i - reach) : i + reach]}
+                beside, reach = [place.value for place in self._confirm(near.values(), care)], 2 * reach
 
     def _edges(self) -> list[tuple[SearchedValue, SearchedValue]]:
         """Neighbours of which the first is chaotic and the second is not."""

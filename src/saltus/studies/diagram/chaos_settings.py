@@ -34,9 +34,10 @@ class ChaosSettings:
         replace(JUDGEMENT, exposure=100_000, round_periods=1125, rounds=8),
     )
     every: float = 0.02  # Share of the range in which each band has a value that is judged with care.
-    # Number of values with chaos on each side of one that fails a careful judgement that are judged so then; doubled every round.
+    # Number of values with chaos on each side of one that fails a careful judgement that are judged so then, and twice as many on
+    # each side of those that fail, and so on.
     near: int = 3
-    lasting: float = 1000.0  # Mean life, in forcing periods, from which transients beside a band are long.
+    lasting: float = 1000.0  # Mean life, in forcing periods, from which transients beyond an edge are long.
     confirmations: int = 20  # The largest number of rounds in which edges are located and confirmed.
 
 

@@ -66,32 +66,40 @@ class PlacedBranch:
         each = np.lexsort((before, rows))
         return rows[each], before[each]
 
-    def extrema(self, value: float, before: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Extrema and slowest impact at a value after the point of this number: read off, uncertainty, change to the next.
+    def extrema(self, values: np.ndarray, before: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Extrema and slowest impact at values (k,) after the points of these numbers, (k, 3), how uncertain they are as they are
+        read off, and how much they change to the next point, (k,) each.
 
         The uncertainty is inf where the parameter turns, or where too few points are joined.
         """
-        first = max(0, before - 1)
-        last = min(before + 2, len(self.columns[0]) - 1)
-        parameter, extrema = self.columns[0, first : last + 1], self.columns[SEEN, first : last + 1]
-        a, b = before - first, before - first + 1
-        change = np.abs(extrema[:, b] - extrema[:, a])
-        width = parameter[b] - parameter[a]
-        share = (value - parameter[a]) / width if width else 0.0
-        straight = extrema[:, a] + share * (extrema[:, b] - extrema[:, a])
-        steps = np.diff(parameter)
-        if last - first < 3 or not self.joined[first:last].all() or not ((steps > 0).all() or (steps < 0).all()):
-            return straight, np.full(len(SEEN), np.inf), change
-        cubic, quadratic = _lagrange(parameter, extrema, value), _lagrange(parameter[:3], extrema[:, :3], value)
-        return cubic, np.abs(cubic - quadratic), change
+        here, there = self.columns[SEEN][:, before], self.columns[SEEN][:, before + 1]
+        parameter = self.columns[0]
+        width = parameter[before + 1] - parameter[before]
+        share = np.divide(values - parameter[before], width, out=np.zeros(len(values)), where=width != 0.0)
+        read, uncertain = here + share * (there - here), np.full(len(values), np.inf)
+        smooth = np.flatnonzero(self._smooth[before])
+        four = before[smooth, None] + np.arange(-1, 3)
+        nodes, seen = parameter[four], self.columns[SEEN][:, four]
+        cubic, quadratic = _lagrange(nodes, seen, values[smooth]), _lagrange(nodes[:, :3], seen[..., :3], values[smooth])
+        read[:, smooth], uncertain[smooth] = cubic, np.abs(cubic - quadratic).max(axis=0)
+        return read.T, uncertain, np.abs(there - here).max(axis=0)
+
+    @cached_property
+    def _smooth(self) -> np.ndarray:
+        """Whether a point and the next one have a neighbour each, the four are joined, and the parameter does not turn, (n,)."""
+        smooth, steps = np.zeros(len(self.columns[0]), dtype=bool), np.diff(self.columns[0])
+        if len(steps) >= 3:
+            three = np.lib.stride_tricks.sliding_window_view(np.where(self.joined, np.sign(steps), 0.0), 3)
+            smooth[1:-2] = np.abs(three.sum(axis=1)) == 3.0
+        return smooth
 
     def holds(self, orbit: PeriodicOrbit, value: float) -> bool:
         """Whether an orbit at a value, stable or not, or its mirror image, lies on the branch."""
         seen = _seen(orbit)
         for before in self.crossings(np.array([value]), stable=False)[1].tolist():
-            expected, _, change = self.extrema(value, before)
-            near = SETTINGS.near * max(orbit.amplitude, SETTINGS.least) + 2.0 * change.max()
-            if self.columns[4, before] == orbit.period and _apart(seen, expected, True) <= near:
+            expected, _, change = self.extrema(np.array([value]), np.array([before]))
+            near = SETTINGS.near * max(orbit.amplitude, SETTINGS.least) + 2.0 * change[0]
+            if self.columns[4, before] == orbit.period and _apart(seen, expected[0], True) <= near:
                 other = self.solved(value, before)
                 if other is not None and same_orbit(orbit, other):
                     return True
@@ -106,12 +114,13 @@ class PlacedBranch:
         return points[0].orbit if points else None
 
 
-def _lagrange(nodes: np.ndarray, values: np.ndarray, at: float) -> np.ndarray:
-    """The polynomial through values (k, n) at nodes (n,)."""
-    others = [np.delete(nodes, i) for i in range(len(nodes))]
-    return np.asarray(
-        values @ np.array([np.prod((at - other) / (node - other)) for node, other in zip(nodes, others, strict=True)])
-    )
+def _lagrange(nodes: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """The polynomials through values (n, k, m) at nodes (k, m), at one place each, (n, k)."""
+    result = np.zeros(values.shape[:2])
+    for i in range(nodes.shape[1]):
+        others = np.delete(nodes, i, axis=1)
+        result += values[..., i] * np.prod((at[:, None] - others) / (nodes[:, i, None] - others), axis=1)
+    return result
 
 
 def _slowest(orbit: PeriodicOrbit) -> float:
@@ -131,7 +140,7 @@ def stable_motions(branches: list[PlacedBranch], grid: np.ndarray, dimension: in
     for branch in branches:
         cells, before = branch.crossings(grid)
         part = np.zeros(len(cells), record)
-        extrema = np.array([branch.extrema(grid[c], b)[0] for c, b in zip(cells, before, strict=True)]).reshape(-1, len(SEEN))
+        extrema = branch.extrema(grid[cells], before)[0]
         part["cell"], part["state"] = cells, np.nan
         part["period"], part["impact_count"] = branch.columns[4:6, before]
         part["amplitude"] = np.maximum(extrema[:, 0], -extrema[:, 1])
@@ -153,33 +162,26 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
         Whether mirror images count as one.
     """
     result = np.zeros(len(motions), dtype=bool)
+    every = np.stack([motions.highest, motions.lowest, motions.slowest], axis=1)
+    sizes = np.maximum(motions.amplitude, SETTINGS.least)
     for branch in branches:
-        rows, places = branch.crossings(motions.value)
-        for row, before in zip(rows.tolist(), places.tolist(), strict=True):
-            if not result[row] and motions.period[row] == branch.columns[4, before]:
-                result[row] = _is_at(motions, row, branch, before, mirrored)
+        rows, before = branch.crossings(motions.value)
+        rows, before = (each[~result[rows] & (motions.period[rows] == branch.columns[4, before])] for each in (rows, before))
+        expected, uncertain, change = branch.extrema(motions.value[rows], before)
+        apart, size = _apart(every[rows], expected, mirrored), sizes[rows]
+        both_stable = (branch.columns[3, before] > 0) & (branch.columns[3, before + 1] > 0)
+        sure = both_stable & (uncertain < SETTINGS.certain * size) & (apart < 2.0 * uncertain + SETTINGS.same * size)
+        result[rows[sure]] = True
+        for i in np.flatnonzero(~sure & (apart <= SETTINGS.near * size + 2.0 * change)).tolist():
+            if not result[rows[i]]:
+                orbit = branch.solved(float(motions.value[rows[i]]), int(before[i]))
+                if orbit is not None and (orbit.stable or both_stable[i]):
+                    result[rows[i]] = _apart(every[rows[i]], _seen(orbit), mirrored) < SETTINGS.same * size[i]
     return result
 
 
-def _is_at(motions: SimulatedMotions, row: int, branch: PlacedBranch, before: int, mirrored: bool) -> bool:
-    """Whether a motion is the stable orbit of a branch after the point of this number."""
-    value, seen = float(motions.value[row]), np.array([motions.highest[row], motions.lowest[row], motions.slowest[row]])
-    size = max(float(motions.amplitude[row]), SETTINGS.least)
-    expected, uncertain, change = branch.extrema(value, before)
-    apart = _apart(seen, expected, mirrored)
-    if apart > SETTINGS.near * size + 2.0 * change.max():
-        return False
-    both_stable = bool(branch.columns[3, before : before + 2].all())
-    if both_stable and uncertain.max() < SETTINGS.certain * size and apart < 2.0 * uncertain.max() + SETTINGS.same * size:
-        return True
-    orbit = branch.solved(value, before)
-    if orbit is None or not (orbit.stable or both_stable):
-        return False
-    return _apart(seen, _seen(orbit), mirrored) < SETTINGS.same * size
-
-
-def _apart(seen: np.ndarray, expected: np.ndarray, mirrored: bool) -> float:
-    """How far two motions are apart, (highest, lowest, slowest impact)."""
-    apart = float(np.abs(seen - expected).max())
-    image = np.array([-expected[1], -expected[0], expected[2]])
-    return min(apart, float(np.abs(seen - image).max())) if mirrored else apart
+def _apart(seen: np.ndarray, expected: np.ndarray, mirrored: bool) -> np.ndarray:
+    """How far motions are apart, (highest, lowest, slowest impact) each."""
+    apart = np.abs(seen - expected).max(axis=-1)
+    image = np.stack([-expected[..., 1], -expected[..., 0], expected[..., 2]], axis=-1)
+    return np.asarray(np.minimum(apart, np.abs(seen - image).max(axis=-1)) if mirrored else apart)
