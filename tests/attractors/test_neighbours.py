@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.attractors.lyapunov.largest_exponent import largest_exponents
+from saltus.attractors.lyapunov.largest_exponent import LargestExponents
 from saltus.attractors.lyapunov.neighbours import SETTINGS, Neighbours
 from saltus.attractors.lyapunov.stretching import stretched
 from saltus.flow import find_recurrence
@@ -33,7 +33,7 @@ def states_of(system, count):
 def test_neighbours_part_as_the_derivatives_say_through_impacts_that_die_away():
     """Over the same 12 periods from the same states, after the same four in which they turn to the direction that grows."""
     states, lengths = states_of(DYING, 5), np.array([DYING.load.period])
-    rates, time = Neighbours(DYING, states[None], {}, lengths, 4, 1e-11).rates(np.array([0]), 12)
+    rates, time = Neighbours(DYING, states[None], {}, turning=4, tol=1e-11).rates(np.array([0]), 12)
     begin, direction, _ = stretched(DYING, states, np.full_like(states, 0.5), {}, 4, 1e-11)
     growth = stretched(DYING, begin, direction, {}, 12, 1e-11)[2]
     assert time[0] == 12 * lengths[0]
@@ -47,7 +47,7 @@ def test_the_exponent_of_an_orbit_is_that_of_its_multiplier_also_where_neighbour
     expected = math.log(abs(orbit.multipliers[0])) / orbit.duration
     assert (4 * orbit.duration * expected < math.log(SETTINGS.least)) == together
     begin = np.repeat(np.concatenate(orbit.section_state[None, None]), 4, axis=0)[None]
-    rates, _ = Neighbours(orbit.system, begin, {}, np.array([orbit.duration]), 32, 1e-12).rates(np.array([0]), 16)
+    rates, _ = Neighbours(orbit.system, begin, {}, turning=32, tol=1e-12).rates(np.array([0]), 16)
     np.testing.assert_allclose(rates[0], expected, rtol=0, atol=1e-4)
 
 
@@ -55,7 +55,12 @@ def test_an_exponent_does_not_depend_on_what_else_is_asked():
     """A group alone and beside one of another frequency, whose pairs are brought together after other times."""
     states = np.stack([states_of(DYING, 4)] * 2)
     frequencies = np.array([1.02, 0.61])
-    both = largest_exponents(DYING, states, {"load.frequency": frequencies}, runs=(16, 64))
-    alone = largest_exponents(DYING, states[:1], {"load.frequency": frequencies[:1]}, runs=(16, 64))
-    assert alone.exponent[0] == both.exponent[0]
-    assert np.isfinite(both.exponent).all()
+    both, alone = (
+        LargestExponents(DYING, states[:n], {"load.frequency": frequencies[:n]}, shortest=16, tol=1e-10) for n in (2, 1)
+    )
+    both.go_on(np.array([0, 1]), 16)
+    alone.go_on(np.array([0]), 16)
+    for run in (both, alone):
+        run.go_on(np.array([0]), 64)
+    assert alone.found.exponent[0] == both.found.exponent[0]
+    assert np.isfinite(both.found.exponent).all()

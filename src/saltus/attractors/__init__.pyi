@@ -4,7 +4,6 @@ from .basins.fractal import BasinEntropy, UncertaintyExponent, Wada, basin_entro
 from .basins.grid import basins_of_attraction
 from .find import find_attractors
 from .lyapunov.ensemble import lyapunov_many
-from .lyapunov.largest_exponent import largest_exponents
 from .lyapunov.spectrum import Exponents, lyapunov_spectrum
 from .manifolds.equilibria import Equilibrium, equilibria
 from .manifolds.phase_plane import Separatrix, separatrices
@@ -44,7 +43,6 @@ __all__ = [
     "excludes_tori",
     "find_attractors",
     "judge_unsettled",
-    "largest_exponents",
     "lyapunov_many",
     "lyapunov_spectrum",
     "separatrices",

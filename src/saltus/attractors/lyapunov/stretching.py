@@ -6,8 +6,24 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from saltus.attractors.lyapunov.perturbations import Perturbations
 from saltus.flow import Stop, last_states, motions_from, stop_names
 from saltus.systems import System
+
+
+class Stretching(Perturbations):
+    """Perturbations by derivatives, which along the direction that grows are accurate however far a step goes."""
+
+    def longest_spans(self, rows: np.ndarray) -> np.ndarray:
+        """A step may be as long as the run."""
+        return np.full(len(rows), np.iinfo(int).max)
+
+    def step(self, motions: np.ndarray, periods: int) -> None:
+        """Follow these motions with their derivatives."""
+        columns = {path: values[motions] for path, values in self.columns.items()}
+        found = stretched(self.system, self.here[motions], self.direction[motions], columns, periods, self.tol)
+        self.here[motions], self.direction[motions] = found[:2]
+        self.growth[motions] += found[2]
 
 
 def stretched(

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors.lyapunov.largest_exponent import largest_exponents
+from saltus.attractors.lyapunov.largest_exponent import LargestExponents
 from saltus.enumerations import NumberedSentence
 from saltus.flow import RECURRENCE, Outcome, Recurrence, find_recurrence, return_period
 from saltus.orbits import states_beside
@@ -54,9 +54,13 @@ class JudgementSettings:
     settled: int = 3
     # Number of survivors of which the exponent is measured, all of which are samples of one attractor.
     measured: int = 12
-    # Forcing periods of each run of these. A longer one follows where that before leaves open what the exponent is: weak chaos of
-    # exponent 0.005 takes a thousand periods.
-    runs: tuple[int, ...] = (64, 320, 1600)
+    # Forcing periods of the shortest run of these, which is doubled up to the longest one as long as it leaves open what the
+    # exponent is: weak chaos of exponent 0.005 takes a thousand periods.
+    shortest_run: int = 64
+    longest_run: int = 1600
+    # From a run of this length on, a long period is looked for where the exponent seems to be below 0: if there is one, longer
+    # runs are spared.
+    regular_run: int = 256
     # Distance between the beginnings of companions from one state, or they would all be one motion. Chaos of exponent 0.005
     # brings them apart within 3000 units of time; those from several states are apart from the beginning.
     apart: float = 1e-7
@@ -263,20 +267,25 @@ class _Judgement:
     def measure(self) -> None:
         """The exponents of some survivors, by ever longer runs as long as these leave open whether they are positive.
 
-        The longest run is spared where the exponent seems to be below 0 and a motion repeats itself after a long period.
+        Longer runs are spared where the exponent seems to be below 0 and a motion repeats itself after a long period.
         """
-        count = min(self.settings.measured, self.settings.companions)
-        chosen = np.linspace(0, self.settings.companions - 1, count).astype(int)
-        for runs in (self.settings.runs[:-1], self.settings.runs[-1:]):
-            rows = np.flatnonzero(self.open & ~self.positive & ~self.negative & (self.period == 0))
-            if not runs or not rows.size:
-                continue
-            columns = {path: values[rows] for path, values in self.parameters.items()}
-            given = self.states[rows][:, chosen]
-            found = largest_exponents(self.system, given, columns, runs=runs, tol=self.settings.tol)
+        rows, settings = np.flatnonzero(self.open), self.settings
+        if not rows.size:
+            return
+        chosen = np.linspace(0, settings.companions - 1, min(settings.measured, settings.companions)).astype(int)
+        columns = {path: values[rows] for path, values in self.parameters.items()}
+        given, shortest, periods = self.states[rows][:, chosen], settings.shortest_run, 0
+        run = LargestExponents(self.system, given, columns, shortest=shortest, tol=settings.tol)
+        while periods < settings.longest_run:
+            periods = min(max(2 * periods, shortest), settings.longest_run)
+            asked = np.flatnonzero((~self.positive & ~self.negative & (self.period == 0))[rows])
+            if not asked.size:
+                return
+            run.go_on(asked, periods)
             for name in ("exponent", "error", "positive", "negative"):
-                getattr(self, name)[rows] = getattr(found, name)
-            self.look_for_long_periods(self.open & (self.exponent < 0.0))
+                getattr(self, name)[rows] = getattr(run.found, name)
+            if periods >= settings.regular_run:
+                self.look_for_long_periods(self.open & (self.exponent < 0.0))
 
     def look_for_long_periods(self, chosen: np.ndarray) -> None:
         """Follow those of the chosen, (n,), not surely chaotic until they settle: near bifurcations exponents are near 0."""

@@ -263,8 +263,7 @@ def judgements(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[s
     system, inputs = _given(arguments, block)
     d = system.dimension
     result = np.full((len(inputs), len(JUDGED) + d * COMPANIONS + (d + 1) * SETTLED), np.nan)
-    numbers = inputs[0]["settings"]
-    settings = JudgementSettings(**numbers | {"runs": tuple(numbers["runs"])})
+    settings = JudgementSettings(**inputs[0]["settings"])
     assert settings.companions <= COMPANIONS, "rows have room for so many"
     states = np.full((len(inputs), max(len(given["states"]) for given in inputs), d), np.nan)
     for to_fill, given in zip(states, inputs, strict=True):
