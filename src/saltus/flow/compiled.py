@@ -24,7 +24,9 @@ from saltus.flow import (
     steps,
 )
 from saltus.flow.contacts import (
+    closings,
     complementarity,
+    contact_choice,
     contact_decisions,
     contact_impacts,
     contact_layout,
@@ -127,8 +129,8 @@ def load_contacts_kernel() -> Callable[..., int]:
 
 def contacts_module() -> ModuleType:
     """The module of the scalar kernel for models with several contacts."""
-    parts = (contact_layout, complementarity, contact_impacts, contact_tangent, frictions, contact_decisions, contacts_kernel)
-    return load_module("contacts", _text(kernel_layout, roots, steps, *parts))
+    parts = (contact_layout, complementarity, contact_impacts, contact_tangent, frictions, contact_choice, closings)
+    return load_module("contacts", _text(kernel_layout, roots, steps, *parts, contact_decisions, contacts_kernel))
 
 
 @cache

@@ -34,6 +34,10 @@ IRREGULAR = {
         "at time {time:.9g} contacts close together, which motions beside this one close one after the other, so that the "
         "motion is not continuous in what moves them apart"
     ),
+    ImpactDetail.ORDERED: (
+        "at time {time:.9g} contacts close together that do not act on one another, but what the motion does between two of them "
+        "depends on which comes first, so that there are only one-sided derivatives"
+    ),
 }
 
 
@@ -47,8 +51,8 @@ class Sensitivities(Result):
     starts at contact, is released by a jump of the load, ends on an event, or grazes the contact (see `grazings`).
 
     `event_times` has a row for each of `motion.events` and a column for each initial coordinate, initial velocity and
-    parameter: the derivative of its time. It is nan where the event has none (a grazing, the beginning of chatter) or where
-    the motion had lost its derivative before.
+    parameter: the derivative of its time. It is nan where the event has none (a grazing, the beginning of chatter, impacts that
+    come at several instants beside this motion) or where the motion had lost its derivative before.
 
     Attributes
     ----------

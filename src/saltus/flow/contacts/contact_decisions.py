@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from saltus.flow.contacts.closings import rests_in_a_row
+from saltus.flow.contacts.contact_choice import choose_closed, note_ties
 from saltus.flow.contacts.contact_impacts import (
-    bring_to_rest,
     closed_bits,
-    contact_position,
     couple,
     fill_after,
     frozen_accumulation,
-    gap_series,
     hold_coordinates,
     near_contacts,
     record_contact_event,
@@ -28,90 +27,23 @@ from saltus.flow.contacts.contact_tangent import (
     fill_slopes,
     move_columns,
     note_shifts,
-    rest_columns,
     start_columns,
 )
 from saltus.flow.contacts.frictions import (
     all_stand,
-    choose_slides,
     hold_frictions,
     record_slides,
     slide_bits,
     slides_before,
-    slides_so,
     stick_columns,
     undecided,
 )
 from saltus.flow.kernel_layout import Mode, Setting, Status, Where, Work
 from saltus.flow.memory_layout import EventCode, State
-from saltus.flow.roots import leading
 from saltus.flow.steps import expand, motion_end
 from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
-
-TIED = 1e-12  # A smaller reaction vanishes together with that of another contact: rounding of the loads that hold them.
-
-
-@lean_jit
-def holds(where, model, contacts, work, solver, candidates):
-    """Whether the first Taylor coefficients that are not 0 confirm which of the candidates are closed; notes how many are 0."""
-    order, g, own, count = where[Where.ORDER], work[Work.GAP], where[Where.OWN], contacts.shape[0]
-    for i in range(count):
-        if not candidates >> i & 1:
-            continue
-        known = contacts[i, ContactColumn.RELEASED]
-        if contacts[i, ContactColumn.CLOSED] == 1:
-            k = leading(work[Work.MARGINS][i], known, order)
-            if k < order and work[Work.MARGINS][i, k] < 0.0:
-                return False
-        else:
-            gap_series(model, contacts, work, i, contact_position(solver, own, count, i), order, g)
-            k = leading(g, 2 + known, order)
-            if k == order or g[k] < 0.0:
-                return False
-        contacts[i, ContactColumn.SKIP] = k
-    return True
-
-
-@lean_jit
-def choose_closed(where, state, env, model, contacts, frictions, work, solver, candidates, still, t, origin):
-    """Decide which of the candidates, which are at rest at their positions, stay closed; False if nothing is consistent.
-
-    0 <= reaction _|_ second derivative of the gap >= 0, and where both are 0 the same of their first derivatives that are not.
-    Likewise which of the frictions in `still`, which have the speed of their ground, stick: if they can, they do.
-    """
-    count = contacts.shape[0]
-    for number in range((1 << count) * 3 ** frictions.shape[0]):
-        choice = number & ((1 << count) - 1)  # the bits of those that open
-        if choice & ~candidates or not choose_slides(frictions, still, number >> count):
-            continue
-        for i in range(count):
-            if candidates >> i & 1:
-                contacts[i, ContactColumn.CLOSED] = 1 - (choice >> i & 1)
-        hold_coordinates(where, env, contacts)
-        hold_frictions(where, env, frictions)
-        expand(where, state, env, model, work, t, origin, 1.0, where[Where.ORDER])
-        agrees = holds(where, model, contacts, work, solver, candidates)
-        if agrees and slides_so(where, frictions, count, work, solver, still):
-            return True
-    return False
-
-
-@lean_jit
-def note_ties(where, state, env, model, contacts, work, candidates, t, origin):
-    """Note that the reactions vanish of all candidates of which they do to within rounding, as they do of one that is released.
-
-    Cells of a chain that move alike let go at one instant, of which each has its own rounding.
-    """
-    for i in range(contacts.shape[0]):
-        if candidates >> i & 1:
-            contacts[i, ContactColumn.CLOSED] = 1
-    hold_coordinates(where, env, contacts)
-    expand(where, state, env, model, work, t, origin, 1.0, 2)
-    for i in range(contacts.shape[0]):
-        if candidates >> i & 1 and abs(work[Work.MARGINS][i, 0]) <= TIED:
-            contacts[i, ContactColumn.RELEASED] = 1
 
 
 @lean_jit
@@ -130,7 +62,7 @@ def free_pulls(where, state, env, model, contacts, work, solver, t, origin):
 
 
 @lean_jit
-def end_accumulation_of(where, state, settings, env, model, contacts, work, solver, events, t, origin):
+def end_accumulation_of(where, state, settings, env, model, contacts, frictions, work, solver, events, t, origin):
     """Bring to rest what impacts that get smaller and smaller bring to rest soon; returns when, or t."""
     count, own, tol = contacts.shape[0], where[Where.OWN], settings[Setting.TOLERANCE]
     if not couple(where, state, env, model, contacts, solver):
@@ -161,12 +93,20 @@ def end_accumulation_of(where, state, settings, env, model, contacts, work, solv
     record_contact_event(where, state, contacts, events, EventCode.HELD, moving, t + left)
     if where[Where.COLUMNS] > 0:
         accumulation_shifts(where, state, env, model, contacts, work, solver, near, t, origin)
-        note_shifts(where, state, contacts, events, solver[Solver.HELD_SHIFTS], 0)
-    bring_to_rest(where, state, model, contacts, solver, near)
+        note_shifts(where, state, contacts, events, solver[Solver.EVENT_SHIFTS], 0)
+    rests_in_a_row(where, state, env, model, contacts, frictions, work, solver, t, origin, near)
     fill_after(where, state, contacts, solver, events)
-    if where[Where.COLUMNS] > 0:
-        rest_columns(where, state, env, model, contacts, solver, near)
     return t + left
+
+
+@lean_jit
+def event_shifts(where, state, contacts, events, solver):
+    """Fill `EVENT_SHIFTS` by those of the columns, or of an impact that has just been noted: nan if it is of several instants."""
+    first, last = 1 + 2 * where[Where.OWN] + contacts.shape[0], where[Where.EVENTS] - 1
+    for j in range(where[Where.COLUMNS]):
+        solver[Solver.EVENT_SHIFTS][j] = state[State.COORDINATES + 2 * where[Where.DOF] + j]
+        if last >= 0 and events[0][last, 1] == EventCode.IMPACT and events[1][last, 0] == state[State.TIME]:
+            solver[Solver.EVENT_SHIFTS][j] = events[1][last, first + j]
 
 
 @lean_jit
@@ -194,9 +134,8 @@ def decide_contacts(where, state, settings, env, model, contacts, frictions, wor
     """Find out which contacts are closed from here on. Returns PAUSED to go on, or NOT_UNIQUE."""
     t, count = state[State.TIME], contacts.shape[0]
     rested, shifts = where[Where.HELD] == 1, State.COORDINATES + 2 * where[Where.DOF]
-    for j in range(where[Where.COLUMNS]):
-        solver[Solver.HELD_SHIFTS][j] = state[shifts + j]
-    settled = end_accumulation_of(where, state, settings, env, model, contacts, work, solver, events, t, origin)
+    event_shifts(where, state, contacts, events, solver)
+    settled = end_accumulation_of(where, state, settings, env, model, contacts, frictions, work, solver, events, t, origin)
     candidates, before = closed_bits(contacts), slides_before(frictions)
     couple(where, state, env, model, contacts, solver)
     still = undecided(where, state, solver, frictions)
@@ -224,7 +163,7 @@ def decide_contacts(where, state, settings, env, model, contacts, frictions, wor
     if where[Where.HELD] == 1 and not rested:
         all_bits = closed_bits(contacts) | ((1 << frictions.shape[0]) - 1) << count
         record_contact_event(where, state, contacts, events, EventCode.RESTING, all_bits, settled)
-        note_shifts(where, state, contacts, events, solver[Solver.HELD_SHIFTS], 0)
+        note_shifts(where, state, contacts, events, solver[Solver.EVENT_SHIFTS], 0)
     where[Where.MODE] = Mode.REST if where[Where.HELD] == 1 else Mode.ARC
     where[Where.SIDE] = 1 + (closed_bits(contacts) | slide_bits(frictions, count))
     return Status.PAUSED

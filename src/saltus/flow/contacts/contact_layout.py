@@ -54,7 +54,7 @@ class Solver(IntEnum):
     FALLING_PULLS = 13
     SLOPES = 14  # a row for each column of the tangent: the derivatives of `NUMBERS`
     JUMP = 15  # of the velocities at an impact
-    HELD_SHIFTS = 16  # by how much the end of an accumulation moves with each column
+    EVENT_SHIFTS = 16  # by how much an impact, or the end of an accumulation, moves with each column
     PULL_SLOPES = 17  # the derivatives of `PULLS`, a row for each column
 
 
@@ -96,6 +96,7 @@ class ImpactDetail(IntEnum):
     REGULAR = 0
     NO_SPEED = 1  # a contact is reached without speed, so that motions beside this one have no derivative
     APART = 2  # contacts close at one instant, and motions beside this one close them one after the other
+    ORDERED = 3  # the same of contacts that do not act on one another, and their order makes a difference of first order
 
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

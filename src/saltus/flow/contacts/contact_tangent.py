@@ -205,9 +205,9 @@ def perturb(where, state, model, contacts, solver, j, step):
 
 @jit
 def accumulation_shifts(where, state, env, model, contacts, work, solver, near, t, origin):
-    """By how much the end of an accumulation moves with each column, into `HELD_SHIFTS`: that of its last impact, and the
-    difference of what is then left with its gaps, rates, accelerations and numbers moved to both sides."""
-    own, count, first = where[Where.OWN], contacts.shape[0], State.COORDINATES + 2 * where[Where.DOF]
+    """By how much the end of an accumulation moves with each column, into `EVENT_SHIFTS`, where that of its last impact is: with
+    the difference of what is then left with its gaps, rates, accelerations and numbers moved to both sides."""
+    own, count = where[Where.OWN], contacts.shape[0]
     fill_slopes(where, state, env, model, solver)
     pull_slopes(where, state, env, model, contacts, work, solver, t, origin)
     gaps, rates, pulls = solver[Solver.GAPS].copy(), solver[Solver.RATES].copy(), solver[Solver.PULLS].copy()
@@ -230,7 +230,7 @@ def accumulation_shifts(where, state, env, model, contacts, work, solver, near, 
             change += sign * (left if left >= 0.0 else math.nan)
             solver[Solver.GAPS][:], solver[Solver.RATES][:], solver[Solver.PULLS][:] = gaps, rates, pulls
             solver[Solver.NUMBERS][:] = numbers
-        solver[Solver.HELD_SHIFTS][j] = state[first + j] + (0.5 * change / step if largest > 0.0 else 0.0)
+        solver[Solver.EVENT_SHIFTS][j] += 0.5 * change / step if largest > 0.0 else 0.0
     perturb(where, state, model, contacts, solver, 0, 0.0)
 
 

@@ -18,20 +18,17 @@ import math
 
 import numpy as np
 
+from saltus.flow.contacts.closings import contact_impact
 from saltus.flow.contacts.contact_decisions import decide_contacts
 from saltus.flow.contacts.contact_impacts import (
     closed_bits,
     contact_position,
     contact_step_size,
     couple,
-    fill_after,
     gap_series,
     hold_coordinates,
-    impact_impulses,
     is_smooth,
-    push,
     record_contact_event,
-    settle_contact,
     solver_arrays,
 )
 from saltus.flow.contacts.contact_layout import (
@@ -40,16 +37,10 @@ from saltus.flow.contacts.contact_layout import (
     ContactColumn,
     ContactPart,
     FrictionColumn,
-    ImpactDetail,
-    Solver,
 )
 from saltus.flow.contacts.contact_tangent import (
-    closing_columns,
     fill_slopes,
-    hold_columns,
-    impulse_columns,
     note_shifts,
-    note_velocities,
     release_columns,
 )
 from saltus.flow.contacts.frictions import first_friction, friction_step_size, hold_frictions, reach
@@ -57,7 +48,7 @@ from saltus.flow.function_types import ADVANCE_CONTACTS
 from saltus.flow.kernel_layout import BATCH, SHORTEST, ZERO, Mode, Setting, Status, Where, Work
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.roots import NEVER, SIMPLE, contact_root, horner, horner_slope, margin_root
-from saltus.flow.steps import expand, forget, move, next_target, record_step, work_arrays
+from saltus.flow.steps import expand, move, next_target, record_step, work_arrays
 from saltus.taylor import cached_jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -67,40 +58,6 @@ FAST_IMPACT = 0.3  # After a faster impact the series that is usual is needed to
 RADIUS = 0.5  # A series of order n is taken to reach as far as this times the n-th root of the tolerance.
 LEAST_ORDER = 6  # Of fewer coefficients the last ones may all vanish by symmetry.
 WORTH = 0.8  # The share of the usual order below which a lower one is tried.
-
-
-@lean_jit
-def contact_impact(where, state, env, model, contacts, work, solver, events, t, origin, hit):
-    """Apply the impact law to all contacts whose gap is 0, of which those in `hit` have just closed. PAUSED, or NO_IMPACT."""
-    own, count, first, detail = where[Where.OWN], contacts.shape[0], State.COORDINATES + where[Where.DOF], ImpactDetail.REGULAR
-    regular, chosen = couple(where, state, env, model, contacts, solver), hit
-    for i in range(count):
-        chosen |= contacts[i, ContactColumn.CLOSED] << i
-    record_contact_event(where, state, contacts, events, EventCode.IMPACT, hit, t)
-    if where[Where.COLUMNS] > 0:
-        detail = closing_columns(where, state, env, model, contacts, work, solver, t, origin, hit)
-        events[0][where[Where.EVENTS] - 1, 3] = detail
-        note_velocities(where, state, solver, 0.0)
-    for i in range(count):  # a contact that is reached without a speed, to within the working precision
-        if hit >> i & 1:
-            solver[Solver.RATES][i] = min(solver[Solver.RATES][i], 0.0)
-        solver[Solver.GAPS][i] = solver[Solver.RATES][i]
-    acts = impact_impulses(solver, own, count, chosen, solver[Solver.RATES]) if regular else -1
-    if acts < 0:
-        return Status.NO_IMPACT
-    push(where, state, model, contacts, solver)
-    for i in range(count):
-        if chosen >> i & 1:
-            settle_contact(where, state, model, contacts, solver, i, solver[Solver.RATES][i])
-    fill_after(where, state, contacts, solver, events)
-    if detail == ImpactDetail.NO_SPEED:
-        forget(where, state)
-    elif where[Where.COLUMNS] > 0:
-        note_velocities(where, state, solver, -1.0)
-        impulse_columns(where, state, env, model, contacts, solver, acts, chosen)
-        hold_columns(where, state, contacts, solver, chosen)
-        note_shifts(where, state, contacts, events, state, first + where[Where.DOF])
-    return Status.PAUSED
 
 
 @lean_jit
@@ -227,7 +184,8 @@ def contact_arc(where, state, settings, env, model, contacts, frictions, work, s
         frictions[k, FrictionColumn.SKIP] = 0
     if bits > 0:
         where[Where.MODE] = Mode.CONTACT
-        return contact_impact(where, state, env, model, contacts, work, solver, events, state[State.TIME], origin, bits)
+        t = state[State.TIME]
+        return contact_impact(where, state, env, model, contacts, frictions, work, solver, events, t, origin, bits)
     if hit >= 0:
         if where[Where.COLUMNS] > 0:
             release_columns(where, state, env, model, work, state[State.TIME], origin, hit)

@@ -1,0 +1,79 @@
+"""Which of the contacts that are at rest at their positions stay closed.
+
+Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines the arguments.
+"""
+
+from __future__ import annotations
+
+from saltus.flow.contacts.contact_impacts import contact_position, gap_series, hold_coordinates
+from saltus.flow.contacts.contact_layout import ContactColumn
+from saltus.flow.contacts.frictions import choose_slides, hold_frictions, slides_so
+from saltus.flow.kernel_layout import Where, Work
+from saltus.flow.roots import leading
+from saltus.flow.steps import expand
+from saltus.taylor import lean_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+TIED = 1e-12  # A smaller reaction vanishes together with that of another contact: rounding of the loads that hold them.
+
+
+@lean_jit
+def holds(where, model, contacts, work, solver, candidates):
+    """Whether the first Taylor coefficients that are not 0 confirm which of the candidates are closed; notes how many are 0."""
+    order, g, own, count = where[Where.ORDER], work[Work.GAP], where[Where.OWN], contacts.shape[0]
+    for i in range(count):
+        if not candidates >> i & 1:
+            continue
+        known = contacts[i, ContactColumn.RELEASED]
+        if contacts[i, ContactColumn.CLOSED] == 1:
+            k = leading(work[Work.MARGINS][i], known, order)
+            if k < order and work[Work.MARGINS][i, k] < 0.0:
+                return False
+        else:
+            gap_series(model, contacts, work, i, contact_position(solver, own, count, i), order, g)
+            k = leading(g, 2 + known, order)
+            if k == order or g[k] < 0.0:
+                return False
+        contacts[i, ContactColumn.SKIP] = k
+    return True
+
+
+@lean_jit
+def choose_closed(where, state, env, model, contacts, frictions, work, solver, candidates, still, t, origin):
+    """Decide which of the candidates, which are at rest at their positions, stay closed; False if nothing is consistent.
+
+    0 <= reaction _|_ second derivative of the gap >= 0, and where both are 0 the same of their first derivatives that are not.
+    Likewise which of the frictions in `still`, which have the speed of their ground, stick: if they can, they do.
+    """
+    count = contacts.shape[0]
+    for number in range((1 << count) * 3 ** frictions.shape[0]):
+        choice = number & ((1 << count) - 1)  # the bits of those that open
+        if choice & ~candidates or not choose_slides(frictions, still, number >> count):
+            continue
+        for i in range(count):
+            if candidates >> i & 1:
+                contacts[i, ContactColumn.CLOSED] = 1 - (choice >> i & 1)
+        hold_coordinates(where, env, contacts)
+        hold_frictions(where, env, frictions)
+        expand(where, state, env, model, work, t, origin, 1.0, where[Where.ORDER])
+        agrees = holds(where, model, contacts, work, solver, candidates)
+        if agrees and slides_so(where, frictions, count, work, solver, still):
+            return True
+    return False
+
+
+@lean_jit
+def note_ties(where, state, env, model, contacts, work, candidates, t, origin):
+    """Note that the reactions vanish of all candidates of which they do to within rounding, as they do of one that is released.
+
+    Cells of a chain that move alike let go at one instant, of which each has its own rounding.
+    """
+    for i in range(contacts.shape[0]):
+        if candidates >> i & 1:
+            contacts[i, ContactColumn.CLOSED] = 1
+    hold_coordinates(where, env, contacts)
+    expand(where, state, env, model, work, t, origin, 1.0, 2)
+    for i in range(contacts.shape[0]):
+        if candidates >> i & 1 and abs(work[Work.MARGINS][i, 0]) <= TIED:
+            contacts[i, ContactColumn.RELEASED] = 1
