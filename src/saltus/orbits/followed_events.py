@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from saltus.flow import EventCode, Motion, modes_of
-from saltus.orbits.sampled_motion import SampledMotion
+from saltus.orbits.sampled_motion import ONE_INSTANT, SampledMotion
 from saltus.systems import Model
 
 CHANGES = (
@@ -26,9 +26,8 @@ CHANGES = (
 
 @dataclass(frozen=True)
 class EventSettings:
-    """Which events are one, and when a section has to be moved."""
+    """Which impacts die away, and when a section has to be moved."""
 
-    together: float = 1e-9  # Events nearer to each other than this share of the orbit's duration have no order.
     grows: float = 1e-6  # Share by which an impact is faster than the one before if they have not begun to die away.
     # The section is moved where it is nearer to an event than this share of the time between the events before and after it.
     section_distance: float = 0.02
@@ -89,9 +88,9 @@ def events_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | No
         events += tuple(_image(event, motion.system.model, images) for event in events)
         times, period = times + tuple(time + period for time in times), 2.0 * period
     apart = np.diff([*times, times[0] + period]) if len(times) > 1 else np.empty(0)
-    apart = apart[apart > SETTINGS.together * period]
+    apart = apart[apart > ONE_INSTANT * period]
     distance = float(min([SETTINGS.farthest, sampled.nearest_touch(), *speeds, *apart]))
-    events, times = _in_order(events, times, SETTINGS.together * period)
+    events, times = _in_order(events, times, ONE_INSTANT * period)
     return FollowedEvents(events, times, period, max(distance, 0.0), section_distance)
 
 
@@ -151,13 +150,20 @@ def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
 def _in_order(
     events: tuple[OrbitEvent, ...], times: tuple[float, ...], together: float
 ) -> tuple[tuple[OrbitEvent, ...], tuple[float, ...]]:
-    """Events of different parts at one instant, as of cells that move alike, in an order that rounding does not decide."""
-    keys, first = [], -math.inf
-    for event, time in zip(events, times, strict=True):
-        first = time if time - first > together else first
-        keys.append((first, event.parts))
-    places = sorted(range(len(events)), key=keys.__getitem__)
-    return tuple(events[i] for i in places), tuple(times[i] for i in places)
+    """Events of different parts at one instant, as of cells that move alike, part by part with the mode after all of them.
+
+    It is rounding that decides which of them come first, and which are one event.
+    """
+    found, begin = list[tuple[OrbitEvent, float]](), 0
+    for end in range(1, len(events) + 1):
+        if end < len(events) and times[end] - times[begin] <= together:
+            continue
+        here = list(zip(events[begin:end], times[begin:end], strict=True))
+        parts = [1 << i for i in range(max(event.parts for event in events[begin:end]).bit_length())]
+        split = [(OrbitEvent(e.kind, part, events[end - 1].mode), t) for part in parts for e, t in here if e.parts & part]
+        found += split if len({event.parts for event, _ in split}) > 1 else here
+        begin = end
+    return tuple(event for event, _ in found), tuple(time for _, time in found)
 
 
 def _section_distance(motion: Motion, period: float) -> float:

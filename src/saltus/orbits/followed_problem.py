@@ -16,7 +16,7 @@ import numpy as np
 from saltus.errors import SaltusError
 from saltus.flow import Motion, MotionRequest, Program, Sensitivities, derivatives_of, limits_of, program, state_rates
 from saltus.flow import segments as at
-from saltus.orbits.followed_events import FollowedEvents, events_of, impact_speeds
+from saltus.orbits.followed_events import FollowedEvents, events_of
 from saltus.orbits.problem import Equations, Problem
 from saltus.orbits.sampled_motion import SampledMotion
 from saltus.systems import System, image_of
@@ -142,9 +142,13 @@ class FollowedProblem(Problem):
         return derivatives_of(request, self._program.at(parameters, self._records))
 
     def _impacts(self, motion: Motion) -> np.ndarray:
-        """Times and least speeds of the impacts that do not die away, (n, 2)."""
-        rows = np.column_stack([motion.impacts.time, impact_speeds(motion)])
-        return np.asarray(rows[rows[:, 1] > DYING])
+        """Times and speeds of the impacts of each contact that do not die away, (n, 2): of cells in step each has its own."""
+        impacts, names, rows = motion.impacts, self.system.model.coordinates, [np.empty((0, 2))]
+        for i, contact in enumerate(self.system.model.contacts):
+            speeds = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])
+            rows.append(np.column_stack([impacts.time, speeds])[(impacts.side >> i & 1 == 1) & (speeds > DYING)])
+        found = np.concatenate(rows)
+        return np.asarray(found[np.argsort(found[:, 0], kind="stable")])
 
     def _extremes(self, sampled: SampledMotion | None) -> np.ndarray:
         """The extrema of all coordinates and the least values of the margins, in the places of the other orbits'."""

@@ -15,6 +15,9 @@ SAMPLES = 33  # of each step, between which the least values are those of parabo
 NEWTON_STEPS = 4  # from the largest sample of a coordinate to its extremum, whose error each of them squares
 NARROWER = (0.3, 1e-3)  # shares of the distance of samples: so far beside its least value a force is looked at, in turn
 MOST_ORDER = 24  # of a step's series
+ONE_INSTANT = (
+    1e-9  # Events nearer to each other than this share of the motion's duration have no order, and nothing is between them.
+)
 
 SHARES = np.linspace(0.0, 1.0, SAMPLES)
 ORDERS = np.arange(MOST_ORDER + 1)
@@ -43,7 +46,7 @@ class SampledMotion:
         """The samples of a motion that was kept densely."""
         dense = motion.dense
         assert dense is not None
-        steps = np.flatnonzero(dense.length > 0.0)
+        steps = np.flatnonzero(dense.length > ONE_INSTANT * (motion.time - motion.start))
         length, count = dense.length[steps, None, None], dense.series.shape[2]
         scaled = (dense.series[steps] * length ** ORDERS[:count]).transpose(1, 0, 2)
         position, velocity, acceleration = (scaled @ table[:count] for table in (POWERS, SLOPES, BENDS))

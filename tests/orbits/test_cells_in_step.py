@@ -1,0 +1,63 @@
+"""Orbits of chains of cells that move in step, with restitution: contacts of all cells close at one instant."""
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.orbits import same_orbit
+
+BETA80 = np.deg2rad(80)
+
+
+def cells(kind: type, **numbers: float) -> saltus.System:
+    load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.6))
+    return saltus.System(
+        model=kind(beta0=BETA80, mass_ratio=0.2, damping=0.05, **numbers), load=load, impact=saltus.NewtonImpact(e=0.5)
+    )
+
+
+@pytest.fixture(scope="module")
+def three() -> saltus.PeriodicOrbit:
+    return saltus.find_orbit(
+        cells(saltus.ThreeCells, coupling=0.5),
+        lower_1=0.1,
+        upper_1=-0.05,
+        lower_2=0.12,
+        upper_2=-0.05,
+        lower_3=0.1,
+        upper_3=-0.06,
+        velocity=(0.0,) * 6,
+    )
+
+
+def test_they_end_on_the_orbit_of_one_cell_whose_multipliers_are_among_theirs(three: saltus.PeriodicOrbit) -> None:
+    one = saltus.find_orbit(cells(saltus.TwoLayer), theta_1=0.1, theta_2=-0.05, velocity=(0.0, 0.0))
+    assert three.amplitude == pytest.approx(one.amplitude, abs=1e-9)
+    assert three.residual < 1e-12
+    for multiplier in one.multipliers:
+        assert np.abs(three.multipliers - multiplier).min() < 1e-6
+    assert len(one.multipliers) == 4
+    assert len(three.multipliers) == 12
+    assert np.abs(three.multipliers).max() > np.abs(one.multipliers).max() + 0.1  # cells that part come together slowly
+
+
+def test_multipliers_are_the_rate_at_which_a_motion_beside_it_comes_back(three: saltus.PeriodicOrbit) -> None:
+    """Cells 1 and 3 pushed apart: the slowest motion against each other has the largest multiplier."""
+    largest = np.abs(three.multipliers).max()
+    state = three.start()
+    velocity = np.array(state.pop("velocity"))
+    velocity[[0, 4]] += 1e-4, -1e-4
+    apart = []
+    for periods in (20, 30):
+        motion = saltus.simulate(three.system, **state, velocity=tuple(velocity), periods=periods, dense=False)
+        apart.append(abs(motion.lower_1 - motion.lower_3) + abs(motion.upper_1 - motion.upper_3))
+    assert (apart[1] / apart[0]) ** 0.1 == pytest.approx(largest, rel=1e-3)
+
+
+def test_rounding_makes_no_special_points_along_their_branch(three: saltus.PeriodicOrbit) -> None:
+    """What the cells do at one instant comes in an order that rounding decides, at each point anew."""
+    branch = saltus.continue_orbit(three, "load.horizontal.amplitude", (0.58, 0.62))
+    assert not branch.special
+    assert [str(end) for end in branch.ends] == ["bound 0.58", "bound 0.62"]
+    assert all(same_orbit(orbit, orbit) for orbit in branch.orbits)
+    assert same_orbit(branch.at(0.6)[0], three)
