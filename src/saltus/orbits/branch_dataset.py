@@ -30,7 +30,7 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
     problem = orbits[0].problem
     data: dict[str, Any] = {"parameter": ("point", branch.parameters, {"long_name": branch.path})}
     data |= {name: ("point", values, attrs) for name, values, attrs in _columns(orbits)}
-    data |= _multipliers(orbits) | _unknowns(orbits) | _special(branch.special) | _rests(orbits)
+    data |= multiplier_columns(orbits) | solution_columns(orbits) | _special(branch.special) | _rests(orbits)
     attributes: dict[str, Any] = {
         "kind": "branch",
         "path": branch.path,
@@ -58,10 +58,7 @@ def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[st
         ("highest", column(lambda o: o.highest), {**angle, "long_name": f"max {coordinate}"}),
         ("lowest", column(lambda o: o.lowest), {**angle, "long_name": f"min {coordinate}"}),
         ("stable", column(lambda o: o.stable, np.int8), {}),
-        ("symmetric", column(lambda o: o.symmetric, np.int8), {}),
         ("impact_count", column(lambda o: o.signature.impact_count, int), {"long_name": "impacts in one period of the orbit"}),
-        ("period", column(lambda o: o.period, int), {"long_name": "forcing periods in one period of the orbit"}),
-        ("side", column(lambda o: o.signature.side, np.int8), {"long_name": "side of an orbit without impacts"}),
         ("slowest", column(lambda o: o.slowest), {"long_name": "least speed of an impact"}),
         ("clearance", column(lambda o: o.clearance), {"long_name": "least inner minimum of the gap"}),
         ("residual", column(lambda o: o.residual), {}),
@@ -84,22 +81,37 @@ def _rests(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
     }
 
 
-def _multipliers(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
+def multiplier_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
+    """The multipliers of each orbit, in rows of one length."""
     every = [orbit.multipliers for orbit in orbits]  # those that closed contacts make 0 are more or fewer
     values = np.array([np.pad(one, (0, max(map(len, every)) - len(one))) for one in every])
     dims = ("point", "multiplier")
     return {"multiplier_real": (dims, values.real), "multiplier_imag": (dims, values.imag)}
 
 
-def _unknowns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
-    """The equations' own unknowns and sides, in rows of one length."""
+def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
+    """The signature of each orbit and its equations' own unknowns, in rows of one length: what `orbits_of` reads."""
     width = max(orbit.problem.size for orbit in orbits)
     unknowns = np.full((len(orbits), width), np.nan)
     sides = np.zeros((len(orbits), max(1, max(len(orbit.signature.sides) for orbit in orbits))), dtype=np.int8)
     for row, side, orbit in zip(unknowns, sides, orbits, strict=True):
         row[: orbit.problem.size] = orbit.solution.unknowns
         side[: len(orbit.signature.sides)] = orbit.signature.sides
-    data = {"unknowns": (("point", "unknown"), unknowns), "sides": (("point", "impact"), sides)}
+    data: dict[str, Any] = {
+        "unknowns": (("point", "unknown"), unknowns),
+        "sides": (("point", "impact"), sides),
+        "symmetric": ("point", np.array([orbit.symmetric for orbit in orbits], dtype=np.int8)),
+        "period": (
+            "point",
+            np.array([orbit.period for orbit in orbits]),
+            {"long_name": "forcing periods in one period of the orbit"},
+        ),
+        "side": (
+            "point",
+            np.array([orbit.signature.side for orbit in orbits], dtype=np.int8),
+            {"long_name": "side of an orbit without impacts"},
+        ),
+    }
     if not orbits[0].problem.system.model.held:
         return data
     events = np.full((len(orbits), max(1, max(len(orbit.signature.events) for orbit in orbits)), 3), -1)

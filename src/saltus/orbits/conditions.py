@@ -5,21 +5,20 @@ With the orbit's equations F(y, p) = 0 (`problem.py`, J their derivatives to the
     fold LP:  g = 0 of  [[J, b], [c^T, 0]] (u, g) = (0, 1),         grazing GR:  v_i = 0;
 
 period doubling PD, and symmetry breaking BPC with the half map, as LP, with J of perturbations that change their sign each time.
-b and c are fixed near the null vectors, so the left vector d of the transposed system gives dg = -d^T (dJ) u.
+b and c are fixed near the null vectors, so the left vector d of the transposed system gives dg = -d^T (dJ) u. Central differences
+along u give (dJ) u, of motions that begin at y + s u and end a period later at y + s u, or, for PD and BPC, at y - s u.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.problem import Problem
-from saltus.orbits.signature import Signature
+from saltus.orbits.problem import Equations, Problem
 
 
 @dataclass(frozen=True)
@@ -54,14 +53,12 @@ class Singular:
     problem: Problem
     closing: float
     border: tuple[np.ndarray, np.ndarray]
-    twice: Problem | None  # of two (half) periods, in which alternating perturbations are periodic; None without impacts
 
     @classmethod
     def near(cls, orbit: PeriodicOrbit, closing: float) -> Singular:
         """The condition bordered by the null vectors of an orbit at which it nearly holds."""
         left, _, right = np.linalg.svd(orbit.solution.equations.jacobian(closing))
-        twice = _of_two_periods(orbit.problem) if closing < 0 and orbit.signature.sides else None
-        return cls(orbit.problem, closing, (left[:, -1], right[-1]), twice)
+        return cls(orbit.problem, closing, (left[:, -1], right[-1]))
 
     def moved(self, at: ConditionValue) -> Singular:
         """The condition bordered by the null vectors of a later point."""
@@ -78,45 +75,29 @@ class Singular:
             right, left = np.linalg.solve(matrix, unit), np.linalg.solve(matrix.T, unit)
         except np.linalg.LinAlgError:
             return None
-        bend = self.bend(solution, right[:n])
-        if bend is None or not np.isfinite(bend).all():
+        step = SETTINGS.shift / np.linalg.norm(right[:n])
+        beside = self.beside(solution, step * right[:n])
+        if beside is None:
             return None
-        return ConditionValue(float(right[n]), -self.along(left[:n]) @ bend @ self._same(), right[:n], left[:n])
-
-    def along(self, vector: np.ndarray) -> np.ndarray:
-        """A perturbation of the problem in whose terms `bend` is."""
-        return vector if self.twice is None else np.concatenate([vector, -vector])
-
-    def _same(self) -> np.ndarray:
-        """What (unknowns, parameters) do to those of `bend`; half of it, as two (half) periods count twice."""
-        n, count = self.problem.size, len(self.problem.paths)
-        if self.twice is None:
-            return np.eye(n + count)
-        both = np.zeros((2 * n + count, n + count))
-        both[:n, :n] = both[n : 2 * n, :n] = 0.5 * np.eye(n)
-        both[2 * n :, n:] = 0.5 * np.eye(count)
-        return both
-
-    def bend(self, solution: Solution, vector: np.ndarray) -> np.ndarray | None:
-        """The second derivatives of the equations along a vector and to (unknowns, parameters), by central differences."""
-        problem = self.twice or self.problem
-        y, step = self.doubled(solution.unknowns), SETTINGS.shift / np.linalg.norm(vector)
-        ahead, behind = (problem.evaluate(y + s * step * self.along(vector), solution.values) for s in (1, -1))
-        if ahead is None or behind is None:
+        bend = (beside[0].derivatives() - beside[1].derivatives()) / (2.0 * step)
+        if not np.isfinite(bend).all():
             return None
-        return np.asarray((ahead.derivatives() - behind.derivatives()) / (2.0 * step))
+        return ConditionValue(float(right[n]), -left[:n] @ bend, right[:n], left[:n])
 
-    def doubled(self, unknowns: np.ndarray) -> np.ndarray:
-        """An orbit's unknowns over two (half) periods."""
-        return unknowns if self.twice is None else self.problem.repeated(unknowns)
+    def curvature(self, solution: Solution, vector: np.ndarray) -> np.ndarray | None:
+        """The second derivative of the equations along a perturbation of length 1 that returns as the condition asks."""
+        beside = self.beside(solution, SETTINGS.shift * vector)
+        if beside is None:
+            return None
+        ahead, behind = (equations.jacobian(self.closing) @ vector for equations in beside)
+        return np.asarray((ahead - behind) / (2.0 * SETTINGS.shift))
 
-
-def _of_two_periods(problem: Problem) -> Problem:
-    """The problem of twice the time that a problem covers."""
-    signature = problem.signature
-    periods = signature.period * (1 if signature.symmetric else 2)
-    second = tuple(-s for s in signature.sides) if signature.symmetric else signature.sides
-    return problem.with_signature(Signature((*signature.sides, *second), periods))
+    def beside(self, solution: Solution, shift: np.ndarray) -> tuple[Equations, Equations] | None:
+        """The equations of motions beside an orbit, by +shift and by -shift, which return shifted as the condition asks."""
+        both = (solution.unknowns + shift, solution.unknowns - shift)
+        ends = both if self.closing > 0 else both[::-1]
+        ahead, behind = (self.problem.evaluate(y, solution.values, later=end) for y, end in zip(both, ends, strict=True))
+        return None if ahead is None or behind is None else (ahead, behind)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,10 +135,9 @@ def cubic(condition: Singular, solution: Solution, at: ConditionValue) -> float:
     near to another kind that it cannot be followed when it is perturbed.
     """
     u, d = (x / np.linalg.norm(x) for x in (at.right, at.left))
-    bend, n = condition.bend(solution, u), u.size
-    if bend is None:
+    curvature = condition.curvature(solution, u)
+    if curvature is None:
         return math.nan
-    curvature = bend[:n, : bend.shape[0]] @ condition.along(u)
     try:
         h = np.linalg.solve(solution.equations.jacobian(), -curvature)
     except np.linalg.LinAlgError:
@@ -167,21 +147,9 @@ def cubic(condition: Singular, solution: Solution, at: ConditionValue) -> float:
         return math.nan
 
     def third(a: float) -> float:
-        pair = [solution.unknowns + s * a * u + 0.5 * a**2 * h for s in (1, -1)]
-        parts = _over_both(condition, solution.values, *pair)
-        return math.nan if parts is None else 3.0 * float(d @ (parts[0] - parts[1])) / a**3
+        one, other = (solution.unknowns + s * a * u + 0.5 * a**2 * h for s in (1, -1))
+        first = condition.problem.evaluate(one, solution.values, later=other)
+        second = condition.problem.evaluate(other, solution.values, later=one)
+        return math.nan if first is None or second is None else 3.0 * float(d @ (first.residual - second.residual)) / a**3
 
     return (4.0 * third(step) - third(2.0 * step)) / 3.0
-
-
-def _over_both(condition: Singular, values: np.ndarray, one: np.ndarray, other: np.ndarray) -> Any:
-    """The residuals over two (half) periods of a motion that is at `one` in the first and at `other` in the second; or None."""
-    if condition.twice is not None:
-        later = other.copy()
-        later[::2] += condition.problem.closing
-        equations = condition.twice.evaluate(np.concatenate([one, later]), values)
-        return None if equations is None else np.split(equations.residual, 2)
-    first, second = condition.problem.evaluate(one, values), condition.problem.evaluate(other, values)
-    if first is None or second is None:
-        return None
-    return first.residual + (one - other), second.residual - (one - other)  # as equations without impacts are (end) - unknowns

@@ -119,14 +119,17 @@ class ContactProblem(Problem):
         forces = equations.seen[:, [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL]]
         return float(min(forces.min(), apart.min(initial=math.inf)))
 
-    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False) -> ContactEquations | None:
-        frequency = self.frequency(values)
-        if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
+    def evaluate(
+        self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
+    ) -> ContactEquations | None:
+        frequency, later = self.frequency(values), unknowns if later is None else later
+        if not (frequency > 0.0 and all(np.isfinite(numbers).all() for numbers in (unknowns, later, values))):
             return None
         state, phases = self.split(unknowns)
-        times = (np.append(phases, phases[0] + self.closing) if phases.size else np.array([0.0, self.closing])) / frequency
+        end, last = self.split(later)
+        times = (np.append(phases, last[0] + self.closing) if phases.size else np.array([0.0, self.closing])) / frequency
         followed = self._followed(self.plan, times, state, values, with_extremes)
-        return None if followed is None else self._assembled(state, times, frequency, *followed)
+        return None if followed is None else self._assembled(end, times, frequency, *followed)
 
     def carried_along(self, state: np.ndarray, closed: int, times: np.ndarray, values: np.ndarray) -> np.ndarray | None:
         """The state at the second time of the smooth motion from a state at the first one, with these contacts closed."""
@@ -154,7 +157,7 @@ class ContactProblem(Problem):
 
     def _assembled(
         self,
-        state: np.ndarray,
+        end: np.ndarray,
         times: np.ndarray,
         frequency: float,
         ends: np.ndarray,
@@ -162,7 +165,7 @@ class ContactProblem(Problem):
         maps: np.ndarray,
         seen: np.ndarray,
     ) -> ContactEquations:
-        """Residual and derivatives, by the chain rule from segment to segment.
+        """Residual, with the state `end` at the end, and derivatives, by the chain rule from segment to segment.
 
         The columns are the state at the start, the phases, the phase of the first event a period later, and the parameters.
         """
@@ -198,7 +201,7 @@ class ContactProblem(Problem):
         there[events:, :first] = -np.eye(first)
         if events:
             there[:, first] = total[:, end_phase]
-        residual = np.append(guards, (after - state)[free])
+        residual = np.append(guards, (after - end)[free])
         return ContactEquations(residual, here, there, total[:, parameters:], ends, self._extremes(seen), seen, first)
 
     def _extremes(self, seen: np.ndarray) -> np.ndarray:

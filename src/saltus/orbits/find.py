@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -251,14 +251,17 @@ def _is_symmetric(problem: Problem) -> bool:
 
 def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
     """An orbit that repeats after a divisor of its period, as an orbit of that; None where it does not."""
-    signature, unknowns, n = orbit.signature, orbit.solution.unknowns, len(orbit.signature.sides)
+    signature, unknowns = orbit.signature, orbit.solution.unknowns
+    changes = signature.sides or signature.events
+    n = len(changes)
     for q in range(1, signature.period):
         if signature.period % q or (n * q) % signature.period:
             continue
         part = n * q // signature.period
-        if signature.sides and (part == 0 or signature.sides[:part] != signature.sides[part : 2 * part]):
+        if changes and (part == 0 or changes[:part] != changes[part : 2 * part]):
             continue
-        shorter = orbit.problem.with_signature(Signature(signature.sides[:part], q, False, signature.side))
+        short = replace(signature, sides=signature.sides[:part], events=signature.events[:part], period=q, symmetric=False)
+        shorter = orbit.problem.with_signature(short)
         found = PeriodicOrbit.near(shorter, unknowns[: shorter.size], orbit.solution.values)
         if found is not None and np.abs(found.solution.unknowns - unknowns[: shorter.size]).max() < TOLERANCES.halves:
             return found

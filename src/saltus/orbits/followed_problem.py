@@ -69,7 +69,12 @@ class FollowedProblem(Problem):
         """The state at the section, and its time."""
         return self.start_state(unknowns, self.at(values)), float(self.signature.section or 0.0) / self.frequency(values)
 
-    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False) -> FollowedEquations | None:
+    def evaluate(
+        self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
+    ) -> FollowedEquations | None:
+        if later is not None:
+            equations = self.evaluate(unknowns, values, with_extremes)
+            return None if equations is None else replace(equations, residual=equations.residual + unknowns - later)
         place = np.append(unknowns, values)
         if self._latest is None or not np.array_equal(self._latest[0], place):
             self._latest = place, self._evaluated(unknowns, values)

@@ -67,10 +67,7 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
 
 
 def _signatures(dataset: xarray.Dataset) -> list[Signature]:
-    """The signature of each orbit: of a branch one a point, of a curve one for all."""
-    if "sides" not in dataset:
-        one, sides = dataset.attrs, np.atleast_1d(dataset.attrs["sides"])
-        return [_signature(sides, one["period"], one["symmetric"], one["side"])] * dataset.sizes["point"]
+    """The signature of each orbit."""
     columns = (dataset[name].values for name in ("sides", "period", "symmetric", "side"))
     signatures = [_signature(*row) for row in zip(*columns, strict=True)]
     if "events" not in dataset:

@@ -223,18 +223,24 @@ class Problem:
         """A change of the unknowns as one of `repeated` ones, with the other sign in the second round."""
         return np.concatenate([direction, -direction])
 
-    def evaluate(self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False) -> Equations | None:
-        """The equations at a point, or None where the motion cannot be followed."""
-        frequency = self.frequency(values)
-        if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
+    def evaluate(
+        self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
+    ) -> Equations | None:
+        """The equations at a point, or None where the motion cannot be followed.
+
+        `later` are the unknowns at the end of the period, where others are asked for than at its beginning, as of a motion that
+        takes more than one period.
+        """
+        frequency, later = self.frequency(values), unknowns if later is None else later
+        if not (frequency > 0.0 and all(np.isfinite(numbers).all() for numbers in (unknowns, later, values))):
             return None
-        segments = self._segments(unknowns, frequency)
+        segments = self._segments(unknowns, later, frequency)
         followed = self.follow_segments(segments, values, with_extremes)
         if followed is None:
             return None
         if not self.signature.sides:
-            return self._shooting(unknowns, frequency, followed)
-        return self._crossing(unknowns, frequency, segments, followed)
+            return self._shooting(later, frequency, followed)
+        return self._crossing(np.append(unknowns[3::2], later[1]), frequency, segments, followed)
 
     def carried(self, state: np.ndarray, begin: float, end: float, values: np.ndarray) -> np.ndarray | None:
         """The state at phase `end` of the smooth motion without impacts from a state at phase `begin`."""
@@ -254,15 +260,15 @@ class Problem:
         done = load_segments()[0](self._where, self._settings, env, model, *segments, ends, columns, extremes)
         return None if done < n else FollowedSegments(ends, columns, extremes, np.sign(model[4][1:]))
 
-    def _segments(self, unknowns: np.ndarray, frequency: float) -> Segments:
-        """The segments between the impacts."""
+    def _segments(self, unknowns: np.ndarray, later: np.ndarray, frequency: float) -> Segments:
+        """The segments between the impacts, the last one up to the first impact of the next period."""
         n = len(self.signature.sides)
         if not n:
             spans = np.array([[0.0, self.closing / frequency, 0.0]])
             return Segments(spans, self._sides, unknowns.reshape(1, -1).copy())
         spans = np.empty((n, 3))
         spans[:, 0] = unknowns[::2]
-        spans[:-1, 1], spans[-1, 1] = unknowns[2::2], unknowns[0] + self.closing
+        spans[:-1, 1], spans[-1, 1] = unknowns[2::2], later[0] + self.closing
         spans[:, :2] /= frequency
         spans[:, 2] = unknowns[1::2]
         return Segments(spans, self._sides, np.zeros((n, 2)))
@@ -277,7 +283,7 @@ class Problem:
         """The side of each segment, 0 for all sides."""
         return (0,) if self.passes_contact else self.signature.along()
 
-    def _shooting(self, unknowns: np.ndarray, frequency: float, followed: FollowedSegments) -> Equations:
+    def _shooting(self, later: np.ndarray, frequency: float, followed: FollowedSegments) -> Equations:
         own, sign = self.own, -1.0 if self.signature.symmetric else 1.0
         ends, columns, extremes, _ = followed
         state = ends[0, at.KINDS : at.KINDS + 2 * own]
@@ -286,16 +292,16 @@ class Problem:
         if FREQUENCY in self.paths:
             parameters[:, self.paths.index(FREQUENCY)] -= sign * rates * self.closing / frequency**2
         here, there = sign * columns[:, : 2 * own, : 2 * own], -np.eye(2 * own)[None]
-        return Equations(sign * state - unknowns, here, there, parameters, ends, extremes)
+        return Equations(sign * state - later, here, there, parameters, ends, extremes)
 
-    def _crossing(self, unknowns: np.ndarray, frequency: float, segments: Segments, followed: FollowedSegments) -> Equations:
+    def _crossing(self, following: np.ndarray, frequency: float, segments: Segments, followed: FollowedSegments) -> Equations:
+        """The equations of the impacts at the ends of the segments, at which the gap closes with the speeds `following`."""
         spans, (ends, columns, extremes, rates) = segments.spans, followed
         n, count = len(spans), len(self.paths)
         sign = np.where(segments.sides[:, 1] > 0, rates[0], rates[1])
         residual, here, there = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
         parameters = np.empty((n, 2, count))
         place = self.paths.index(FREQUENCY) if FREQUENCY in self.paths else -1
-        following = np.append(unknowns[3::2], unknowns[1])
         load_segments()[1](spans, sign, following, frequency, place, ends, columns, residual, here, there, parameters)
         return Equations(residual.ravel(), here, there, parameters.reshape(2 * n, count), ends, extremes)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from saltus.continuation import Corrected, Course
 from saltus.errors import ParameterError
+from saltus.orbits.branch_dataset import multiplier_columns, solution_columns
 from saltus.orbits.conditions import Condition, ConditionValue, Slow
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
@@ -91,6 +92,22 @@ class ConditionedCurve(OrbitCurve):
         """Always: the condition is the same, whatever borders it."""
         return True
 
+    def along_condition(self, orbit: PeriodicOrbit) -> SpecialCurvePoint | None:
+        """The point near an orbit that nearly fulfils the condition; None if it is not found or cannot be followed."""
+        known = self.known(orbit.solution.unknowns, orbit.solution.values)
+        if known is None:
+            return None
+        first = self.along_kernel(known)
+        exact: SpecialCurvePoint | None = self.solve(first.place, first.tangent)
+        return exact
+
+
+def without_condition(point: SpecialCurvePoint) -> OrbitPoint:
+    """A point as one of the curves of orbits along both parameters."""
+    return OrbitPoint(
+        point.curve.with_problem(point.orbit.problem), point.place, point.tangent, point.iterations, point.equations
+    )
+
 
 @answering("at")
 @dataclass(frozen=True, eq=False)
@@ -152,21 +169,20 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
     def to_xarray(self) -> xarray.Dataset:
         """The curve along `point`, its codimension-two points along `special`.
 
-        `parameter` is (point, path); `unknowns` and `sides` are those of `problem.py`.
+        `parameter` is (point, path); the signature and the `unknowns` of each orbit are as in `Branch.to_xarray`.
         """
         import xarray
 
         orbits, problem = self.orbits, self.orbits[0].problem
-        signature, model = problem.signature, problem.system.model
+        model = problem.system.model
         name = model.coordinates[0]
         angle = {"units": model.unit_of(name), "long_name": f"max abs({name})"}
         data: dict[str, Any] = {
             "parameter": (("point", "path"), self.parameters),
             "amplitude": ("point", np.array([o.amplitude for o in orbits]), angle),
             "residual": ("point", np.array([p.residual for p in self.points])),
-            "multiplier_real": (("point", "multiplier"), np.array([o.multipliers.real for o in orbits])),
-            "multiplier_imag": (("point", "multiplier"), np.array([o.multipliers.imag for o in orbits])),
-            "unknowns": (("point", "unknown"), np.array([o.solution.unknowns for o in orbits])),
+            **multiplier_columns(orbits),
+            **solution_columns(orbits),
             "special_kind": ("special", np.array([s.kind for s in self.special], dtype="U8")),
             "special_parameter": (("special", "path"), np.array([s.parameters for s in self.special]).reshape(-1, 2)),
             "special_bracket": (("special", "path"), np.array([s.evidence.brackets for s in self.special]).reshape(-1, 2)),
@@ -177,10 +193,6 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
             "ends": [str(end) for end in self.ends],
             "end_reasons": [end.reason.code for end in self.ends],
             "closed": int(self.closed),
-            "sides": list(signature.sides) or [0],
-            "side": signature.side,
-            "period": signature.period,
-            "symmetric": int(signature.symmetric),
         }
         known = provenance(problem.system, tol=problem.tol, **attributes)
         return xarray.Dataset(data, coords={"path": list(self.paths)}, attrs=known)

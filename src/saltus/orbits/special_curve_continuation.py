@@ -11,19 +11,25 @@ import numpy as np
 from saltus.checks import check_bounds, check_count, check_path, check_step
 from saltus.continuation import STEPS, Continuation, Cut, End, TestFunction, both_ways
 from saltus.errors import ParameterError
+from saltus.orbits.bifurcations import grazing
 from saltus.orbits.branch_continuation import STEP
 from saltus.orbits.branch_events import OrbitEvents
 from saltus.orbits.codimension import curve_test, curve_tests, room
 from saltus.orbits.conditions import Condition, Singular, Slow
+from saltus.orbits.contact_problem import ContactProblem, problem_of
+from saltus.orbits.contact_signature import section_of
 from saltus.orbits.find import divide
+from saltus.orbits.followed_problem import FollowedProblem
 from saltus.orbits.grazing import inserted
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Problem
 from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.signature import Signature
-from saltus.orbits.special_curve import ConditionedCurve, SpecialCurve, SpecialCurvePoint
+from saltus.orbits.special_curve import ConditionedCurve, SpecialCurve, SpecialCurvePoint, without_condition
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
-from saltus.orbits.symmetry import half, keeps_symmetry, over_full_period
+from saltus.orbits.switching_contacts import contact_change
+from saltus.orbits.switching_followed import change_at, same_events
+from saltus.orbits.symmetry import full_point, half, keeps_symmetry, over_full_period
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.progress import Progress, silent
 from saltus.systems import check_system
@@ -47,13 +53,34 @@ class CurveEvents(OrbitEvents):
         return None
 
     def barrier(self, point: Any) -> TestFunction:
-        """Another grazing."""
-        return curve_test(SpecialKind[f"{self.kind}_GR"], room)
+        """Another grazing, or another change of the events of an orbit with several contacts or friction."""
+        if isinstance(point.orbit.problem, FollowedProblem):
+            return same_events(point)
+        several = isinstance(point.orbit.problem, ContactProblem)
+        return curve_test(SpecialKind[f"{self.kind}_GR"], grazing if several else room)
 
-    def across(self, run: Continuation, cut: Cut) -> End:
-        """The end at another grazing."""
-        assert cut.special is not None
-        return End(OrbitEnd.MEETS_GRAZING, cut.point.parameter, cut.special.kind)
+    def cut(self, point: SpecialCurvePoint, ahead: SpecialCurvePoint) -> Cut | End | None:
+        """The cut where the orbit's events change, with the kind of that point; without one if only its section comes near."""
+        found = super().cut(point, ahead)
+        if not isinstance(found, Cut) or found.special is None or isinstance(point.condition, Slow):
+            return found
+        plain, change = without_condition(found.point), SpecialKind.GR
+        if isinstance(point.orbit.problem, FollowedProblem):
+            special = change_at(replace(found.special, point=plain), without_condition(point)).special
+            if special is None:
+                return Cut(found.point, None)
+            change = SpecialKind[special.kind]
+        elif isinstance(point.orbit.problem, ContactProblem):
+            change = contact_change(full_point(plain) if plain.orbit.symmetric else plain)
+        kind = SpecialKind[f"{self.kind}_GR" if change is SpecialKind.GR else f"{self.kind}_SW"]
+        return Cut(found.point, replace(found.special, kind=kind))
+
+    def across(self, run: Continuation, cut: Cut) -> SpecialCurvePoint | End:
+        """The end at another change of events; from where one comes to the phase of the state the curve goes on from another."""
+        if cut.special is None:
+            return _from_another_section(cut.point) or End(OrbitEnd.NO_SECTION, cut.point.parameter)
+        reason = OrbitEnd.MEETS_CHANGE if cut.special.kind.endswith("SW") else OrbitEnd.MEETS_GRAZING
+        return End(reason, cut.point.parameter, cut.special.kind)
 
     def ended(self, run: Continuation, ahead: Any, cut: Cut | None) -> End | None:
         """The end of an orbit that has shrunk to rest, unless it is another grazing."""
@@ -112,6 +139,12 @@ def continue_special(
     check_count("most_points", most_points, 1)
     if special.kind not in FOLLOWED:
         raise ParameterError(f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}", "special")
+    if special.kind == SpecialKind.GR and special.orbit.system.model.held:
+        raise ParameterError(
+            "of models with several contacts or friction curves are followed of LP, PD and BPC, not of GR so far; "
+            "continue an orbit at several values of the second parameter instead",
+            "special",
+        )
     if isinstance(special.orbit, RestingOrbit):
         raise ParameterError(
             "curves are followed of orbits between impacts only, and this one rests; continue it along one parameter", "special"
@@ -123,7 +156,7 @@ def continue_special(
             "special",
         )
     first_path, system = special.orbit.problem.paths[0], special.orbit.system
-    check_system(system, "continue_special")
+    check_system(system, "continue_special", several_contacts=True)
     if path == first_path:
         raise ParameterError(
             f"the branch already runs along {path}; name another parameter to follow its {special.kind} in", "path"
@@ -159,16 +192,31 @@ def _start(special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[flo
     orbit, condition = _defined(special, paths)
     scales = tuple((high - low) / 3.0 for low, high in limits)
     curve = ConditionedCurve(orbit.problem, scales, condition=condition)
-    known = curve.known(orbit.solution.unknowns, orbit.solution.values)
-    if known is None:
-        raise ParameterError(f"the motion beside this {special.kind} cannot be followed, so its curve cannot; choose another")
-    first = curve.along_kernel(known)
-    exact: SpecialCurvePoint | None = curve.solve(first.place, first.tangent)
+    exact = curve.along_condition(orbit)
     if exact is None:
         raise ParameterError(
-            f"Newton's method does not find this {special.kind} again; locate it on its branch with a smaller step"
+            f"Newton's method does not find this {special.kind} again, or the motion beside it cannot be followed; "
+            "locate it on its branch with a smaller step, or choose another"
         )
     return exact
+
+
+def _from_another_section(point: SpecialCurvePoint) -> SpecialCurvePoint | None:
+    """The same point with its orbit's state at a phase farther from all events, in the direction in which it was followed."""
+    condition, problem = point.condition, point.orbit.problem
+    assert isinstance(condition, Singular)
+    phase, state = section_of(point.orbit.motion(), point.orbit.frequency)
+    moved = problem.with_signature(replace(problem.signature, section=phase))
+    orbit = PeriodicOrbit.near(moved, state, point.parameters)
+    if orbit is None:
+        return None
+    curve = ConditionedCurve(moved, point.curve.scales, condition=Singular.near(orbit, condition.closing))
+    there, k = curve.along_condition(orbit), len(point.parameters)
+    if there is None:
+        return None
+    ahead = float(there.tangent[-k:] @ (curve.weights[-k:] ** 2 * point.tangent[-k:])) > 0.0
+    turned: SpecialCurvePoint = there if ahead else there.turned()
+    return turned
 
 
 def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrbit, Condition]:
@@ -185,7 +233,7 @@ def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrb
         signature, unknowns = _touching(special)
         orbit = _evaluated(Problem(system, signature, paths), unknowns, values)
         return orbit, Slow(orbit.problem, _first_without_speed(orbit.problem, unknowns))
-    problem = Problem(system, old.signature, paths)
+    problem = problem_of(system, old.signature, paths)
     if old.passes_contact and not problem.passes_contact:
         raise ParameterError(
             f"{paths[1]} makes the contact a singularity, which it is not at {system.parameters[paths[1]]:g}; change it "

@@ -46,6 +46,9 @@ class SpecialKind(StrEnum):
     LP_PD_GR = "LP-PD-GR", "a grazing at which folds and period doublings of the orbits with more impacts both end", 2
     LP_BPC_GR = "LP-BPC-GR", "the same, with symmetry breakings of symmetric orbits", 2
     GR_GR = "GR-GR", "two grazings at once", 2
+    LP_SW = "LP-SW", "fold where the events of the orbit change, as a contact's release appears or is lost", 2
+    PD_SW = "PD-SW", "period doubling where they change", 2
+    BPC_SW = "BPC-SW", "symmetry breaking where they change", 2
 
     def __new__(cls, code: str, description: str, codimension: int = 1) -> SpecialKind:
         """A kind is its code."""
@@ -89,6 +92,7 @@ class OrbitEnd(EndReason):
     NO_MOTION = "the motion cannot be followed {detail} the grazing"
     NO_DIRECTION = "neither direction after the grazing leads to orbits of the system"
     MEETS_GRAZING = "meets another grazing: {kind}"
+    MEETS_CHANGE = "meets another change of the orbit's events: {kind}"
     REFUSED = "the system ends there: {detail}"
     NO_PULL = "shrinks to rest at {parameter:.10g}: from there on the load no longer pulls the contact open on side {detail}"
     REST_VANISHES = (
