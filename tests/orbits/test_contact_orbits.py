@@ -241,6 +241,6 @@ def test_what_has_no_equations_is_refused_by_name(ask, error, words):
     assert words in str(refused.value)
 
 
-def test_curves_of_special_points_are_refused_by_name(branch):
-    with pytest.raises(ParameterError):
+def test_curves_of_changes_of_events_are_refused_by_name(branch):
+    with pytest.raises(ParameterError, match="LP, PD, BPC"):
         saltus.continue_special(branch.special[0], "load.frequency", (0.9, 1.1))

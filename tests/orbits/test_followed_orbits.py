@@ -121,3 +121,22 @@ def test_both_layers_have_orbits_whose_impacts_die_away() -> None:
     assert orbit.signature.section is not None
     assert orbit.defect < 1e-11
     assert (np.sort(np.abs(orbit.multipliers))[:2] < 1e-12).all()
+
+
+def test_a_period_doubling_where_impacts_die_away_lies_on_its_curve() -> None:
+    """Of both layers with e = 0.5: a branch under another vertical load, of orbits found there, has it where the curve is."""
+    amplitude = "load.horizontal.amplitude"
+    load = saltus.Load(frequency=0.5, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.1055))
+    model, impact = saltus.TwoLayer(beta0=np.deg2rad(80), damping=0.1), saltus.NewtonImpact(e=0.5)
+    orbit = saltus.find_orbit(saltus.System(model=model, load=load, impact=impact), theta_1=0.05, theta_2=0.0)
+    assert orbit.signature.section is not None
+    (flip,) = saltus.continue_orbit(orbit, amplitude, (0.1055, 0.1062)).special
+    assert flip.kind == "PD"
+    curve = saltus.continue_special(flip, "load.vertical", (-0.5005, -0.4985))
+    assert [end.parameter for end in curve.ends] == [-0.5005, -0.4985]
+    (there,) = curve.at("load.vertical", -0.499)
+    near = there.system.get(amplitude)
+    assert abs(near - flip.parameter) > 1e-4
+    beside = saltus.find_orbit(there.system.with_({amplitude: near - 2e-4}), theta_1=0.05, theta_2=0.0)
+    (again,) = saltus.continue_orbit(beside, amplitude, (near - 2e-4, near + 1e-4)).special
+    assert (again.kind, again.parameter) == ("PD", pytest.approx(near, abs=1e-12))

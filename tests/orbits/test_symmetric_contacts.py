@@ -88,6 +88,20 @@ def test_the_symmetry_breaks_where_the_half_map_has_the_multiplier_minus_one(bet
     assert not any(special.kind == "LP" and abs(special.parameter - expected) < 1e-6 for special in back.special)
 
 
+def test_the_breaking_of_the_symmetry_in_load_and_restitution_is_the_closed_form(between_walls: saltus.Branch) -> None:
+    """All along the curve: there the half map, which depends on both, has the multiplier -1."""
+    (point,) = (special for special in between_walls.special if special.kind == "BPC")
+    curve = saltus.continue_special(point, "impact.e", (0.5, 0.9), first_bounds=(0.05, 2.0))
+    assert [end.parameter for end in curve.ends] == [0.5, 0.9]
+    assert len(curve.points) > 20
+    for there in curve.points:
+        amplitude, e = there.parameters
+        assert abs(np.linalg.det(half_map(amplitude, e) + np.eye(2))) < 1e-12
+        assert there.orbit.symmetric
+    again = saltus.orbits.orbits_of(curve.to_xarray())
+    assert [orbit.solution.unknowns.tolist() for orbit in again] == [orbit.solution.unknowns.tolist() for orbit in curve.orbits]
+
+
 def test_mirror_layers_are_followed_over_half_a_period() -> None:
     """The layers swap; the orbit and its multipliers are those over the full period."""
     model = saltus.TwoLayer(beta0=np.deg2rad(80), damping=0.1)
@@ -106,31 +120,76 @@ def test_mirror_layers_are_followed_over_half_a_period() -> None:
         assert one == pytest.approx(-other[::-1], abs=1e-11)
 
 
-@pytest.fixture(scope="module")
-def small() -> saltus.Branch:
-    """The layers under small loads, where the symmetry breaks as well."""
+def layers(frequency: float, amplitude: float) -> saltus.System:
+    """Both layers, which the mirror swaps."""
     model = saltus.TwoLayer(beta0=np.deg2rad(80), damping=0.1)
-    load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.1))
-    system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.0))
-    return saltus.continue_orbit(saltus.find_orbit(system, theta_1=0.1, theta_2=0.0), LOAD, (0.02, 0.9))
+    load = saltus.Load(frequency=frequency, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=amplitude))
+    return saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.0))
 
 
-def test_both_halves_switch_together(small: saltus.Branch) -> None:
+@pytest.fixture(scope="module")
+def mirrored() -> saltus.Branch:
+    """The layers from small loads to large ones."""
+    return saltus.continue_orbit(saltus.find_orbit(layers(1.0, 0.1), theta_1=0.1, theta_2=0.0), LOAD, (0.02, 0.9))
+
+
+@pytest.fixture(scope="module")
+def breaking() -> saltus.Branch:
+    """The layers under a slower load, where the symmetry breaks."""
+    return saltus.continue_orbit(saltus.find_orbit(layers(0.5, 0.5), theta_1=0.3, theta_2=0.0), LOAD, (0.1, 0.5))
+
+
+def test_both_halves_switch_together(mirrored: saltus.Branch) -> None:
     """At a grazing or a switching of a symmetric orbit it stays one."""
-    assert all(orbit.symmetric for orbit in small.orbits)
-    assert {"GR", "SW", "LP", "BPC"} <= {str(point.kind) for point in small.special}
-    assert len({len(orbit.signature.events) for orbit in small.orbits}) >= 4
-    for point in small.special:
+    assert all(orbit.symmetric for orbit in mirrored.orbits)
+    assert {"GR", "SW", "LP"} <= {str(point.kind) for point in mirrored.special}
+    assert len({len(orbit.signature.events) for orbit in mirrored.orbits}) >= 4
+    for point in mirrored.special:
         assert point.evidence.bracket < 1e-10
 
 
-def test_where_the_layers_lose_their_symmetry_two_branches_begin(small: saltus.Branch) -> None:
+def test_every_orbit_of_a_branch_of_both_layers_is_a_motion(mirrored: saltus.Branch) -> None:
+    """By direct simulation: no contact stays closed that an impact of the other layer opens.
+
+    At the grazing of small loads the motions beside it have such an impact at once, which throws the closed layer open.
+    """
+    for orbit in mirrored.orbits:
+        assert orbit.defect < 1e-10 * (1 + np.abs(orbit.multipliers).max())
+    assert mirrored.ends[0].reason is OrbitEnd.TWO_AT_ONCE
+
+
+def test_where_the_layers_lose_their_symmetry_two_branches_begin(breaking: saltus.Branch) -> None:
     """The full-period equations are singular there: a multiplier is 1, and no fold is meant."""
-    (point,) = (special for special in small.special if special.kind == "BPC")
+    (point,) = (special for special in breaking.special if special.kind == "BPC")
     assert point.orbit.multipliers[0] == pytest.approx(1.0, abs=1e-9)
-    for branch in saltus.switch_branch(point, (0.02, 0.9)):
+    for branch in saltus.switch_branch(point, (0.1, 0.2)):
         assert not branch.orbits[-1].symmetric
         assert max(orbit.residual for orbit in branch.orbits) < 1e-9
+
+
+@pytest.mark.parametrize(("name", "kind", "start"), [("mirrored", "LP", 0.1), ("breaking", "BPC", 0.2)])
+def test_special_points_of_the_layers_lie_on_their_curves(
+    name: str, kind: str, start: float, request: pytest.FixtureRequest
+) -> None:
+    """A branch at another vertical load, of orbits found there, has its own where the curve of the first one's is."""
+    (point,) = (special for special in request.getfixturevalue(name).special if special.kind == kind)
+    curve = saltus.continue_special(point, "load.vertical", (-0.505, -0.495))
+    (there,) = curve.at("load.vertical", -0.498)
+    assert there.defect < 1e-10
+    near = there.system.get(LOAD)
+    settled = saltus.find_orbit(there.system.with_({LOAD: start}), theta_1=0.3, theta_2=0.0)
+    branch = saltus.continue_orbit(settled, LOAD, sorted((start, near + 0.01 * (near - start))))
+    assert min(abs(special.parameter - near) for special in branch.special if special.kind == kind) < 1e-11
+
+
+def test_a_curve_ends_where_its_orbits_graze(mirrored: saltus.Branch) -> None:
+    """Named as both at once, with an orbit that has the multiplier 1 and touches a layer."""
+    (fold,) = (special for special in mirrored.special if special.kind == "LP")
+    curve = saltus.continue_special(fold, "load.frequency", (0.6, 1.1))
+    (both,) = curve.special
+    assert (both.kind, curve.ends[0].reason) == ("LP-GR", OrbitEnd.MEETS_GRAZING)
+    assert abs(both.orbit.multipliers[0] - 1.0) < 1e-6
+    assert min(both.orbit.slowest, both.orbit.clearance) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_friction_on_ground_that_stands_still_keeps_the_symmetry() -> None:

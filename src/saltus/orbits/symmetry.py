@@ -139,6 +139,7 @@ def half_point(point: OrbitPoint) -> OrbitPoint:
 
 def full_period(orbit: PeriodicOrbit) -> PeriodicOrbit:
     """A symmetric orbit as a solution of the equations of its full period."""
-    found = PeriodicOrbit.near(*over_full_period(orbit.problem, orbit.solution.unknowns), orbit.solution.values)
-    assert found is not None, "a symmetric orbit solves the equations of its full period"
+    # It is not solved for again: where the symmetry breaks these equations are singular.
+    found = PeriodicOrbit.known(*over_full_period(orbit.problem, orbit.solution.unknowns), orbit.solution.values)
+    assert found is not None, "a symmetric orbit can be followed over its full period"
     return found

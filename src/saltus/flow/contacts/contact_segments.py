@@ -159,8 +159,22 @@ def follow_segment(where, state, settings, env, model, contacts, work, solver, b
 
 
 @lean_jit
-def given_impact(where, state, env, model, contacts, solver, hit):
-    """The impact of the contact `hit` whatever the sign of its speed: with the impulses that one of a unit speed has."""
+def stays_closed(solver, count, acts, after):
+    """Whether no contact in `after` is opened by an impact, as one is that has no impulse itself when those in `acts` have."""
+    for i in range(count):
+        if after >> i & 1 and not acts >> i & 1:
+            for k in range(count):
+                if acts >> k & 1 and solver[Solver.COUPLING][i, k] != 0.0:
+                    return False
+    return True
+
+
+@lean_jit
+def given_impact(where, state, env, model, contacts, solver, hit, after):
+    """The impact of the contact `hit` whatever the sign of its speed: with the impulses that one of a unit speed has.
+
+    Returns False where it has no outcome, or opens one of the contacts in `after`, which are to be closed then.
+    """
     own, count, unit = where[Where.OWN], contacts.shape[0], solver[Solver.FALLING_RATES]
     couple(where, state, env, model, contacts, solver)
     chosen = 1 << hit
@@ -169,7 +183,7 @@ def given_impact(where, state, env, model, contacts, solver, hit):
         unit[i] = -1.0 if i == hit else 0.0
         solver[Solver.GAPS][i] = solver[Solver.RATES][i]
     acts = impact_impulses(solver, own, count, chosen, unit)
-    if acts < 0:
+    if acts < 0 or not stays_closed(solver, count, acts, after):
         return False
     note_velocities(where, state, solver, 0.0)
     for i in range(count):
@@ -292,9 +306,10 @@ def pass_event(where, state, env, model, contacts, solver, row, ends, maps):
     own, dof = where[Where.OWN], where[Where.DOF]
     unit_columns(where, state)
     impact = row[SegmentPlan.KIND] == EventCode.IMPACT
-    if impact and not given_impact(where, state, env, model, contacts, solver, row[SegmentPlan.CONTACT]):
+    after = row[SegmentPlan.AFTER]
+    if impact and not given_impact(where, state, env, model, contacts, solver, row[SegmentPlan.CONTACT], after):
         return False
-    hold_contacts(where, state, env, model, contacts, solver, row[SegmentPlan.AFTER])
+    hold_contacts(where, state, env, model, contacts, solver, after)
     copy_columns(where, state, maps)
     for a in range(own):
         ends[SegmentEnd.NUMBERS + 8 * own + a] = state[State.COORDINATES + a]
