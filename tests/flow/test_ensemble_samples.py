@@ -82,6 +82,21 @@ def check_records(samples, motion, edges, name, close):
             assert float(samples.least_speed[leg]) == pytest.approx(speeds[inside].min(initial=np.inf), rel=1e-8, abs=1e-11)
 
 
+def test_extrema_of_long_steps_are_those_of_short_ones():
+    """Steps of a low order's tolerance, in which a fast load turns the velocity several times, or nearly."""
+    rng = np.random.default_rng(12)
+    load, n = Load(frequency=4.0, horizontal=Harmonic(1.0), vertical=-0.1), 400
+    system = System(model=Metainterface(beta0=math.radians(80.0), damping=0.1), load=load)
+    parameters = {"load.horizontal.amplitude": rng.uniform(0.02, 0.5, n), "load.vertical": rng.uniform(-0.3, -0.01, n)}
+    starts = {"theta": rng.uniform(-0.3, 0.3, n), "velocity": rng.uniform(-0.3, 0.3, n), "parameters": parameters}
+    options = {"periods": 3, "sample": ("state", "extrema"), "last": "all"}
+    long, short = (saltus.simulate_many(system, **starts, **options, tol=tol) for tol in (1e-8, 1e-15))
+    apart = np.abs(long.sampled_theta - short.sampled_theta)
+    assert float((apart < 1e-7).mean()) > 0.99
+    for name in ("largest_theta", "smallest_theta"):
+        assert float(np.abs(long[name] - short[name]).where(apart.max("period") < 1e-7).max()) < 1e-7
+
+
 def test_the_whole_motion_has_the_extremes_of_its_periods():
     cases = long_cases("rocking", 200)
     everything = cases.in_lanes(sample=KINDS, last="all")

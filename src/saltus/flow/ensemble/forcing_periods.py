@@ -138,18 +138,19 @@ def begin_period(lane, sizes, m, lanes, tables):
     The records' breakpoints end both.
     """
     labels = lanes[LaneArray.LABELS]
-    breaks, _ = own_records(tables, labels[lane, LaneLabel.TRAJECTORY])
+    breaks = tables[0]  # their own row of it as an array of its own would be counted as a reference, by a locked instruction
+    own = min(labels[lane, LaneLabel.TRAJECTORY], breaks.shape[0] - 1)
     period, last, length = int(get(m, Slot.PERIOD, lane)), labels[lane, LaneLabel.LAST_PERIOD], get(m, Slot.PERIOD_LENGTH, lane)
     origin, end = period * length, period_end(lane, m, lanes)
     limit = end + length if period + 1 < last else end
     piece = labels[lane, LaneLabel.PIECE]
-    while piece < breaks.size and breaks[piece] - origin <= get(m, Slot.NOW, lane):
+    while piece < breaks.shape[1] and breaks[own, piece] - origin <= get(m, Slot.NOW, lane):
         piece += 1
     labels[lane, LaneLabel.PIECE] = piece
-    each = piece < breaks.size or sizes[Size.EVERY_END] > 0
+    each = piece < breaks.shape[1] or sizes[Size.EVERY_END] > 0
     put(m, Slot.PASSED_TOGETHER, lane, -np.inf if each else float(last - 2))
-    if piece < breaks.size:
-        limit = min(limit, breaks[piece] - origin)
+    if piece < breaks.shape[1]:
+        limit = min(limit, breaks[own, piece] - origin)
     put(m, Slot.ORIGIN, lane, origin)
     put(m, Slot.PERIOD_END, lane, min(end, limit))
     put(m, Slot.STEP_LIMIT, lane, limit)

@@ -14,6 +14,7 @@ from saltus.taylor import (
     WIDTH,
     absolute,
     bits,
+    fma,
     get,
     inline_jit,
     lean_jit,
@@ -34,61 +35,94 @@ from saltus.taylor import (
 LONGEST_RECURRENCE = 16  # forcing periods, up to which a recurrence is looked for
 RECURRENT = 1e-10  # largest distance of two states, relative to their size or to 1, at which they count as one
 NEARLY_RECURRENT = 1e4  # largest distance, in units of RECURRENT, at which they may still be approaching one another
+ROUNDED = 1e-14  # of what is bounded: more than rounding takes from a difference of two bounds
+NEARLY_TURNED = 1e-4  # of a span of time: the fourth power of a shorter move to a turning point is rounding
 MOST_MOVES = 60  # steps of Newton's method to a turning point: more than bisection needs for the same digits
 
 
 @lean_jit
-def turning_value(m, at, row, order, low, high, v0, chosen):
-    """The position where a velocity, monotonic and of two signs at the ends, the first that of `v0`, vanishes."""
-    h, tau = high - low, 0.5 * (low + high)
+def turning_value(m, at, row, order, low, high, v_low, v_high, chosen):
+    """The position where a velocity, monotonic and of two signs at the ends, vanishes."""
+    span, tau = high - low, low + (high - low) * (v_low / (v_low - v_high))
     before = row * SERIES_LENGTH
-    active, start = chosen, load(m, at[LanePart.POSITIONS] + before)
+    active, start, value = chosen, load(m, at[LanePart.POSITIONS] + before), splat(0.0)
     for _ in range(MOST_MOVES):
-        _, v, a, _ = motion_at(m, at, row, order, start, tau)
-        first = mask(bits(v * v0 > 0.0))
+        x, v, a, jerk = motion_at(m, at, row, order, start, tau)
+        first = mask(bits(v * v_low > 0.0))
         low, high = select(first, tau, low), select(first, high, tau)
-        following = tau - v / a
+        newton = v / a
+        following = tau - newton * fma(newton, jerk / a, splat(1.0))
         inside = mask(bits(following >= low) & bits(following <= high))
-        following = select(inside, following, 0.5 * (low + high))
-        moved = absolute(following - tau)
-        tau = select(mask(active), following, tau)  # a lane stays where it has converged, whatever the others do
-        active &= bits(moved > 1e-9 * h)
+        move = select(inside, following, 0.5 * (low + high)) - tau
+        going = mask(active)  # a lane stays where it has converged, whatever the others do
+        value = select(going, fma(move, fma(move, fma(move, (1.0 / 3.0) * jerk, 0.5 * a), v), x), value)
+        tau = select(going, tau + move, tau)
+        active &= bits(absolute(move) > NEARLY_TURNED * span)
         if active == 0:
             break
-    return both_at(m, at[LanePart.POSITIONS] + before, at[LanePart.VELOCITIES] + before, order, start, tau)[0]
+    return value
+
+
+@inline_jit
+def course(m, at, row, end, ratio, bend):
+    """What is certain of a coordinate on [0, end] by the first six terms of its series, and by how much the others may add.
+
+    `bend` is the bound of `sweep` for a step of end / `ratio`. Returns bits of the lanes in which the velocity is monotonic, and
+    in which it keeps its sign, and bounds of the coordinate, by the Bernstein coefficients of velocity and coordinate.
+    """
+    series, square = at[LanePart.POSITIONS] + row * SERIES_LENGTH, end * end
+    cube = square * end
+    g0, g1, g2, g3 = load(m, series), load(m, series + 1) * end, load(m, series + 2) * square, load(m, series + 3) * cube
+    g4, g5 = load(m, series + 4) * (square * square), load(m, series + 5) * (square * cube)
+    shrunk = ratio * ratio
+    rest = bend * (shrunk * shrunk)
+    rest = fma(maximum(rest - 12.0 * absolute(g4) - 20.0 * absolute(g5), splat(0.0)), shrunk, ROUNDED * rest)
+    b1, b2 = fma(g2, splat(0.5), g1), g1 + g2 + 0.5 * g3
+    b3, b4 = g1 + 1.5 * (g2 + g3) + g4, g1 + 2.0 * g2 + 3.0 * g3 + 4.0 * g4 + 5.0 * g5
+    least, most = minimum(minimum(b1, b2), minimum(b3, minimum(g1, b4))), maximum(maximum(b1, b2), maximum(b3, maximum(g1, b4)))
+    one_sign = bits(least > rest * 0.2) | bits(most < rest * -0.2)
+    c0, c1, c2, c3 = b1 - g1, b2 - b1, b3 - b2, b4 - b3
+    falls, rises = maximum(maximum(c0, c1), maximum(c2, c3)), minimum(minimum(c0, c1), minimum(c2, c3))
+    monotonic = bits(rises > rest * 0.25) | bits(falls < rest * -0.25)
+    x1 = fma(g1, splat(0.2), g0)
+    x2 = fma(b1, splat(0.2), x1)
+    x3 = fma(b2, splat(0.2), x2)
+    x4 = fma(b3, splat(0.2), x3)
+    x5, beyond = fma(b4, splat(0.2), x4), rest * (1.0 / 30.0)
+    above = maximum(maximum(maximum(g0, x1), maximum(x2, x3)), maximum(x4, x5)) + beyond
+    below = minimum(minimum(minimum(g0, x1), minimum(x2, x3)), minimum(x4, x5)) - beyond
+    return monotonic, one_sign, above, below
 
 
 @lean_jit
 def record_range(m, at, row, sizes, h, bend, begin, v_begin, end, x, v, chosen, helpers, poly, series):
     """Take the extrema of a coordinate from `begin` to `end` of this step into HIGHEST and LOWEST, for chosen lanes.
 
-    Where the velocity is monotonic for certain, by its derivative at the start and the bound `bend` of how far that strays, an
-    extremum within the step is where it vanishes. Where neither that is certain nor that the velocity keeps its sign, all
-    turning points are looked for, lane by lane.
+    Lanes are left alone whose coordinate does not pass what has been recorded for certain. Where the velocity is monotonic for
+    certain, an extremum within the step is where it vanishes. Where neither that is certain nor that the velocity keeps its sign,
+    all turning points are looked for, lane by lane.
     """
     order, positions = sizes[Size.ORDER], at[LanePart.POSITIONS] + row * SERIES_LENGTH
     high, low = load(m, Slot.HIGHEST), load(m, Slot.LOWEST)
-    v0, first = load(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH), 2.0 * load(m, positions + 2) * h * h
-    last = first + 6.0 * load(m, positions + 3) * (h * h * h)
-    monotonic = bits(minimum(first, last) > bend) | bits(maximum(first, last) < -bend)
-    turns = bits(v_begin * v < 0.0) & monotonic & chosen
     top, bottom = maximum(high, x), minimum(low, x)
+    monotonic, one_sign, above, below = course(m, at, row, end, end / h, bend)
+    open_ = chosen & ~one_sign & (bits(above > top) | bits(below < bottom))
+    turns = bits(v_begin * v < 0.0) & monotonic & open_
     if turns:
-        turning = turning_value(m, at, row, order, begin, end, v_begin, turns)
+        turning = turning_value(m, at, row, order, begin, end, v_begin, v, turns)
         top, bottom = select(mask(turns), maximum(top, turning), top), select(mask(turns), minimum(bottom, turning), bottom)
     store(m, Slot.HIGHEST, select(mask(chosen), top, high))
     store(m, Slot.LOWEST, select(mask(chosen), bottom, low))
-    one_sign = bits(absolute(v0) * h > absolute(first) + 0.5 * absolute(last - first) + bend * (1.0 / 3.0))
-    unclear = chosen & ~monotonic & ~one_sign
+    unclear = open_ & ~monotonic
     if unclear:
         for lane in range(WIDTH):
             if (unclear >> lane) & 1:
                 for k in range(order + 1):
                     series[k] = get(m, positions + k, lane)
                 turning_range = helpers[Helper.TURNING_RANGE]
-                above, below = turning_range(series, order, vector_lane(begin, lane), vector_lane(end, lane), poly)
-                put(m, Slot.HIGHEST, lane, max(get(m, Slot.HIGHEST, lane), above))
-                put(m, Slot.LOWEST, lane, min(get(m, Slot.LOWEST, lane), below))
+                high_there, low_there = turning_range(series, order, vector_lane(begin, lane), vector_lane(end, lane), poly)
+                put(m, Slot.HIGHEST, lane, max(get(m, Slot.HIGHEST, lane), high_there))
+                put(m, Slot.LOWEST, lane, min(get(m, Slot.LOWEST, lane), low_there))
 
 
 @lean_jit
@@ -160,13 +194,18 @@ def recurrence_period(states, agreements, done, own):
     It repeats itself after q periods when 2 q + 2 states in a row agree with those q periods before. The smallest q counts, and
     none while the states of a part of it are not clearly apart, as a recurrence of fewer periods may still be approached.
     """
-    here, found, near = done % (2 * LONGEST_RECURRENCE), 0, 0
+    here, found, near = states[done % (2 * LONGEST_RECURRENCE)], 0, 0
     for q in range(1, min(LONGEST_RECURRENCE, done - 1) + 1):
-        there, apart = (done - q) % (2 * LONGEST_RECURRENCE), 0.0
+        there, same, close = states[(done - q) % (2 * LONGEST_RECURRENCE)], True, True
         for i in range(2 * own):
-            apart = max(apart, abs(states[here, i] - states[there, i]) / max(1.0, abs(states[here, i])))
-        agreements[q] = agreements[q] + 1 if apart <= RECURRENT else 0
-        if apart <= NEARLY_RECURRENT * RECURRENT:
+            apart, allowed = abs(here[i] - there[i]), RECURRENT * max(1.0, abs(here[i]))
+            if not apart <= allowed:
+                same = False
+                if not apart <= NEARLY_RECURRENT * allowed:
+                    close = False
+                    break
+        agreements[q] = agreements[q] + 1 if same else 0
+        if close:
             near |= 1 << q
         if found == 0 and agreements[q] >= 2 * q + 2:
             found = q
