@@ -204,6 +204,34 @@ def test_typical_systems_are_captured_from_speeds_worth_having():
     assert (lossless > [1.0, 1e-2, 5e-3, 2e-3, 5e-4]).all()
 
 
+@pytest.mark.parametrize("e", [1.0, 0.8])
+def test_what_is_proved_between_two_loads_holds_under_those_between(e):
+    """Along ways through the plane of amplitude and mean load: nearly the speeds of their ends, and motions never leave again."""
+    rng, n, system = np.random.default_rng(3), 200, BASE.with_({"impact.e": e})
+    start = {"load.horizontal.amplitude": rng.uniform(0.0, 1.2, n) * LIFT, "load.vertical": rng.uniform(-1.0, -0.4, n)}
+    end = {path: values + rng.uniform(-0.005, 0.005, n) for path, values in start.items()}
+    speeds = module.proved_speeds(system, start, end)
+    ends = np.array([module.proved_speeds(system, columns) for columns in (start, end)])
+    assert (speeds[(ends > 0).all(axis=0)] > 0.0).mean() > 0.9
+    assert (speeds[(ends == 0).any(axis=0)] == 0.0).all()
+    share = rng.uniform(0.0, 1.0, n)
+    between = {path: values + share * (end[path] - values) for path, values in start.items()}
+    for i in rng.choice(np.flatnonzero(speeds > 0), 12, replace=False):
+        here = system.with_({path: float(values[i]) for path, values in between.items()})
+        motion = simulate(here, theta=0.0, velocity=-0.999 * speeds[i], time=rng.uniform(0.0, 7.0), duration=60.0)
+        assert EventKind.RELEASE not in [event.kind for event in motion.events]
+        assert abs(motion.impacts.velocity_before[-1]) < speeds[i] * (1.0 if e == 1.0 else 1e-3)
+
+
+def test_nothing_is_proved_between_two_records():
+    time = np.linspace(0.0, 30.0, 61)
+    load = Load(horizontal=Record(time, 0.02 * np.sin(1.7 * time), "force"), vertical=-0.5)
+    system = System(model=Metainterface(beta0=BETA80, damping=0.1), load=load, impact=VelocityReduction(0.5))
+    scales = {"load.horizontal.scale": np.array([0.5, 1.0])}
+    assert (module.proved_speeds(system, scales) > 0.0).all()
+    assert (module.proved_speeds(system, scales, scales) == 0.0).all()
+
+
 def test_a_record_that_presses_enough_is_captured_and_one_that_lifts_is_not():
     time = np.linspace(0.0, 30.0, 61)
     record = Record(time, 0.02 * np.sin(1.7 * time), "force")

@@ -94,19 +94,27 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     return DataArray(speeds, dims=dims, coords=coords, name="capture_speed")
 
 
-def proved_speeds(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
-    """`capture_speed` for flat columns of numbers that the system takes; (n,), or (1,) for numbers alone."""
+def proved_speeds(system: System, given: Mapping[str, np.ndarray], to: Mapping[str, np.ndarray] | None = None) -> np.ndarray:
+    """`capture_speed` for flat columns of numbers that the system takes; (n,), or (1,) for numbers alone.
+
+    With other columns, `to`, each speed holds for all numbers between the two; under a load by records it is then 0.
+    """
     traced, law = _law_of(system)
-    arrays = (given.get(path, np.asarray(value)) for path, value in system.parameters.items())
-    columns = np.broadcast_arrays(*map(np.atleast_1d, arrays))
+    sides = [
+        [columns.get(path, np.asarray(value)) for path, value in system.parameters.items()] for columns in (given, to or given)
+    ]
+    columns = np.broadcast_arrays(*map(np.atleast_1d, sides[0] + sides[1]))
+    first, second = columns[: len(sides[0])], columns[len(sides[0]) :]
     result = np.zeros(columns[0].size)
-    if law is None:
+    records = [] if law is None else _record_ranges(system, traced, given)
+    if law is None or (records and to is not None):
         return result
-    records = _record_ranges(system, traced, given)
     for start in range(0, result.size, CAPTURE.batch):
         part = slice(start, start + CAPTURE.batch)
-        leaves = Leaves([Interval(c[None, part]) for c in columns], records)
-        result[part] = law.capture(leaves, result[part].size)
+        ranges = [
+            Interval(np.minimum(a, b)[None, part], np.maximum(a, b)[None, part]) for a, b in zip(first, second, strict=True)
+        ]
+        result[part] = law.capture(Leaves(ranges, records), result[part].size)
     return result
 
 

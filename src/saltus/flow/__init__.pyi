@@ -2,6 +2,7 @@ from .approach import approached
 from .compiled import load_contact_segments, load_segments
 from .contacts.contact_layout import ContactColumn, SegmentEnd, SegmentExtremes, SegmentPlan
 from .dense_output import DenseOutput
+from .ensemble.capture_speeds import captured_between
 from .ensemble.compiled_lanes import load_advance, load_driver, load_helpers
 from .ensemble.dataset_reading import stop_names, stroboscopic
 from .ensemble.ensemble import compiled_lanes, simulate_many
@@ -67,6 +68,7 @@ __all__ = [
     "Where",
     "approached",
     "available_cores",
+    "captured_between",
     "compiled_lanes",
     "contact_pull",
     "contact_regularity",

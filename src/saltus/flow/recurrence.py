@@ -143,6 +143,7 @@ def find_recurrence(
     periods: int,
     *,
     parameters: Mapping[str, np.ndarray] | None = None,
+    captured: np.ndarray | None = None,
     max_period: int = RECURRENCE.compiled_max_period,
     kept: int | None = None,
     extrema: bool = False,
@@ -169,6 +170,8 @@ def find_recurrence(
         For how many forcing periods at most.
     parameters
         Numbers by dotted path, (n,) each, in place of the system's.
+    captured
+        The speeds below which the motions are proved to be captured, (n,), where that is known (`captured_between`); else nan.
     max_period
         The longest period looked for. Those above 16 need `kept` to be more than twice as many.
     kept
@@ -196,7 +199,7 @@ def find_recurrence(
     last = max(1, min(max(size, max_period if extrema or impact_count or speed else 1), periods))
     coordinates, velocity = _as_arguments(system, states)
     inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
-    result = run_ensemble(system, inputs, wanted, read_threads(threads), progress, last=last)
+    result = run_ensemble(system, inputs, wanted, read_threads(threads), progress, last=last, captured=captured)
     found = replace(_read(result), outcome=_outcome(result, parameters is not None))
     return _with_periods(found, result.recurrence_period if stop_early else None, max_period, settings)
 

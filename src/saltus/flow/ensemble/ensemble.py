@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import check_memory, check_number, check_work
-from saltus.errors import ParameterError
+from saltus.flow.ensemble.capture_speeds import capture_speeds
 from saltus.flow.ensemble.compiled_lanes import compile_beside, compile_driver_aside, load_lane_functions
 from saltus.flow.ensemble.ensemble_dataset import to_dataset
 from saltus.flow.ensemble.ensemble_result import EnsembleResult
@@ -27,7 +27,6 @@ from saltus.taylor import record_tables
 if TYPE_CHECKING:
     import xarray
 
-MOST_SYSTEMS, MOST_PROVED = 16, 1 << 18  # systems, and parameter sets of each, whose speeds of capture are remembered
 SLIVER = 1e-9  # A duration that ends so near, in forcing periods, to the end of one is meant to end there.
 
 
@@ -120,15 +119,16 @@ def run_ensemble(
     duration: float | None = None,
     side: int = 0,
     last: int | str = 1,
+    captured: np.ndarray | None = None,
 ) -> EnsembleResult:
-    """Compile what is not there yet, and run the trajectories."""
+    """Compile what is not there yet, and run the trajectories; `captured` are speeds of capture that are known already."""
     driver = compile_driver_aside(system.model.held)
     run = program(system, wanted.limits, wanted.paths)
     if system.model.sides:
         check_contact(system)
     jobs = _jobs(system, run, inputs, wanted.periods, duration, side)
     if Until.REST in wanted.until:
-        jobs.numbers[:, JobNumber.CAPTURE_SPEED] = _capture(system, inputs.parameters, wanted.limits)
+        jobs.numbers[:, JobNumber.CAPTURE_SPEED] = capture_speeds(system, inputs.parameters, wanted.limits, known=captured)
     spans = jobs.labels[:, JobLabel.LAST_PERIOD] - jobs.labels[:, JobLabel.FIRST_PERIOD]
     begun = jobs.numbers[:, JobNumber.END_TIME] > jobs.numbers[:, JobNumber.START_TIME]
     check_work("periods" if duration is None else "duration", inputs.size, float(np.max(spans, initial=0)))
@@ -139,50 +139,6 @@ def run_ensemble(
         compile_beside(driver, system.model.held)
     ends = lanes.run(jobs, threads, progress, total=float(np.sum(spans + 1)))
     return EnsembleResult(system, inputs, wanted, jobs, ends)
-
-
-def _capture(system: System, columns: dict[str, np.ndarray], limits: tuple[str, ...]) -> Any:
-    """The speed below which each trajectory is proved to be captured, computed once for equal parameters.
-
-    With several contacts it is asked only once all are closed and nothing moves: it is 0 or infinite.
-
-    Raises
-    ------
-    ParameterError
-        A margin to stop at besides the model's own, which a captured motion may still reach.
-    """
-    from saltus.bounds import keeps_rest, proved_speeds
-
-    lifted = [friction.limit for friction in system.model.frictions]
-    asked = [name for name in limits if name not in (*system.model.stops, *lifted)]
-    if asked:
-        raise ParameterError(f'until="rest" proves nothing about {asked[0]}; leave out either it or stop_at', "until")
-    if system.model.frictions:
-        return 0.0  # nothing is proved of what sticks
-    if system.model.contacts:
-        return np.where(keeps_rest(system, columns), math.inf, 0.0)
-    if not system.model.sides:
-        return 0.0
-    varied = {path: values for path, values in columns.items() if values.ndim}
-    if not varied:
-        return proved_speeds(system, columns)
-    sets, place = np.unique(np.stack(list(varied.values()), axis=1), axis=0, return_inverse=True)
-    single = {path: float(values) for path, values in columns.items() if not values.ndim}
-    if len(_proved) >= MOST_SYSTEMS:
-        _proved.clear()
-    known = _proved.setdefault((system.to_json(), *varied, *single.items()), {})
-    rows = [row.tobytes() for row in sets]
-    new = [i for i, row in enumerate(rows) if row not in known]
-    if new:
-        if len(known) + len(new) > MOST_PROVED:
-            known.clear()
-            new = list(range(len(rows)))
-        distinct = dict(zip(varied, sets[new].T, strict=True))
-        known.update(zip((rows[i] for i in new), proved_speeds(system, columns | distinct).tolist(), strict=True))
-    return np.array([known[row] for row in rows])[place.reshape(-1)]
-
-
-_proved: dict[tuple[Any, ...], dict[bytes, float]] = {}  # studies ask for the same parameters again and again
 
 
 def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> Lanes:

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from saltus.enumerations import NumberedSentence
-from saltus.flow import approached, find_recurrence, return_period
+from saltus.flow import approached, captured_between, find_recurrence, return_period
 from saltus.studies.chart.motions import ALIKE
 from saltus.systems import System
 
@@ -101,6 +102,11 @@ class Ways:
     max_period: int
     tol: float
 
+    @cached_property
+    def captured(self) -> np.ndarray:
+        """(n,): the speeds below which capture is proved all along a way, nan where that is asked at each place."""
+        return captured_between(self.system, self.start, self.end)
+
     def settled(self, rows: np.ndarray, last: np.ndarray, share: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the motions from states (n, 2) at a share of these ways settle on, of dtype WAY, and whether they have settled.
 
@@ -124,6 +130,7 @@ class Ways:
             motions["state"],
             max(periods, 3 * self.max_period),
             parameters=parameters,
+            captured=self.captured[rows],
             max_period=self.max_period,
             kept=2 * self.max_period,
             extrema=True,

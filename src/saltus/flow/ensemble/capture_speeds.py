@@ -1,0 +1,91 @@
+"""The speeds below which the trajectories of an ensemble are proved to be captured at rest, proved once for equal parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.systems import System
+
+MOST_SYSTEMS, MOST_PROVED = 16, 1 << 18  # systems, and parameter sets of each, whose speeds of capture are remembered
+
+
+def capture_speeds(
+    system: System, columns: Mapping[str, np.ndarray], limits: tuple[str, ...], known: np.ndarray | None = None
+) -> Any:
+    """The speed below which each trajectory is proved to be captured; `known` are those that need no proof, nan for the others.
+
+    With several contacts it is asked only once all are closed and nothing moves: it is 0 or infinite.
+
+    Raises
+    ------
+    ParameterError
+        A margin to stop at besides the model's own, which a captured motion may still reach.
+    """
+    from saltus.bounds import keeps_rest
+
+    lifted = [friction.limit for friction in system.model.frictions]
+    asked = [name for name in limits if name not in (*system.model.stops, *lifted)]
+    if asked:
+        raise ParameterError(f'until="rest" proves nothing about {asked[0]}; leave out either it or stop_at', "until")
+    if system.model.frictions:
+        return 0.0  # nothing is proved of what sticks
+    if system.model.contacts:
+        return np.where(keeps_rest(system, columns), math.inf, 0.0)
+    if not system.model.sides:
+        return 0.0
+    if known is None:
+        return _remembered(system, columns)
+    speeds, left = known.copy(), np.flatnonzero(np.isnan(known))
+    if left.size:
+        speeds[left] = _remembered(system, {path: a[left] if a.ndim else a for path, a in columns.items()})
+    return speeds
+
+
+def captured_between(system: System, start: Mapping[str, np.ndarray], end: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The speeds below which motions are proved to be captured under all parameters on ways from some, (n,) each, to others.
+
+    They are nan where single values must be asked, as something is proved at one end of a way and not along it. Where nothing
+    is proved at either end nothing is taken for proved between them: the speed is 0.
+    """
+    from saltus.bounds import proved_speeds
+
+    size = len(next(iter(start.values())))
+    if system.model.frictions or system.model.contacts or not system.model.sides:
+        return np.full(size, np.nan)
+    speeds = proved_speeds(system, start, end)
+    left = np.flatnonzero(speeds == 0.0)
+    if left.size:
+        ends = [_remembered(system, {path: a[left] for path, a in columns.items()}) for columns in (start, end)]
+        speeds[left] = np.where(np.maximum(*ends) > 0.0, np.nan, 0.0)
+    return speeds
+
+
+def _remembered(system: System, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """`proved_speeds`, computed once for equal parameters: studies ask for the same ones again and again."""
+    from saltus.bounds import proved_speeds
+
+    varied = {path: values for path, values in sorted(columns.items()) if values.ndim}
+    if not varied:
+        return proved_speeds(system, columns)
+    sets, place = np.unique(np.stack(list(varied.values()), axis=1), axis=0, return_inverse=True)
+    single = {path: float(values) for path, values in columns.items() if not values.ndim}
+    if len(_proved) >= MOST_SYSTEMS:
+        _proved.clear()
+    known = _proved.setdefault((system.to_json(), *varied, *single.items()), {})
+    rows = [row.tobytes() for row in sets]
+    new = [i for i, row in enumerate(rows) if row not in known]
+    if new:
+        if len(known) + len(new) > MOST_PROVED:
+            known.clear()
+            new = list(range(len(rows)))
+        distinct = dict(zip(varied, sets[new].T, strict=True))
+        known.update(zip((rows[i] for i in new), proved_speeds(system, {**columns, **distinct}).tolist(), strict=True))
+    return np.array([known[row] for row in rows])[place.reshape(-1)]
+
+
+_proved: dict[tuple[Any, ...], dict[bytes, float]] = {}
