@@ -26,7 +26,6 @@ VARIANTS: tuple[tuple[float, float, float], ...] = (
     *((m, e, g) for m in (0.001, 0.01) for e, g in ((0.0, 1.0), (0.0, 0.0), (0.5, 0.0))),
 )
 REFERENCE = (0.001, 0.0, 0.0)  # the variant of the pictures: almost no mass, frictionless inelastic contact (erratum 25)
-VERTICAL_LOAD = "load.vertical"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
