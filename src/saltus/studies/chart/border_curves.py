@@ -27,7 +27,8 @@ def curve_dataset(curve: Any, paths: Sequence[str]) -> xarray.Dataset:
         data[name] = ("point", curve.parameters[:, i])
     kept: xarray.Dataset = data[["horizontal", "vertical", "amplitude", "residual", "special_kind"]]
     kept["special_place"] = (("special", "axis"), data["special_parameter"].values[:, order])
-    kept.attrs = {**data.attrs, "impact_count": curve.orbits[0].signature.impact_count, "path": list(paths)}
+    signature = curve.orbits[0].signature
+    kept.attrs = {**data.attrs, "period": signature.period, "impact_count": signature.impact_count, "path": list(paths)}
     return kept
 
 
