@@ -90,6 +90,8 @@ def first_friction(where, frictions, count, work, solver, h, whole):
                 continue
             else:
                 sliding_series(frictions, work, solver, k, 1.0 * slides, order, guard)
+                if known == 0 and guard[0] < 0.0:  # by rounding, see `undecided`
+                    return k, 0.0, 2, False
             if known >= order:
                 continue
             kind, u, touch = contact_root(guard, known, order, h, work[Work.POLYNOMIAL])
@@ -127,14 +129,18 @@ def reach(where, state, env, model, work, solver, frictions, count, t, origin, k
 
 @lean_jit
 def undecided(where, state, solver, frictions):
-    """The frictions, as bits, that have the speed of their ground; of the others it is noted which way they slide."""
+    """The frictions, as bits, that have the speed of their ground; of the others it is noted which way they slide.
+
+    One whose sliding speed has changed its sign within rounding, at the instant of another one's event as of blocks that move
+    alike, has its own event next: each takes the tangent's columns to its own instant.
+    """
     bits = 0
     for k in range(frictions.shape[0]):
         place = State.COORDINATES + where[Where.DOF] + frictions[k, FrictionColumn.COORDINATE]
         rate = state[place] - ground_speed(solver, frictions, k)
         if rate == 0.0:
             bits |= 1 << k
-        else:
+        elif abs(rate) > ZERO or rate * frictions[k, FrictionColumn.SLIDES] >= 0.0:
             frictions[k, FrictionColumn.SLIDES], frictions[k, FrictionColumn.SKIP] = 1 if rate > 0.0 else -1, 0
     return bits
 
