@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import cos, pi, sin, sqrt
 
 import numpy as np
 import pytest
 
 import saltus
+from saltus.orbits import solved_near
+from saltus.orbits.images import nearest
 
 
 def rubbed(frequency: float = 0.7, friction: float = 0.2, **numbers: float) -> saltus.System:
@@ -140,3 +143,24 @@ def test_a_period_doubling_where_impacts_die_away_lies_on_its_curve() -> None:
     beside = saltus.find_orbit(there.system.with_({amplitude: near - 2e-4}), theta_1=0.05, theta_2=0.0)
     (again,) = saltus.continue_orbit(beside, amplitude, (near - 2e-4, near + 1e-4)).special
     assert (again.kind, again.parameter) == ("PD", pytest.approx(near, abs=1e-12))
+
+
+def test_a_section_that_moves_to_another_forcing_period_does_not_turn_a_branch_round() -> None:
+    """Of orbits of three periods: the branch goes through its fold from bound to bound, though its sections move. The state at
+    the section after that is on the motion from the one before, by which a loop is seen to close."""
+    load = saltus.Load(frequency=2.56, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=1.0))
+    model = saltus.TwoLayer(beta0=np.deg2rad(80), damping=0.1, mass_ratio=0.01)
+    system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.5))
+    orbit = solved_near(system, "load.frequency", np.array([0.0, -0.073, 0.0, -0.096]), 3)
+    assert orbit is not None
+    branch = saltus.continue_orbit(orbit, "load.frequency", (2.5, 2.57))
+    assert [end.parameter for end in branch.ends] == [2.57, 2.57]
+    rates = np.diff(branch.parameters)
+    assert np.count_nonzero(np.diff(np.sign(rates[rates != 0.0]))) == 1
+    assert [str(point.kind) for point in branch.special].count("LP") == 1
+    moved = [pair for pair in pairwise(branch.points) if pair[0].orbit.signature.section != pair[1].orbit.signature.section]
+    same = [(before, after) for before, after in moved if before.parameter == after.parameter]
+    assert len(same) > 1
+    for before, after in same:
+        assert np.abs(before.place - after.place).max() > 1e-3
+        np.testing.assert_allclose(nearest(before, before.place, after), after.place, rtol=0, atol=1e-9)

@@ -114,12 +114,12 @@ class Continuation:
             return False
         closed = end is None and self._closes(point, ahead)
         if closed:
-            ahead, end, cut = self.points[0], End(CurveEnd.CLOSED), None
+            ahead, end, cut = self.events.closing(self.points[0], ahead), End(CurveEnd.CLOSED), None
         if closed or not born:
             self._locate(self.trail.examined(self.trail.up_to(samples, ahead)))
         else:
             self.trail.begin(ahead)
-        self.points.append(ahead)
+        self.points += [ahead, self.points[0]] if closed and ahead is not self.points[0] else [ahead]
         self.watch(ahead)
         self.end = self.end or end or self.events.ended(self, ahead, cut)
         return self.end is None and cut is not None and self._cross(cut)
@@ -210,7 +210,8 @@ class Continuation:
         if not (0.0 < share <= 1.0 and b.curve.norm(along - share * across) < STEPS.closing * length):
             return False
         moved = self.events.nearest(first, first.place + STEPS.ahead * first.tangent, b)
-        assert moved is not None
+        if moved is None:
+            return False
         return float((moved - place) @ (b.curve.weights**2 * b.tangent)) > 0.0  # else it comes back along itself
 
 

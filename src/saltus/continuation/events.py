@@ -81,3 +81,7 @@ class Events:
     def nearest(self, point: Any, place: np.ndarray, other: Any) -> np.ndarray | None:
         """A place, on the equations of `point`, renumbered to lie nearest to another point; None if it cannot be compared."""
         return place
+
+    def closing(self, first: Any, ahead: Any) -> Any:
+        """The first point of a curve that closes, on the equations with which it comes back if they can be told."""
+        return first

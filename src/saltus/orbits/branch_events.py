@@ -21,6 +21,7 @@ from saltus.orbits.images import (
     on_family,
     passes_image,
     repetition,
+    with_section_of,
 )
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
@@ -66,6 +67,10 @@ class OrbitEvents(Events):
 
     def nearest(self, point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
         return nearest(point, place, other)
+
+    def closing(self, first: OrbitPoint, ahead: OrbitPoint) -> OrbitPoint:
+        """The first orbit of a loop, with its state at the section with which the loop comes back."""
+        return with_section_of(first, ahead)
 
 
 @dataclass
@@ -167,7 +172,7 @@ class BranchEvents(OrbitEvents):
             run.special.pop()
             return End(OrbitEnd.COMES_BACK, graze.parameter)
         followed = isinstance(cut.point.orbit.problem, FollowedProblem)
-        following = beyond(cut, run.points[-2:][0]) if followed else other_side(cut.point)
+        following = beyond(cut, run.points) if followed else other_side(cut.point)
         if isinstance(following, End):
             return following
         count, value = _impact_count(following), following.parameter

@@ -122,6 +122,19 @@ class FollowedProblem(Problem):
         middle = equations.middle
         return np.asarray((image_of(self.system.model, middle) if self.signature.period % 2 else middle) - unknowns)
 
+    def state_at(self, phase: float, unknowns: np.ndarray, values: np.ndarray, near: np.ndarray) -> np.ndarray | None:
+        """The state at a phase of the load of the motion that begins at the section: of those in its forcing periods the nearest
+        one to another state. None where it cannot be followed."""
+        if self.evaluate(unknowns, values) is None or self._latest is None or self._latest[1] is None:
+            return None
+        motion, signature = self._latest[1][0], self.signature
+        ahead = (phase - float(signature.section or 0.0)) % math.tau + math.tau * np.arange(signature.period)
+        later = ahead >= math.tau * signature.span  # of a symmetric orbit, whose second half is the image of the first one
+        times = motion.start + np.where(later, ahead - math.tau * signature.span, ahead) / self.frequency(values)
+        states = np.array([np.concatenate([np.atleast_1d(part) for part in motion.at(time)]) for time in times.tolist()])
+        states = np.where(later[:, None], image_of(self.system.model, states) if later.any() else states, states)
+        return np.asarray(states[np.abs(states - near).max(axis=1).argmin()])
+
     @cached_property
     def _program(self) -> Program:
         return program(self.system, limits_of(self.system, ()), self.paths)

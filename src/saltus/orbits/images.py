@@ -8,6 +8,7 @@ import numpy as np
 
 from saltus.continuation import between
 from saltus.orbits.contact_problem import ContactProblem
+from saltus.orbits.followed_problem import FollowedProblem
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
 from saltus.orbits.tolerances import TOLERANCES
@@ -139,6 +140,27 @@ def renumbered(problem: Problem, unknowns: np.ndarray, other: OrbitPoint) -> np.
 
 def nearest(point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
     """A place on the equations of a point in the numbers in which it lies nearest to another point; None if it cannot."""
-    n = point.curve.problem.size
-    unknowns = renumbered(point.curve.problem, place[:n], other)
+    problem, n = point.curve.problem, point.curve.problem.size
+    if isinstance(problem, FollowedProblem):
+        unknowns = _at_section_of(problem, place, other)
+    else:
+        unknowns = renumbered(problem, place[:n], other)
     return None if unknowns is None else np.concatenate([unknowns, place[n:]])
+
+
+def _at_section_of(problem: FollowedProblem, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+    """The state at the section of a point, as near to the point's as may be, of a motion that is followed through its events;
+    None where the point is of another kind."""
+    target, n = other.orbit.signature, problem.size
+    if target.section is None or (target.period, target.symmetric) != (problem.signature.period, problem.signature.symmetric):
+        return None
+    return problem.state_at(target.section, place[:n], place[n:], other.solution.unknowns)
+
+
+def with_section_of(point: OrbitPoint, other: OrbitPoint) -> OrbitPoint:
+    """A point that is followed through its events with its state at the section of another one; else the point as it is."""
+    place = None
+    if isinstance(point.curve.problem, FollowedProblem) and not point.curve.joins(other.curve):
+        place = nearest(point, point.place, other)
+    found = None if place is None else other.curve.known(*np.split(place, [other.curve.problem.size]))
+    return point if found is None else other.curve.with_tangent(found, other.tangent) or point

@@ -8,18 +8,20 @@ other derivatives on the other side, or with a jump. With dry friction the chang
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from saltus.continuation import Bounds, Corrected, CurveEnd, Cut, End, Evidence, TestFunction, Zero
+from saltus.continuation import Bounds, Corrected, Course, CurveEnd, Cut, End, Evidence, TestFunction, Zero
 from saltus.errors import SaltusError
 from saltus.flow import EventCode
 from saltus.orbits.contact_signature import section_of
 from saltus.orbits.followed_events import SETTINGS as EVENTS
 from saltus.orbits.followed_events import FollowedEvents, OrbitEvent
 from saltus.orbits.followed_problem import FollowedEquations, FollowedProblem
+from saltus.orbits.images import nearest
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
@@ -43,6 +45,7 @@ class OtherSideSettings:
     refused: float = 10.0  # Steps ahead at which parameters are tried, where no step leads on.
     standing: float = 1e-11  # What moves by less sticks for good: slips grow as the third power of their duration.
     slow: float = 1e-2  # The largest speed of an impact that has just appeared.
+    same: float = 0.01  # Share of such a distance within which two orbits at one value of the parameter are one.
     along: float = 1e-6  # The distance along a branch over which the section's tangent is carried to another section.
 
 
@@ -116,20 +119,23 @@ def _stands(point: OrbitPoint) -> bool:
     return bool(orbit.problem.system.model.frictions) and orbit.highest - orbit.lowest < SETTINGS.standing
 
 
-def beyond(cut: Cut, before: OrbitPoint) -> OrbitPoint | End:
-    """Where a branch goes on beyond a cut: with other events, or from another section."""
+def beyond(cut: Cut, points: Sequence[OrbitPoint]) -> OrbitPoint | End:
+    """Where a branch of these points, the last one at a cut, goes on beyond it: with other events, or from another section."""
     if _stands(cut.point):
         return End(OrbitEnd.STICKS, cut.point.parameter)
-    sequence = events_at(before).sequence
+    sequence = events_at(points[-2:][0]).sequence
     if cut.special is not None and cut.special.kind == SpecialKind.CH:
         return End(OrbitEnd.REST_VANISHES, cut.point.parameter)
     if events_at(cut.point).sequence == sequence and _section_is_near(cut.point):
         return _from_another_section(cut.point) or End(OrbitEnd.NO_SECTION, cut.point.parameter)
-    return other_events(cut.point, sequence)
+    return other_events(cut.point, sequence, points)
 
 
-def other_events(point: OrbitPoint, sequence: EventSequence) -> OrbitPoint | End:
-    """An orbit beside a point that has other events than these, with the direction away from it; or why there is none."""
+def other_events(point: OrbitPoint, sequence: EventSequence, points: Sequence[OrbitPoint] = ()) -> OrbitPoint | End:
+    """An orbit beside a point that has other events than these, with the direction away from it; or why there is none.
+
+    It is none of the branch of these points, as between two changes that are all but one it may lead back along itself.
+    """
     reason, detail = OrbitEnd.NO_OTHER_EVENTS, ""
     for equations in _beside(point, sequence):
         if _is_discontinuous(equations):
@@ -140,9 +146,23 @@ def other_events(point: OrbitPoint, sequence: EventSequence) -> OrbitPoint | End
         for probe in SETTINGS.probes:
             for direction in (tangent, -tangent):
                 ahead: OrbitPoint | None = curve.solve_within(point.place + probe * direction, direction, SETTINGS.near * probe)
-                if ahead is not None and events_at(ahead).sequence != sequence and _leads_away(point, ahead, probe):
+                if ahead is None or events_at(ahead).sequence == sequence or not _leads_away(point, ahead, probe):
+                    continue
+                if not _lies_on(points, ahead, SETTINGS.same * probe):
                     return ahead
     return End(reason, point.parameter, detail=detail)
+
+
+def _lies_on(points: Sequence[OrbitPoint], ahead: OrbitPoint, same: float) -> bool:
+    """Whether an orbit is one of a branch of these points: solved for between them, it is no farther away than `same`."""
+    course, sequence = Course(tuple(points), (), (End(OrbitEnd.START), End(OrbitEnd.START)), ()), events_at(ahead).sequence
+    for i, (a, b) in enumerate(pairwise(points)):
+        passed = min(a.parameter, b.parameter) <= ahead.parameter <= max(a.parameter, b.parameter)
+        if passed and sequence in (events_at(a).sequence, events_at(b).sequence):
+            places = [nearest(known, known.place, ahead) for known in course.solved_between(i, ahead.parameter)]
+            if any(place is not None and ahead.curve.norm(place - ahead.place) < same for place in places):
+                return True
+    return False
 
 
 def _leads_away(point: OrbitPoint, ahead: OrbitPoint, probe: float) -> bool:
@@ -185,6 +205,7 @@ def _section_is_near(point: OrbitPoint) -> bool:
 def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
     """The same orbit with its state at a phase farther from all events, and the tangent carried there."""
     problem = point.orbit.problem
+    assert isinstance(problem, FollowedProblem)
     phase, state = section_of(point.orbit.motion(), point.orbit.frequency)
     moved = problem.with_signature(replace(problem.signature, section=phase))
     assert isinstance(moved, FollowedProblem)
@@ -192,8 +213,10 @@ def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
     first = PeriodicOrbit.near(moved, state, point.parameters)
     if near is None or first is None:
         return None
-    guess = section_of(near.orbit.motion(), near.orbit.frequency, phase)[1]
-    second = PeriodicOrbit.near(moved, guess, near.parameters)
+    guess = problem.state_at(
+        phase, near.solution.unknowns, near.parameters, first.solution.unknowns
+    )  # in the same forcing period
+    second = None if guess is None else PeriodicOrbit.near(moved, guess, near.parameters)
     if second is None:
         return None
     solution, apart = first.solution, second.solution.unknowns - first.solution.unknowns
