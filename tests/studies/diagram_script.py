@@ -1,5 +1,6 @@
-"""A small diagram with a store, as a script of its own that is killed when it writes a chunk."""
+"""Small diagrams with a store, of one contact and of two, as a script of its own that is killed when it writes a chunk."""
 
+import math
 import os
 import signal
 import sys
@@ -7,8 +8,9 @@ import sys
 import numpy as np
 from shared_systems import forced
 
-from saltus.studies import response_spectrum
+from saltus.studies import bifurcation_diagram, response_spectrum
 from saltus.sweep.store import Store
+from saltus.systems import Harmonic, Load, NewtonImpact, System, TwoStops
 
 FREQUENCY, BOUNDS = "load.frequency", (1.3, 1.6)  # two motions, their cascades and chaos
 
@@ -19,6 +21,17 @@ def diagram(**options):
     return response_spectrum(
         forced(2.0), FREQUENCY, BOUNDS, **{"effort": "quick", "max_period": 2, "values": values, "starts": 4} | options
     )
+
+
+def contact_diagram(**options):
+    """Of a mass between two stops."""
+    load = Load(frequency=1.0, force=Harmonic(amplitude=0.8, phase=math.pi / 2))
+    stops = System(model=TwoStops(stiffness=0.0), load=load, impact=NewtonImpact(e=0.7))
+    few = {"effort": "quick", "max_period": 1, "values": [0.62], "starts": 4, "repelling": 0, "switch": False}
+    return bifurcation_diagram(stops, "load.force.amplitude", (0.6, 0.65), **few | options)
+
+
+DIAGRAMS = {"one": diagram, "several": contact_diagram}  # by how many contacts there are
 
 
 def killed_at(count):
@@ -38,4 +51,4 @@ def killed_at(count):
 
 if __name__ == "__main__":
     killed_at(int(sys.argv[2]))
-    diagram(store=sys.argv[1])
+    DIAGRAMS[sys.argv[3]](store=sys.argv[1])

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from diagram_script import BOUNDS, FREQUENCY, diagram
+from diagram_script import BOUNDS, FREQUENCY, contact_diagram, diagram
 from shared_systems import forced
 from typer.testing import CliRunner
 
@@ -69,12 +69,34 @@ def test_a_store_changes_no_number_and_remembers_all_of_them(alone, kept, monkey
 def test_killed_at_several_moments_a_search_goes_on_to_the_same_bytes(kept, tmp_path):
     chunks = sum(part.total for part in parts_of(kept / "diagram.zarr"))
     for count in (1, 6, chunks // 3, chunks // 3 + 1):
-        command = [sys.executable, str(SCRIPT), str(tmp_path / "diagram.zarr"), str(count)]
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-        died = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-        assert died.returncode == -signal.SIGKILL, died.stderr
-        assert not status(tmp_path / "diagram.zarr").complete
+        kill("one", tmp_path / "diagram.zarr", count)
     assert files(computed(tmp_path)) == files(kept)
+
+
+def test_killed_and_interrupted_a_search_with_several_contacts_goes_on_to_the_same_bytes(tmp_path):
+    def stop(_, what):
+        if "following" in what:
+            raise KeyboardInterrupt
+
+    whole, again = tmp_path / "whole", tmp_path / "again"
+    for folder in (whole, again):
+        folder.mkdir()
+    write_dataset(whole / "diagram.nc", contact_diagram(store=whole / "diagram.zarr"))
+    chunks = sum(part.total for part in parts_of(whole / "diagram.zarr"))
+    with pytest.raises(SweepInterrupted, match="keeps its parts"):
+        contact_diagram(store=again / "diagram.zarr", progress=stop)
+    kill("several", again / "diagram.zarr", 1 + chunks // 3)
+    write_dataset(again / "diagram.nc", contact_diagram(store=again / "diagram.zarr"))
+    assert files(again) == files(whole)
+
+
+def kill(kind, store, count):
+    """Run a diagram until it is killed as it writes so many chunks."""
+    command = [sys.executable, str(SCRIPT), str(store), str(count), kind]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    died = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert died.returncode == -signal.SIGKILL, died.stderr
+    assert not status(store).complete
 
 
 def test_one_and_two_processes_give_the_same_bytes(alone, tmp_path, monkeypatch):
