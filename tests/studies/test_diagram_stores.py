@@ -6,7 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from saltus.flow import Outcome
 from saltus.provenance import identity
 from saltus.studies import response_spectrum
 from saltus.studies.diagram import diagram_work
+from saltus.studies.diagram.effort import EFFORTS, Effort
 from saltus.sweep import Parts, SweepInterrupted, parts, parts_of, status
 
 SCRIPT = Path(__file__).with_name("diagram_script.py")
@@ -64,6 +65,22 @@ def test_a_store_changes_no_number_and_remembers_all_of_them(alone, kept, monkey
     assert min(counts(store)[kind] for kind in ("motions", "branches", "judgements", "distances")) > 0
     monkeypatch.setattr(parts, "run", None)  # nothing is left to compute
     xr.testing.assert_identical(diagram(store=store), alone)
+
+
+def test_what_an_effort_does_not_follow_in_windows_of_chaos_is_listed_with_its_reason(monkeypatch):
+    """Without branches of such motions there are fewer, and each of these motions is a dot; none of a wide range is left."""
+    few = {"max_period": 6}
+    quick = EFFORTS[Effort.QUICK]
+    every = diagram(**few)
+    assert "left" not in every["unplaced"]["reason"].values
+    monkeypatch.setitem(EFFORTS, Effort.QUICK, replace(quick, narrow=0))
+    some = diagram(**few)
+    reasons = some["unplaced"]["reason"]
+    left = some["unplaced"]["parameter"].values[reasons.values == "left"]
+    assert len(left) > 4
+    assert not np.isin(left, some["search"]["searched"].values).any()
+    assert "the effort follows no more of such" in reasons.attrs["left"]
+    assert some["branches"].sizes["branch"] < every["branches"].sizes["branch"] <= some["branches"].sizes["branch"] + quick.narrow
 
 
 def test_killed_at_several_moments_a_search_goes_on_to_the_same_bytes(kept, tmp_path):

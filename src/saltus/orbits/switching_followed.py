@@ -155,7 +155,8 @@ def other_events(point: OrbitPoint, sequence: EventSequence, points: Sequence[Or
 
 def _lies_on(points: Sequence[OrbitPoint], ahead: OrbitPoint, same: float) -> bool:
     """Whether an orbit is one of a branch of these points: solved for between them, it is no farther away than `same`."""
-    course, sequence = Course(tuple(points), (), (End(OrbitEnd.START), End(OrbitEnd.START)), ()), events_at(ahead).sequence
+    begun, sequence = End(OrbitEnd.START), events_at(ahead).sequence
+    course: Course[OrbitPoint, SpecialPoint] = Course(tuple(points), (), (begun, begun), ())
     for i, (a, b) in enumerate(pairwise(points)):
         passed = min(a.parameter, b.parameter) <= ahead.parameter <= max(a.parameter, b.parameter)
         if passed and sequence in (events_at(a).sequence, events_at(b).sequence):

@@ -22,6 +22,7 @@ class Place(NumberedSentence):
     UNSTABLE = 4, "the orbit near it is not called stable: it grazes, or is about to lose its stability"
     ELSEWHERE = 5, "the branch of the orbit near it does not come back to it"
     RARE = 6, "its period is long, and no random motion ends on it"
+    LEFT = 7, "it is stable in a small part of the range alone, and the effort follows no more of such"
 
 
 LONG = 6  # Motions of longer periods are many, and most attract little: those are followed on which random motions end.

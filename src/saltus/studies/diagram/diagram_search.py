@@ -118,8 +118,12 @@ class DiagramSearch:
             for number, run in enumerate(runs):
                 row = _middle(run)
                 if not self._is_placed(row, self.branches.placed[self.found.looked[row] :]):
+                    narrow = self._is_partial(run)
+                    if narrow and len(self.branches.partial) >= self.effort.narrow:
+                        self.found.place[run] = Place.LEFT
+                        continue
                     self._prepare(runs[number:])
-                    self.found.place[row] = self._follow(row, while_stable=self._is_partial(run))
+                    self.found.place[row] = self._follow(row, while_stable=narrow)
                 known = len(self.branches.placed)
                 progress(known / (known + len(rows)), f"following, branches: {known}")
 
@@ -141,8 +145,11 @@ class DiagramSearch:
         small part of the range alone, as far as simulated values show."""
         if self.found.motions.period[run[0]] > LONG:
             return True
-        span, gap = np.ptp(self.found.motions.value[run]), np.diff([self.bounds[0], *self.grid, self.bounds[1]]).max()
-        return bool(span + 2.0 * gap < SETTINGS.narrow * (self.bounds[1] - self.bounds[0]))
+        values, least = self.found.motions.value[run], SETTINGS.narrow * (self.bounds[1] - self.bounds[0])
+        gap = np.diff([self.bounds[0], *self.grid, self.bounds[1]]).max()
+        if not np.isin(values, self.grid).any():  # found where chaos was looked for, whose values are nearer to one another
+            gap = min(gap, 0.25 * least)
+        return bool(np.ptp(values) + 2.0 * gap < least)
 
     def _prepare(self, runs: list[np.ndarray]) -> None:
         """Follow the first of some runs of motions and others at once that are hardly on the same branch.

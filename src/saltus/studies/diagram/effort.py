@@ -29,6 +29,7 @@ class EffortSettings:
     repelling_values: int  # Values at which repelling orbits are searched for: they are followed from one to the others.
     # With this number of branches, no more are followed that are born on others; and so many at most of orbits that repel.
     branches: int
+    narrow: int  # Branches at most of motions that are stable in a small part of the range alone, as in windows of chaos.
     jumps: int  # Rounds in which motions are started beyond the ends of stable parts of branches, to see where they fall to.
     sample: int  # Motions of the sample that tells what share of the states ends on something that the diagram has not.
     # Samples at most: what one shows to be missing is followed, and the next one begins anew, until one shows nothing missing.
@@ -43,6 +44,7 @@ EFFORTS = {
         periods=200,
         repelling_values=13,
         branches=20,
+        narrow=8,
         jumps=0,
         sample=300,
         samples=1,
@@ -51,7 +53,7 @@ EFFORTS = {
         ),
     ),
     Effort.STANDARD: EffortSettings(
-        values=201, starts=24, periods=400, repelling_values=25, branches=30, jumps=2, sample=1000, samples=3
+        values=201, starts=24, periods=400, repelling_values=25, branches=30, narrow=1000, jumps=2, sample=1000, samples=3
     ),
     Effort.THOROUGH: EffortSettings(
         values=801,
@@ -59,6 +61,7 @@ EFFORTS = {
         periods=1000,
         repelling_values=49,
         branches=60,
+        narrow=1000,
         jumps=2,
         sample=5000,
         samples=5,
