@@ -37,9 +37,6 @@ class DiagramSearchSettings:
     # Where a stable part of a branch ends, motions are started from its last orbit, these shares of the range further on both
     # sides: what they fall to is there where no start of the grid may lead.
     beyond: tuple[float, ...] = (3e-5, 3e-4)
-    # Forcing periods that random motions are given which have not settled where there is no chaos: transients of the mean life
-    # that is excluded for chaos, 6600, leave one in twenty.
-    lasting: int = 20_000
 
 
 SETTINGS = DiagramSearchSettings()
@@ -276,7 +273,7 @@ class DiagramSearch:
         motions = self.simulated(values, within_window(self.system, points, self.window))
         loose = np.flatnonzero(motions.unsettled & ~self._in_bands(values))
         if loose.size:
-            motions.gone_on(loose, self.work.followed(values[loose], motions.last[loose], SETTINGS.lasting))
+            motions.gone_on(loose, self.work.followed(values[loose], motions.last[loose], self.effort.lasting))
         return motions
 
     def _in_bands(self, values: np.ndarray) -> np.ndarray:

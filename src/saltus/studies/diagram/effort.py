@@ -34,6 +34,9 @@ class EffortSettings:
     sample: int  # Motions of the sample that tells what share of the states ends on something that the diagram has not.
     # Samples at most: what one shows to be missing is followed, and the next one begins anew, until one shows nothing missing.
     samples: int
+    # Forcing periods that random motions are given which have not settled where there is no chaos: transients of three times the
+    # mean life that is excluded for chaos, 6600 or, with one judgement, 660, leave one in twenty.
+    lasting: int = 20_000
     chaos: ChaosSettings = CHAOS  # How finely bands of chaos are resolved, and how surely they are none of transients.
 
 
@@ -48,8 +51,17 @@ EFFORTS = {
         jumps=0,
         sample=300,
         samples=1,
+        lasting=2000,
+        # Exponents of less than about 0.004 per unit of time are left undecided, as those of motions about tori are: these would
+        # take most of the time.
         chaos=replace(
-            CHAOS, step=4e-3, fine_step=2e-3, edge=1e-3, judgements=CHAOS.judgements[:1], beside=(-4e-4, 4e-4), apart=1e-2
+            CHAOS,
+            step=4e-3,
+            fine_step=2e-3,
+            edge=1e-3,
+            judgements=(replace(CHAOS.judgements[0], longest_run=400),),
+            beside=(-4e-4, 4e-4),
+            apart=1e-2,
         ),
     ),
     Effort.STANDARD: EffortSettings(
