@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from saltus.attractors import Earlier, SettledLater
+from saltus.attractors import Earlier, SettledLater, Unsettled
 from saltus.checks import check_count
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
@@ -239,6 +239,8 @@ class BandSearch:
     def _is_of_interest(self, a: SearchedValue, b: SearchedValue) -> bool:
         """Whether chaos may begin, end or pause between two neighbouring values, and they are not near to one another yet."""
         width = (b.value - a.value) / self.span
+        if a.verdict is b.verdict is Unsettled.UNDECIDED:
+            width /= self.settings.undecided
         if width <= self.settings.step:
             near_chaos = not (a.chaotic and b.chaotic) and max(a.longest, b.longest) > self.settings.long_period
             return near_chaos and width > self.settings.fine_step

@@ -16,6 +16,7 @@ class ChaosSettings:
     # The same where motions have longer periods than this: cascades and narrow bands are near.
     fine_step: float = 3e-4
     long_period: int = 6
+    undecided: float = 1.0  # Factor by which these are longer between two values that are both undecided, as where tori are.
     edge: float = 1e-4  # Share of the range to which the bracket of an edge is halved.
     seeds: int = 2  # States of the chaos at each end of an interval from which motions are begun within.
     neighbours: int = 4  # Motions that have settled at each end, from which others are begun within.

@@ -248,8 +248,8 @@ class DiagramSearch:
         """Estimate which share of the states ends on something that the diagram does not have, by random motions.
 
         What has not settled where there is no chaos is given more time, as it is on its way to something. With `follow` these
-        motions are followed too, and chaos is looked for where they do not settle, after they have been counted; new ones are
-        counted then.
+        motions are followed too and, unless the effort has one sample alone, chaos is looked for where they do not settle, after
+        they have been counted; new ones are counted then.
         """
         for number in range(self.effort.samples):
             motions = self._random_motions(number)
@@ -263,7 +263,8 @@ class DiagramSearch:
                 return
             self.found.reopen(np.arange(first, len(self.found.motions)))
             self.follow(silent)
-            self._add_bands(motions.only(motions.unsettled & ~self._in_bands(motions.value)))
+            if self.effort.samples > 1:
+                self._add_bands(motions.only(motions.unsettled & ~self._in_bands(motions.value)))
 
     def _random_motions(self, number: int) -> SimulatedMotions:
         """Motions from random states of the window at random values, from a seed of their own."""

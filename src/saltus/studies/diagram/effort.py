@@ -52,14 +52,15 @@ EFFORTS = {
         sample=300,
         samples=1,
         lasting=2000,
-        # Exponents of less than about 0.004 per unit of time are left undecided, as those of motions about tori are: these would
-        # take most of the time.
+        # Exponents of less than about 0.004 per unit of time are left undecided, as those of motions about tori are, and so are
+        # multipliers above about 0.97: such motions would take most of the time.
         chaos=replace(
             CHAOS,
             step=4e-3,
             fine_step=2e-3,
+            undecided=5.0,
             edge=1e-3,
-            judgements=(replace(CHAOS.judgements[0], longest_run=400),),
+            judgements=(replace(CHAOS.judgements[0], longest_run=400, patience=1000),),
             beside=(-4e-4, 4e-4),
             apart=1e-2,
         ),
