@@ -69,6 +69,22 @@ def test_its_derivative_to_a_parameter_is_that_of_the_closed_form(branch: saltus
     assert np.abs((ahead - behind) / (2 * step) - orbit.solution.equations.parameters[:, 0]).max() < 1e-6
 
 
+def test_an_orbit_whose_motion_cannot_be_followed_is_not_confirmed(
+    branch: saltus.Branch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As at an event that appears or is lost, where rounding decides: the distance is infinite, and a diagram goes on."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise saltus.MotionError("no choice is consistent")
+
+    orbit = branch.orbits[0]
+    assert orbit.defect < 1e-11
+    vars(orbit).pop("defect")
+    monkeypatch.setattr(saltus.PeriodicOrbit, "motion", refused)
+    assert orbit.defect == np.inf
+    vars(orbit).pop("defect")
+
+
 def test_branches_are_read_from_files(branch: saltus.Branch) -> None:
     """With the phase of their section."""
     again = saltus.orbits.orbits_of(branch.to_xarray())

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import LIMITS, check_count
+from saltus.errors import MotionError
 from saltus.flow import Motion, Validity, simulate
 from saltus.flow import segments as at
 from saltus.notebook import html_table
@@ -268,11 +269,15 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def defect(self) -> float:
-        """The distance between its state and the one a period later, by direct simulation; inf if the impacts differ in number.
+        """The distance between its state and the one a period later, by direct simulation; inf if the impacts differ in number,
+        or if the motion cannot be followed, as at an event that appears or is lost.
 
         Where it grazes, rounding decides whether there is an impact, and the distance is that of its square root.
         """
-        motion = self.motion()
+        try:
+            motion = self.motion()
+        except MotionError:
+            return math.inf
         start = self.start()
         begin = np.array([start[name] for name in self.system.model.coordinates])
         if self.signature.sides:  # the motion ends at an impact: before or after it
