@@ -214,9 +214,8 @@ def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
     first = PeriodicOrbit.near(moved, state, point.parameters)
     if near is None or first is None:
         return None
-    guess = problem.state_at(
-        phase, near.solution.unknowns, near.parameters, first.solution.unknowns
-    )  # in the same forcing period
+    # in the same forcing period, or the tangent would lead from one state of the orbit to another one
+    guess = problem.state_at(phase, near.solution.unknowns, near.parameters, first.solution.unknowns)
     second = None if guess is None else PeriodicOrbit.near(moved, guess, near.parameters)
     if second is None:
         return None
