@@ -160,7 +160,26 @@ def test_starts_beyond_a_contact_are_refused_in_one_sentence():
         (lambda: basins_of_attraction(both, theta_1=[0.1, 0.2], theta_1_velocity=[0, 1], theta_2=0.2), "'upper' at theta_2 = 0"),
         (lambda: basins_of_attraction(wall, x=[0.5, 1.5], velocity=[0, 1]), "x = 1.5 lies beyond the contact at x = 1"),
         (lambda: find_attractors(both, starts=1, also=[[-0.1, -0.1, 0, 0]]), "theta_1 = -0.1 lies beyond"),
+        (
+            lambda: basins_of_attraction(both, theta_1=[0.1, 0.2], theta_1_velocity=[0, 1], theta_2=0.0, theta_2_velocity=0.1),
+            "a velocity of 0.1 moves into the contact 'upper' at theta_2 = 0",
+        ),
+        (
+            lambda: basins_of_attraction(both, theta_1=[0.1, 0.2], theta_2_velocity=[-1.0, 0.5]),
+            "a velocity of 0.5 moves into the contact 'upper' at theta_2 = 0",
+        ),
+        (
+            lambda: find_attractors(both, starts=1, also=[[0.0, -0.1, -0.2, 0]]),
+            "velocity of -0.2 moves into the contact 'lower'",
+        ),
     ):
         with pytest.raises(ParameterError) as refused:
             ask()
         assert words in str(refused.value)
+
+
+def test_starts_at_a_contact_that_stay_or_leave_are_taken():
+    both, _ = both_and_reduced(0.1)
+    found = basins_of_attraction(both, theta_1=[0.1, 0.2], theta_2_velocity=[-0.5, 0.0], periods=64)
+    assert found["label"].shape == (2, 2)
+    assert (found["label"][1] == 1).all()

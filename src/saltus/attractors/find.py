@@ -13,7 +13,7 @@ from saltus.attractors.attractor import REST, UNDECIDED, Attractor, Attractors
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.registry import NoLabel, Registry
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.checks import check_count, check_number, check_reached, check_starts, check_states
+from saltus.checks import check_count, check_leaving, check_number, check_reached, check_starts, check_states
 from saltus.errors import ParameterError
 from saltus.flow import RECURRENCE, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, initial_states
@@ -43,6 +43,7 @@ def _check(
     further = check_states("also", also, system.dimension)
     for place, coordinate in enumerate(system.model.coordinates):
         check_reached(system.model, coordinate, further[:, place], "also")
+        check_leaving(system.model, coordinate, further[:, place], further[:, len(system.model.coordinates) + place], "also")
     check_starts(starts)
     check_count("max_period", max_period, 1, RECURRENCE.compiled_max_period)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
