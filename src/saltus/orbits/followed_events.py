@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +46,13 @@ class OrbitEvent(NamedTuple):
     mode: int
 
 
+class Group(NamedTuple):
+    """Contacts and frictions that act on one another, as bits of an event's parts, and as bits of its mode less 1."""
+
+    parts: int
+    modes: int
+
+
 @dataclass(frozen=True)
 class FollowedEvents:
     """The events of an orbit from its section on, and how near they are to others."""
@@ -55,10 +63,16 @@ class FollowedEvents:
     distance: float  # the least of gaps, speeds, reactions and durations that are 0 where an event appears or is lost
     section_distance: float  # where the section lies between its neighbouring events: 0 on one of them, 1/2 in the middle
 
+    groups: tuple[Group, ...]  # what acts on one another
+
     @property
     def sequence(self) -> tuple[OrbitEvent, ...]:
-        """The events from the same one on wherever the section lies."""
-        return min((self.events[i:] + self.events[:i] for i in range(len(self.events))), default=())
+        """The events of each group from the same one on wherever the section lies; those of others do not matter to it."""
+        found: tuple[OrbitEvent, ...] = ()
+        for parts, modes in self.groups:
+            events = tuple(event._replace(mode=event.mode - 1 & modes) for event in self.events if event.parts & parts)
+            found += min((events[i:] + events[:i] for i in range(len(events))), default=())
+        return found
 
     @property
     def impact_count(self) -> int:
@@ -87,11 +101,32 @@ def events_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | No
     if images is not None:
         events += tuple(_image(event, motion.system.model, images) for event in events)
         times, period = times + tuple(time + period for time in times), 2.0 * period
-    apart = np.diff([*times, times[0] + period]) if len(times) > 1 else np.empty(0)
-    apart = apart[apart > ONE_INSTANT * period]
-    distance = float(min([SETTINGS.farthest, sampled.nearest_touch(), *speeds, *apart]))
+    apart, groups = [SETTINGS.farthest], _groups(motion)
+    for group in groups:
+        own = [time for event, time in zip(events, times, strict=True) if event.parts & group.parts]
+        apart += np.diff([*own, own[0] + period]).tolist() if len(own) > 1 else []
+    distance = float(min([sampled.nearest_touch(), *speeds, *(time for time in apart if time > ONE_INSTANT * period)]))
     events, times = _in_order(events, times, ONE_INSTANT * period)
-    return FollowedEvents(events, times, period, max(distance, 0.0), section_distance)
+    return FollowedEvents(events, times, period, max(distance, 0.0), section_distance, groups)
+
+
+def _groups(motion: Motion) -> tuple[Group, ...]:
+    """The contacts of each group, where the mass matrix connects no coordinate of one with that of another; else all as one."""
+    model, count = motion.system.model, len(motion.system.model.contacts)
+    everything = (Group((1 << count + len(model.frictions)) - 1, (1 << count + 2 * len(model.frictions)) - 1),)
+    names = dict.fromkeys(contact.group for contact in model.contacts)
+    if len(names) < 2 or model.frictions:
+        return everything
+    mass, found = np.asarray(model.mass_matrix(motion.position), dtype=float), list[Group]()
+    places = [
+        [model.coordinates.index(contact.coordinate) for contact in model.contacts if contact.group == name] for name in names
+    ]
+    if any(mass[np.ix_(own, other)].any() for own, other in combinations(places, 2)):
+        return everything
+    for name in names:
+        bits = sum(1 << i for i, contact in enumerate(model.contacts) if contact.group == name)
+        found.append(Group(bits, bits))
+    return tuple(found)
 
 
 def _image(event: OrbitEvent, model: Model, images: Sequence[int]) -> OrbitEvent:
@@ -114,7 +149,10 @@ def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
     # rest is told apart from the event that brings it, and at the start of a motion
     alone = (np.searchsorted(times, times, side="right") - np.searchsorted(times, times) == 1) & (times > motion.start)
     chosen = np.isin(codes[:, 0], CHANGES) & (alone | (codes[:, 0] != EventCode.RESTING))
-    chosen[chosen] = ~_dying(codes[chosen], speeds[chosen])
+    kept = np.flatnonzero(chosen)
+    for parts, _ in _groups(motion):
+        own = kept[codes[kept, 1] & parts != 0]
+        chosen[own[_dying(np.column_stack([codes[own, 0], codes[own, 1] & parts]), speeds[own])]] = False
     times, codes = times[chosen], codes[chosen]
     if dense is None or not times.size:
         return [], times, speeds[chosen]
@@ -134,7 +172,7 @@ def impact_speeds(motion: Motion) -> np.ndarray:
 
 
 def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-    """Which events are impacts of a contact that die away until it is held, (n,): there are infinitely many.
+    """Which events of a group, (n, 2), are impacts of a contact that die away until it is held: there are infinitely many.
 
     They die away after the last one that is slower than the one after it.
     """
