@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.orbits import same_orbit
+from saltus.orbits import near_returns, same_orbit
 
 BETA80 = np.deg2rad(80)
 
@@ -61,3 +61,27 @@ def test_rounding_makes_no_special_points_along_their_branch(three: saltus.Perio
     assert [str(end) for end in branch.ends] == ["bound 0.58", "bound 0.62"]
     assert all(same_orbit(orbit, orbit) for orbit in branch.orbits)
     assert same_orbit(branch.at(0.6)[0], three)
+
+
+def test_the_order_of_events_in_cells_that_do_not_act_on_one_another_makes_no_special_points() -> None:
+    """Below the frequency 0.993 the cells part: the impacts of one come before or after those of another."""
+    system = cells(saltus.ThreeCells, coupling=0.5).with_({"load.frequency": 0.97})
+    start = {"lower_1": 0.1, "upper_1": -0.05, "lower_2": 0.12, "upper_2": -0.05, "lower_3": 0.3, "upper_3": -0.06}
+    orbit = saltus.find_orbit(system, velocity=(0.0,) * 6, **start)
+    state = orbit.start()
+    assert abs(state["lower_1"] - state["lower_3"]) > 0.1
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.96, 0.98))
+    assert not branch.special
+    assert [str(end) for end in branch.ends] == ["bound 0.96", "bound 0.98"]
+
+
+def test_maps_of_motions_one_by_one_are_those_of_lanes() -> None:
+    """Near returns of systems of many coordinates are improved one by one."""
+    system, rng = cells(saltus.TwoLayer), np.random.default_rng(0)
+    states = np.column_stack([rng.uniform(0.05, 0.3, 6), rng.uniform(-0.3, -0.05, 6), rng.uniform(-0.2, 0.2, (6, 2))])
+    values = np.linspace(0.9, 1.1, 6)
+    ends, slopes = near_returns._mapped(system, "load.frequency", values, states, 2)
+    singly = near_returns._mapped_singly(system, "load.frequency", values, states, 2)
+    np.testing.assert_allclose(singly[0], ends, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(singly[1], slopes, rtol=0, atol=1e-5)
+    assert np.abs(slopes).max() > 0.01

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,13 +10,14 @@ import pytest
 import saltus
 from saltus import branch_of
 from saltus.errors import ParameterError
+from saltus.flow import Outcome
 from saltus.orbits import initial_states, orbits_near_returns, search_orbits, solved_near
 from saltus.plots import draw_diagram, draw_stability_chart
 from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
 from saltus.studies.diagram.chaos_search import BandOrigin, BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EFFORTS, Effort
-from saltus.studies.diagram.simulated import followed
+from saltus.studies.diagram.simulated import SimulatedMotions, followed
 from saltus.systems import (
     BeltOscillator,
     Harmonic,
@@ -195,3 +197,25 @@ def test_of_special_points_that_crowd_only_some_are_looked_beside(monkeypatch):
     monkeypatch.setattr(search, "follow", lambda values, starts: begun.extend(values))
     search.beside_special_points([BandOrigin("LP", value, (0.0, 0.5)) for value in (1.3, 1.0, 1.05, 1.125)])
     assert begun == [1.0, 1.125, 1.3]
+
+
+def test_impacts_that_die_away_are_not_counted_where_chaos_is_looked_for():
+    """How many are followed changes along a parameter, and nothing else does: intervals would be halved there."""
+    work = SimpleNamespace(system=SimpleNamespace(dimension=4))
+    search, n, none = BandSearch(work, (0.0, 1.0)), 4, np.full((4, 1), np.nan)
+    search._settle(
+        SimulatedMotions(
+            value=np.full(n, 0.5),
+            periods=np.ones(n),
+            last=np.zeros((n, 4)),
+            outcome=np.full(n, Outcome.PERIODIC),
+            period=np.ones(n, dtype=int),
+            impact_count=np.array([113, 122, 2, 3]),
+            highest=np.ones(n),
+            lowest=np.zeros(n),
+            slowest=np.array([1e-7, 2e-7, 0.1, 0.1]),
+            states=np.full((n, 1, 4), np.nan),
+            peaks=none,
+        )
+    )
+    assert search.place(0.5).kinds == {(1, 0), (1, 2), (1, 3)}

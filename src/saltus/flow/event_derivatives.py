@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 from saltus.flow.memory_layout import EventCode, ReleaseDetail, RestDetail
 from saltus.taylor import (
@@ -42,6 +43,16 @@ def changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]]]:
 
     The leaf "shift" of a column is by how much the event moves.
     """
+    if trace not in _changes:
+        _changes[trace] = _derive_changes(trace)
+    return _changes[trace]
+
+
+_changes: WeakKeyDictionary[Trace, list[tuple[EventCode, int, dict[Expr, Expr]]]] = WeakKeyDictionary()
+
+
+def _derive_changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]]]:
+    """`changes`, which several functions of a structure are written from."""
     events = [(EventCode.LIMIT, i, _shifts(margin_shift(trace, margin))) for i, margin in enumerate(trace.margins.values())]
     events += [(EventCode.RELEASE, i, _shifts(reaction_slopes(trace, reaction))) for i, reaction in enumerate(trace.reactions)]
     if trace.gap is None:

@@ -38,6 +38,9 @@ class NearReturnSettings:
     # no wall and no spring holds: it has no branch. Those of a fold are as near within 1e-14 of its value alone.
     isolated: float = 1e-7
     tol: float = 1e-11  # The error of a step.
+    # With contacts or frictions and more state variables than this, derivatives come from motions one by one, by the code that
+    # branches need as well: that for lanes, which leave events to it, takes longer to compile (minutes for four cells).
+    in_lanes: int = 4
 
 
 SETTINGS = NearReturnSettings()
@@ -129,6 +132,24 @@ def _mapped(system: System, path: str, values: np.ndarray, states: np.ndarray, p
 
     A contact that is closed at the start stays so: its coordinate and velocity are varied no more.
     """
+    if system.model.held and system.dimension > SETTINGS.in_lanes:
+        return _mapped_singly(system, path, values, states, period)
     options: dict[str, Any] = {"periods": period, "sample": (), "tol": SETTINGS.tol, "sensitivities": ()}
     result = motions_from(system, states, parameters={path: values}, **options)
     return last_states(system, result), np.where(held_by_contacts(system, states)[:, None], 0.0, result["derivative"].values)
+
+
+def _mapped_singly(
+    system: System, path: str, values: np.ndarray, states: np.ndarray, period: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same, motion by motion; nan where one cannot be followed or has no derivatives."""
+    problem, held = (
+        problem_of(system, Signature((), period, section=0.0), (path,), SETTINGS.tol),
+        held_by_contacts(system, states),
+    )
+    ends, slopes = np.full(states.shape, np.nan), np.full((*states.shape, states.shape[1]), np.nan)
+    for i, (value, state) in enumerate(zip(values, states, strict=True)):
+        equations = problem.evaluate(state, np.array([value]))
+        if equations is not None:
+            ends[i], slopes[i] = state + equations.residual, np.where(held[i], 0.0, equations.here[0])
+    return ends, slopes

@@ -206,7 +206,8 @@ class BandSearch:
     def _settle(self, motions: SimulatedMotions) -> None:
         self.further.append(motions)
         for i in np.flatnonzero(motions.periodic):
-            facts = int(motions.period[i]), int(motions.impact_count[i]), float(motions.amplitude[i])
+            impacts = 0 if 0.0 < motions.slowest[i] < self.settings.dying else int(motions.impact_count[i])
+            facts = int(motions.period[i]), impacts, float(motions.amplitude[i])
             self.place(float(motions.value[i])).settle(*facts, motions.last[i])
 
     def spread(self) -> None:

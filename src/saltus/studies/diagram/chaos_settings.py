@@ -20,6 +20,8 @@ class ChaosSettings:
     edge: float = 1e-4  # Share of the range to which the bracket of an edge is halved.
     seeds: int = 2  # States of the chaos at each end of an interval from which motions are begun within.
     neighbours: int = 4  # Motions that have settled at each end, from which others are begun within.
+    # With several contacts: impacts that are slower than this die away, and how many are followed is no property of the motion.
+    dying: float = 1e-5
     states: int = 8  # Last states of each unsettled motion that are given to the judgement.
     # Shares of the range beside a special point at which motions from its orbit are begun: narrow bands begin there.
     beside: tuple[float, ...] = (-4e-4, -1.5e-4, 1.5e-4, 4e-4)
