@@ -116,10 +116,14 @@ def first_root(p, n):
     """
     if excluded(p, n):
         return NONE, NEVER, NEVER
-    size = 0.0
-    for k in range(n + 1):
+    size, steep, end = abs(p[0]), 0.0, p[0]
+    for k in range(1, n + 1):
         size += abs(p[k])
+        steep += k * abs(p[k])
+        end += p[k]
     noise = NOISE * size
+    if p[0] > 0.0 > p[1] and -2.0 * p[1] > steep * (1.0 + NOISE) and end < -noise:  # it falls everywhere, as a small bounce does
+        return SIMPLE, newton(p, n, 0.0, 1.0), NEVER
     boxes = np.empty((DEPTH, n + 1))
     left, width = np.empty(DEPTH), np.empty(DEPTH)
     to_bernstein(p, n, boxes[0])

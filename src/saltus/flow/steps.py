@@ -21,16 +21,19 @@ from saltus.taylor import jit, lean_jit
 def work_arrays(where):
     """The arrays of a step, in the places of `Work`."""
     dof, order, margins = where[Where.DOF], where[Where.ORDER], max(where[Where.MARGINS], 1)
+    count = order + 2
+    rows = np.zeros((3 * dof + margins + 4, count))  # one piece of memory for each shape: lanes ask for them at every slow impact
+    pairs = np.zeros((3 * dof + margins + 1, 2))
     return (
-        np.zeros((dof, order + 2)),
-        np.zeros((dof, order + 2)),
-        np.zeros((dof, order + 2)),
-        np.zeros(order + 2),
-        np.zeros((margins, order + 2)),
+        rows[:dof],
+        rows[dof : 2 * dof],
+        rows[2 * dof : 3 * dof],
+        rows[3 * dof],
+        rows[3 * dof + 4 :],
         np.zeros((where[Where.ROWS], order + 6)),
-        np.zeros(order + 2),
-        np.zeros((2, order + 2)),
-        (np.zeros((dof, 2)), np.zeros((dof, 2)), np.zeros((dof, 2)), np.zeros(2), np.zeros((margins, 2))),
+        rows[3 * dof + 1],
+        rows[3 * dof + 2 : 3 * dof + 4],
+        (pairs[:dof], pairs[dof : 2 * dof], pairs[2 * dof : 3 * dof], pairs[3 * dof], pairs[3 * dof + 1 :]),
     )
 
 
