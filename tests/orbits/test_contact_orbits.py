@@ -7,7 +7,7 @@ import pytest
 
 import saltus
 from saltus.errors import MotionError, ParameterError
-from saltus.orbits import SpecialKind, as_bytes, defects, from_bytes, orbits_of
+from saltus.orbits import OrbitEnd, SpecialKind, as_bytes, defects, from_bytes, orbits_of
 from saltus.systems import (
     Harmonic,
     Load,
@@ -191,6 +191,19 @@ def test_a_grazing_is_where_the_linear_response_reaches_the_walls():
     free = saltus.continue_orbit(orbit, "load.frequency", (W - 0.2, W + 0.4))
     grazing = [special for special in free.special if special.kind == SpecialKind.GR]
     assert grazing[0].parameter == pytest.approx(W, abs=1e-10)
+
+
+def test_a_branch_ends_where_one_layer_is_at_its_contact_as_the_other_one_closes():
+    """There the gap has a minimum that no smooth motion has, as the impact turns the first one round as well."""
+    system = System(
+        model=TwoLayer(beta0=1.53514675339103, damping=0.1824851532866711, mass_ratio=0.3),
+        load=Load(frequency=1.7382488876331892, vertical=-0.5, horizontal=Harmonic(amplitude=0.297)),
+        impact=NewtonImpact(e=0.6),
+    )
+    branch = saltus.continue_orbit(saltus.find_orbit(system, theta_1=0.1, theta_2=0.0), H, (0.275, 0.298))
+    assert 0.28 < branch.ends[0].parameter < 0.284
+    assert branch.ends[0].reason is OrbitEnd.TWO_AT_ONCE
+    assert max(orbit.defect for orbit in branch.orbits) < 1e-11
 
 
 def test_an_orbit_survives_bytes():

@@ -112,11 +112,11 @@ class ContactProblem(Problem):
         return float((-equations.ends[rows, SegmentEnd.RATE]).min(initial=math.inf))
 
     def pressing(self, unknowns: np.ndarray, equations: Equations) -> float:
-        """The least of the reactions between closing and release, and of the times between events; below 0 there is no orbit."""
+        """The least of the reactions between closing and release, of the times between events, and of other gaps at impacts."""
         assert isinstance(equations, ContactEquations)
         phases = self.split(unknowns)[1]
         apart = np.diff(np.append(phases, phases[:1] + self.closing))
-        forces = equations.seen[:, [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL]]
+        forces = equations.seen[:, [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL, SegmentExtremes.BESIDE]]
         return float(min(forces.min(), apart.min(initial=math.inf)))
 
     def evaluate(

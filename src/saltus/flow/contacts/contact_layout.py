@@ -87,7 +87,8 @@ class SegmentExtremes(IntEnum):
     FORCE = 5  # the same of a reaction
     PULL = 8  # the least reaction or acceleration from a contact with which it begins, and whose
     TAIL = 10  # the least reaction with which it ends, and whose: of contacts that stay closed up to the event
-    MARGINS = 12  # their least values, from here on
+    BESIDE = 12  # the least gap, at the impact with which it ends, of another contact whose speed the impact changes
+    MARGINS = 13  # their least values, from here on
 
 
 class ImpactDetail(IntEnum):

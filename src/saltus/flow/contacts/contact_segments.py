@@ -38,6 +38,7 @@ from saltus.taylor import cached_jit, lean_jit
 
 MOST_STEPS = 10_000  # of one segment: more are taken only beside a singular mass matrix, in steps that shrink to nothing
 AT_REST = 1e-9  # the speed below which a contact opens from rest after an impact without restitution
+SHORT = 1e-3  # a time in which a gap hardly opens
 ENDS = 1e-6  # share of a segment at both of its ends in which no extremum is looked for: guards are 0 there
 
 
@@ -301,6 +302,28 @@ def extremes_at_end(work, contacts, released, seen):
 
 
 @lean_jit
+def gap_beside(where, model, contacts, solver, row, released, duration, ends, seen):
+    """The least gap, at the impact of a row of the plan, of another contact whose speed that changes.
+
+    A minimum there is none of the smooth motion. A gap that opened as the segment began, from a release if `released` says so,
+    is divided by the power of the duration with which it did; of the shortest segments rounding would be all that is left.
+    """
+    own, count, hit = where[Where.OWN], contacts.shape[0], row[SegmentPlan.CONTACT]
+    for i in range(count):
+        if i == hit or row[SegmentPlan.ALONG] >> i & 1 or solver[Solver.COUPLING][i, hit] == 0.0:
+            continue
+        sign, place = model[ContactPart.SIGNS][i], SegmentEnd.NUMBERS + contacts[i, ContactColumn.COORDINATE]
+        position = contact_position(solver, own, count, i)
+        gap = sign * (ends[place + 4 * own] - position)
+        if sign * (ends[place] - position) < AT_REST:
+            if not duration > SHORT:
+                continue
+            power = 1 if abs(ends[place + own]) >= AT_REST else 3 if released else 2
+            gap /= duration**power
+        seen[SegmentExtremes.BESIDE] = min(seen[SegmentExtremes.BESIDE], gap)
+
+
+@lean_jit
 def pass_event(where, state, env, model, contacts, solver, row, ends, maps):
     """Take the state through the event of a row of the plan, with the derivatives of that; returns whether it has an outcome."""
     own, dof = where[Where.OWN], where[Where.DOF]
@@ -376,5 +399,8 @@ def follow_contact_segments(where, settings, env, model, contacts, plan, times, 
                     divide_guard(where, power, end - begin, ends[s], columns[s, 2 * own])
             if not pass_event(where, state, env, model, contacts, solver, plan[s], ends[s], maps[s]):
                 return s
+            if extremes.shape[0] > 0 and kind == EventCode.IMPACT:
+                released = plan[s - 1, SegmentPlan.KIND] == EventCode.RELEASE
+                gap_beside(where, model, contacts, solver, plan[s], released, end - begin, ends[s], seen)
         opened = contact if kind == EventCode.IMPACT else -1
     return plan.shape[0]
