@@ -5,6 +5,8 @@ import pytest
 
 import saltus
 from saltus.orbits import near_returns, same_orbit
+from saltus.studies.diagram.placement import PlacedBranch, placed
+from saltus.studies.diagram.simulated import simulate_from
 
 BETA80 = np.deg2rad(80)
 
@@ -85,3 +87,13 @@ def test_maps_of_motions_one_by_one_are_those_of_lanes() -> None:
     np.testing.assert_allclose(singly[0], ends, rtol=0, atol=1e-7)
     np.testing.assert_allclose(singly[1], slopes, rtol=0, atol=1e-5)
     assert np.abs(slopes).max() > 0.01
+
+
+def test_motions_whose_impacts_die_away_lie_on_the_branch_of_their_orbit(three: saltus.PeriodicOrbit) -> None:
+    """Orbits list impacts above 1e-5, motions in lanes all that were followed: down to 1e-6."""
+    branch = PlacedBranch(saltus.continue_orbit(three, "load.frequency", (1.0, 1.03)))
+    values = np.array([1.004, 1.026])
+    states = np.tile([0.1, -0.05, 0.12, -0.05, 0.1, -0.06, *(0.0,) * 6], (2, 1))
+    motions = simulate_from(three.system, "load.frequency", values, states, 300)
+    assert (motions.slowest < 1e-5).all()
+    assert placed(motions, [branch], False).all()

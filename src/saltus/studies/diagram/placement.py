@@ -24,6 +24,8 @@ class PlacementSettings:
     # A motion is tried on a branch whose extrema between its points are this near, as a share of the amplitude, beside the change
     # from one of these points to the other.
     near: float = 0.05
+    # Slower impacts die away: motions have all of them that were followed, orbits those that are listed, above 1e-5.
+    dying: float = 2e-4
 
 
 SETTINGS = PlacementSettings()
@@ -124,8 +126,10 @@ def _lagrange(nodes: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarr
 
 
 def _slowest(orbit: PeriodicOrbit) -> float:
-    """The least speed of an impact of an orbit with several contacts, 0 without impacts; else 0, as motions have it."""
-    return orbit.slowest if orbit.system.model.contacts and np.isfinite(orbit.slowest) else 0.0
+    """The least speed of an impact of an orbit with several contacts, or that of what dies away; else 0, as motions have it."""
+    if not orbit.system.model.contacts:
+        return 0.0
+    return max(orbit.slowest if np.isfinite(orbit.slowest) else 0.0, SETTINGS.dying)
 
 
 def _seen(orbit: PeriodicOrbit) -> np.ndarray:
@@ -162,7 +166,8 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
         Whether mirror images count as one.
     """
     result = np.zeros(len(motions), dtype=bool)
-    every = np.stack([motions.highest, motions.lowest, motions.slowest], axis=1)
+    least = SETTINGS.dying if branches and branches[0].branch.orbits[0].system.model.contacts else 0.0
+    every = np.stack([motions.highest, motions.lowest, np.maximum(motions.slowest, least)], axis=1)
     sizes = np.maximum(motions.amplitude, SETTINGS.least)
     for branch in branches:
         rows, before = branch.crossings(motions.value)
