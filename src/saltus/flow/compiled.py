@@ -34,6 +34,7 @@ from saltus.flow.contacts import (
     contact_tangent,
     contacts_kernel,
     frictions,
+    segment_extremes,
 )
 from saltus.flow.contacts.one_free import OneFree, equations_of_one_free
 from saltus.flow.memory_layout import State
@@ -143,7 +144,7 @@ def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
 @cache
 def load_contact_segments() -> Callable[..., int]:
     """What orbits with several contacts are solved with: `follow_contact_segments` of `contacts/contact_segments.py`."""
-    parts = (contact_layout, complementarity, contact_impacts, contact_tangent, contact_segments)
+    parts = (contact_layout, complementarity, contact_impacts, contact_tangent, segment_extremes, contact_segments)
     return entry_point(load_module("contact_segments", _text(kernel_layout, roots, steps, *parts)).follow_contact_segments)
 
 
