@@ -143,10 +143,8 @@ def _mapped_singly(
     system: System, path: str, values: np.ndarray, states: np.ndarray, period: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same, motion by motion; nan where one cannot be followed or has no derivatives."""
-    problem, held = (
-        problem_of(system, Signature((), period, section=0.0), (path,), SETTINGS.tol),
-        held_by_contacts(system, states),
-    )
+    problem = problem_of(system, Signature((), period, section=0.0), (path,), SETTINGS.tol)
+    held = held_by_contacts(system, states)
     ends, slopes = np.full(states.shape, np.nan), np.full((*states.shape, states.shape[1]), np.nan)
     for i, (value, state) in enumerate(zip(values, states, strict=True)):
         equations = problem.evaluate(state, np.array([value]))

@@ -15,9 +15,8 @@ SAMPLES = 33  # of each step, between which the least values are those of parabo
 NEWTON_STEPS = 4  # from the largest sample of a coordinate to its extremum, whose error each of them squares
 NARROWER = (0.3, 1e-3)  # shares of the distance of samples: so far beside its least value a force is looked at, in turn
 MOST_ORDER = 24  # of a step's series
-ONE_INSTANT = (
-    1e-9  # Events nearer to each other than this share of the motion's duration have no order, and nothing is between them.
-)
+# Events nearer to each other than this share of the motion's duration have no order, and nothing is between them.
+ONE_INSTANT = 1e-9
 
 SHARES = np.linspace(0.0, 1.0, SAMPLES)
 ORDERS = np.arange(MOST_ORDER + 1)

@@ -24,8 +24,9 @@ class PlacementSettings:
     # A motion is tried on a branch whose extrema between its points are this near, as a share of the amplitude, beside the change
     # from one of these points to the other.
     near: float = 0.05
-    # Slower impacts die away: motions have all of them that were followed, orbits those that are listed, above 1e-5.
-    dying: float = 2e-4
+    # Least speeds of impacts below this are not compared. Of impacts that die away motions have all that were followed, orbits
+    # those that are listed, above 1e-5, and the last of these is faster the faster they die away.
+    slow: float = 2e-4
 
 
 SETTINGS = PlacementSettings()
@@ -129,7 +130,7 @@ def _slowest(orbit: PeriodicOrbit) -> float:
     """The least speed of an impact of an orbit with several contacts, or that of what dies away; else 0, as motions have it."""
     if not orbit.system.model.contacts:
         return 0.0
-    return max(orbit.slowest if np.isfinite(orbit.slowest) else 0.0, SETTINGS.dying)
+    return max(orbit.slowest if np.isfinite(orbit.slowest) else 0.0, SETTINGS.slow)
 
 
 def _seen(orbit: PeriodicOrbit) -> np.ndarray:
@@ -166,7 +167,7 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
         Whether mirror images count as one.
     """
     result = np.zeros(len(motions), dtype=bool)
-    least = SETTINGS.dying if branches and branches[0].branch.orbits[0].system.model.contacts else 0.0
+    least = SETTINGS.slow if branches and branches[0].branch.orbits[0].system.model.contacts else 0.0
     every = np.stack([motions.highest, motions.lowest, np.maximum(motions.slowest, least)], axis=1)
     sizes = np.maximum(motions.amplitude, SETTINGS.least)
     for branch in branches:
