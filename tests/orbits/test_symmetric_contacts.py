@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from math import atan2, cos, pi, sin
+from math import atan2, cos, pi, sin, sqrt
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 import saltus
+from saltus.continuation import CurveEnd
 from saltus.orbits import OrbitEnd
 
 FORCE = "load.force.amplitude"
@@ -100,6 +101,37 @@ def test_the_breaking_of_the_symmetry_in_load_and_restitution_is_the_closed_form
         assert there.orbit.symmetric
     again = saltus.orbits.orbits_of(curve.to_xarray())
     assert [orbit.solution.unknowns.tolist() for orbit in again] == [orbit.solution.unknowns.tolist() for orbit in curve.orbits]
+
+
+def leaving_without_speed(amplitude: float) -> float:
+    """The phase at which a wall that takes all speed is left at once by the stable motion from wall to wall, in closed form.
+
+    A free mass that leaves the left wall at the phase phi is at the right one half a period later if
+    2 cos(phi) - pi sin(phi) = 2 / A, which has two solutions between -pi/2 and 0 that meet at A = 2 / sqrt(4 + pi^2).
+    """
+    fold = -atan2(pi, 2.0)
+    return brentq(lambda phi: 2 * cos(phi) - pi * sin(phi) - 2 / amplitude, -pi / 2, fold, xtol=1e-15)
+
+
+def test_motions_that_leave_walls_without_speed_fold_stick_and_graze_where_the_closed_form_does() -> None:
+    """The wall that a half begins at is the image of the one that it ends at: this one is left by the force, or holds.
+
+    The fold as above; the force at the impact vanishes where phi = -pi/2, and the speed of the impact where phi = 0.
+    """
+    phi = leaving_without_speed(0.6)
+    x, velocity = -1 + 0.6 * (cos(phi) - 1 + phi * sin(phi)), -0.6 * sin(phi)
+    orbit = saltus.find_orbit(room(0.6, e=0.0), x=x, velocity=velocity, settle=0, period=1)
+    assert orbit.symmetric
+    assert orbit.multipliers[0] == pytest.approx((pi / 2 / np.tan(-phi)) ** 2, abs=1e-10)
+    branch = saltus.continue_orbit(orbit, FORCE, (0.4, 1.2))
+    found = sorted((float(special.parameter), str(special.kind)) for special in branch.special)
+    expected = [(2 / sqrt(4 + pi**2), "LP"), (2 / pi, "SW"), (1.0, "GR")]
+    assert [kind for _, kind in found] == [kind for _, kind in expected]
+    assert [place for place, _ in found] == pytest.approx([place for place, _ in expected], abs=1e-10)
+    assert [end.reason for end in branch.ends] == [CurveEnd.BOUND] * 2
+    for other in branch.orbits:
+        assert other.grazes or other.defect < 1e-9  # that which touches a wall at phase 0 can be started there, too
+        assert np.isfinite(other.defect)
 
 
 def test_mirror_layers_are_followed_over_half_a_period() -> None:

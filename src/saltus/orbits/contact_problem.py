@@ -20,6 +20,7 @@ from saltus.flow import segments as at
 from saltus.orbits.followed_problem import FollowedProblem
 from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
 from saltus.orbits.signature import ModeChange, Signature
+from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import System, image_of
 from saltus.taylor import FREQUENCY
 
@@ -64,7 +65,10 @@ class ContactProblem(Problem):
         if not events:
             return no_event(self.signature.closed)
         following = (*events[1:], events[0].image(self.images) if self.signature.symmetric else events[0])
-        rows = [[e.closed, f.kind, f.contact, f.closed, self._power(e, f)] for e, f in zip(events, following, strict=True)]
+        rows = [
+            [e.closed, f.kind, f.contact, f.closed, self._power(e, f), e.contact if e.is_impact else -1]
+            for e, f in zip(events, following, strict=True)
+        ]
         return np.array(rows, dtype=np.int64)
 
     def _power(self, begin: ModeChange, end: ModeChange) -> int:
@@ -241,10 +245,11 @@ class ContactProblem(Problem):
         return np.stack([first, second])
 
     def _with_held(self, state: np.ndarray, closed: int, values: np.ndarray) -> np.ndarray:
-        contacts = self.at(values).model.contacts
-        for i, contact in enumerate(contacts):
-            if closed >> i & 1:
-                state[self._run.trace.held[i]] = float(contact.position)
+        """A state at rest at the contacts that are closed, and at those that it touches without speed but for rounding."""
+        for i, contact in enumerate(self.at(values).model.contacts):
+            pair = [self._run.trace.held[i], self.own + self._run.trace.held[i]]
+            if closed >> i & 1 or max(abs(contact.gap(state[pair[0]])), abs(state[pair[1]])) < TOLERANCES.touch:
+                state[pair] = float(contact.position), 0.0
         return state
 
 
@@ -255,7 +260,7 @@ def bounces(system: System, contact: int) -> bool:
 
 def no_event(closed: int) -> np.ndarray:
     """The plan of one segment without an event at its end."""
-    return np.array([[closed, -1, -1, closed, 0]], dtype=np.int64)
+    return np.array([[closed, -1, -1, closed, 0, -1]], dtype=np.int64)
 
 
 def problem_of(system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> Problem:

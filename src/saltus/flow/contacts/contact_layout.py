@@ -66,6 +66,7 @@ class SegmentPlan(IntEnum):
     CONTACT = 2  # of that event
     AFTER = 3  # the contacts that are closed after it
     POWER = 4  # of its duration by which its guard is divided: with which the gap of the contact grows that it begins and ends at
+    HIT = 5  # the contact at whose impact it begins, -1 for none
 
 
 class SegmentEnd(IntEnum):

@@ -252,9 +252,6 @@ def follow_contact_segments(where, settings, env, model, contacts, plan, times, 
     work, solver = work_arrays(where), solver_arrays(own, contacts.shape[0], where[Where.COLUMNS], 0)
     roots, nothing, least = np.zeros(where[Where.ORDER] + 2), np.zeros(1), np.zeros(2)
     state = np.zeros(State.COORDINATES + 2 * dof + where[Where.COLUMNS])
-    opened = -1
-    if plan[plan.shape[0] - 1, SegmentPlan.KIND] == EventCode.IMPACT:
-        opened = plan[plan.shape[0] - 1, SegmentPlan.CONTACT]
     for a in range(own):
         state[State.COORDINATES + a], state[State.COORDINATES + dof + a] = first[a], first[own + a]
     couple(where, state, env, model, contacts, solver)
@@ -266,7 +263,7 @@ def follow_contact_segments(where, settings, env, model, contacts, plan, times, 
         copy_numbers(where, state, work, ends[s], SegmentEnd.NUMBERS)
         seen = extremes[s] if extremes.shape[0] > 0 else nothing
         if extremes.shape[0] > 0:
-            extremes_at_start(where, state, model, contacts, work, solver, opened, seen)
+            extremes_at_start(where, state, model, contacts, work, solver, plan[s, SegmentPlan.HIT], seen)
             if kind < 0:
                 extremes_at_section(where, state, model, contacts, work, solver, begin, seen)
         steps = follow_segment(where, state, settings, env, model, contacts, work, solver, begin, end, roots, seen, least)
@@ -296,5 +293,4 @@ def follow_contact_segments(where, settings, env, model, contacts, plan, times, 
                 return s
             if extremes.shape[0] > 0 and kind == EventCode.IMPACT:
                 gap_beside(where, model, contacts, solver, plan, s, end - begin, ends[s], seen)
-        opened = contact if kind == EventCode.IMPACT else -1
     return plan.shape[0]

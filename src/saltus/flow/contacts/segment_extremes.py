@@ -70,8 +70,8 @@ def extremes_at_step(where, state, model, contacts, work, solver, t, h, begin, e
 
 
 @lean_jit
-def extremes_at_start(where, state, model, contacts, work, solver, opened, seen):
-    """Begin with the least of the reactions of closed contacts, and of the acceleration with which `opened` leaves from rest."""
+def extremes_at_start(where, state, model, contacts, work, solver, hit, seen):
+    """Begin with the least of the reactions of closed contacts, and of the acceleration with which `hit` leaves from rest."""
     for k in range(seen.size):
         seen[k] = np.inf
     seen[SegmentExtremes.TOP] = -np.inf
@@ -79,7 +79,7 @@ def extremes_at_start(where, state, model, contacts, work, solver, opened, seen)
         pull, coordinate = np.inf, contacts[i, ContactColumn.COORDINATE]
         if contacts[i, ContactColumn.CLOSED] == 1:
             pull = work[Work.MARGINS][i, 0]
-        elif i == opened and abs(state[State.COORDINATES + where[Where.DOF] + coordinate]) < AT_REST:
+        elif i == hit and abs(state[State.COORDINATES + where[Where.DOF] + coordinate]) < AT_REST:
             pull = model[ContactPart.SIGNS][i] * work[Work.ACCELERATIONS][coordinate, 0]
         if pull < seen[SegmentExtremes.PULL]:
             seen[SegmentExtremes.PULL], seen[SegmentExtremes.PULL + 1] = pull, i
