@@ -7,16 +7,19 @@ import pytest
 from numba import njit, types
 
 from saltus.flow import kernel_layout
-from saltus.flow.ensemble import lane_layout, lane_steps
+from saltus.flow.ensemble import lane_layout, lane_steps, meeting
 from saltus.flow.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, SERIES_LENGTH, LanePart
 from saltus.taylor import compiled_part, lane_vectors, private_numba
 from saltus.taylor.lane_vectors import (
     ALL,
     load,
+    mask,
     rough_exp2,
     rough_inverse,
     rough_log2,
     rough_root,
+    select,
+    splat,
     store,
 )
 from saltus.taylor.private_numba import OPTIONS
@@ -24,14 +27,15 @@ from saltus.taylor.vectors import WIDTH
 
 EPS = 2.0**-52
 H = 0.7  # the step
-# Of a memory with the two series of one coordinate, and slots for what goes in and out
+# Of a memory with the three series of one coordinate, and slots for what goes in and out
 PLACES = np.zeros(len(LanePart), dtype=np.int64)
-PLACES[LanePart.POSITIONS], PLACES[LanePart.VELOCITIES] = 0, SERIES_LENGTH
-STEP, SIGN, TIME, SPEED, SIZE = range(2 * SERIES_LENGTH, 2 * SERIES_LENGTH + 5)
+PLACES[[LanePart.POSITIONS, LanePart.VELOCITIES, LanePart.ACCELERATIONS]] = 0, SERIES_LENGTH, 2 * SERIES_LENGTH
+STEP, SIGN, TIME, SPEED, CERTAIN, SIZE = range(3 * SERIES_LENGTH, 3 * SERIES_LENGTH + 6)
 COMPILED = {"np": np, "math": math, "SERIES_LENGTH": SERIES_LENGTH} | vars(lane_vectors) | vars(private_numba)
-for part in (kernel_layout, lane_layout, lane_steps):
+for part in (kernel_layout, lane_layout, lane_steps, meeting):
     exec(compiled_part(part), COMPILED)
-motion_at, only_root = COMPILED["motion_at"], COMPILED["only_root"]
+motion_at, only_root, guess_from_end = COMPILED["motion_at"], COMPILED["only_root"], COMPILED["guess_from_end"]
+sweep, short_flight, guess_from_start = COMPILED["sweep"], COMPILED["short_flight"], COMPILED["guess_from_start"]
 
 
 @njit(types.void(types.float64[::1], types.int64[::1], types.int64), **OPTIONS)
@@ -40,9 +44,24 @@ def find(m, at, order):
     x, v, a, _ = motion_at(m, at, 0, order, start, h)
     g1, g2 = sign * load(m, 1) * h, sign * load(m, 2) * (h * h)
     g3 = sign * load(m, 3) * (h * h * h)
-    time, speed = only_root(m, at, 0, order, h, start, sign, (sign * start, g1, g2, g3), (x, v, a), ALL)
+    guess = guess_from_end((sign * start, g1, g2, g3), (x, v, a), sign, h)
+    time, speed = only_root(m, at, 0, order, start, sign, guess, h, ALL)
     store(m, TIME, time)
     store(m, SPEED, speed)
+
+
+@njit(types.void(types.float64[::1], types.int64[::1], types.int64), **OPTIONS)
+def find_short(m, at, order):
+    h, sign, start = load(m, STEP), load(m, SIGN), load(m, 0)
+    _, _, _, bend = sweep(m, at, 0, order, start, h)
+    square = h * h
+    cubic = sign * start, sign * load(m, 1) * h, sign * load(m, 2) * square, sign * load(m, 3) * (square * h)
+    certain, flight = short_flight(cubic, bend)
+    guess = guess_from_start(cubic, (sign * load(m, 4) * square * square, sign * load(m, 5) * square * square * h), flight)
+    time, speed = only_root(m, at, 0, order, start, sign, guess * h, 2.0 * flight * h, certain)
+    store(m, TIME, time)
+    store(m, SPEED, speed)
+    store(m, CERTAIN, select(mask(certain), splat(1.0), splat(0.0)))
 
 
 @njit(types.void(types.float64[::1]), **OPTIONS)
@@ -100,6 +119,39 @@ def test_roots_and_velocities_are_exact_to_rounding(kind, order):
             errors.append(abs(float(memory[TIME, lane] - root)) / (late + EPS * H))
             errors.append(abs(float(sign[lane] * memory[SPEED, lane] - slope)) / (bend * late + 16 * EPS * size / H))
     assert max(errors) <= 1.0
+
+
+def flights_of(order, rng):
+    """Coefficients of gaps that begin at 0, for flights from 1e-6 of the step on under a pull that may turn round later in it."""
+    k, share = np.arange(order + 1), 10.0 ** rng.uniform(-6, 0, WIDTH)
+    c = rng.normal(size=(WIDTH, order + 1)) * 10.0 ** (rng.uniform(-2, 1, (WIDTH, 1)) - 6 * k / order)
+    c[:, 0], c[:, 1], c[:, 2] = 0.0, share, -1.0
+    return c / H**k, share * H
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="no long doubles on this machine")
+@pytest.mark.parametrize("order", [LOWEST_ORDER, HIGHEST_ORDER])
+def test_short_flights_that_are_certain_have_one_root_to_relative_rounding(order):
+    rng, errors, count, total = np.random.default_rng(order), [], 0, -(-2000 // WIDTH)
+    for _ in range(total):
+        (c, flight), memory = flights_of(order, rng), np.zeros((SIZE, WIDTH))
+        sign, k = rng.choice([-1.0, 1.0], WIDTH), np.arange(1, order + 1)
+        velocity = c[:, 1:] * k
+        memory[: order + 1], memory[STEP], memory[SIGN] = (sign[:, None] * c).T, H, sign
+        memory[SERIES_LENGTH : SERIES_LENGTH + order] = (sign[:, None] * velocity).T
+        memory[2 * SERIES_LENGTH : 2 * SERIES_LENGTH + order - 1] = (sign[:, None] * velocity[:, 1:] * k[:-1]).T
+        find_short(memory.reshape(-1), PLACES, order)
+        for lane in np.flatnonzero(memory[CERTAIN]):
+            p, time = np.polynomial.Polynomial(c[lane, 1:].astype(np.longdouble)), np.longdouble(memory[TIME, lane])
+            values = p(2 * flight[lane] * np.linspace(0.0, 1.0, 200))
+            assert (np.diff(values > 0) != 0).sum() == 1  # the gap over the time
+            root = time - p(time) / p.deriv()(time)
+            slope = root * p.deriv()(root)
+            errors.append(abs(float((time - root) / root)) / EPS)
+            errors.append(abs(float((sign[lane] * memory[SPEED, lane] - slope) / slope)) / EPS)
+            count += 1
+    assert count > 0.3 * total * WIDTH
+    assert max(errors) < 32
 
 
 def test_rough_functions_are_as_good_as_they_say():

@@ -6,9 +6,10 @@ registers. The functions of a structure, `code`, come through pointers. For mode
 with `several_contacts.py` in the place of `one_contact.py`.
 
 A step of all lanes: Taylor series; a step for each lane; a sweep of Horner's rule that gives the end of the step and bounds the
-gap; the root in the lanes whose gap has one for certain; impacts. A lane whose step shows anything else -- rest, slow impacts,
-a gap that cannot be decided, a limit, a number out of range -- is moved by the scalar kernel (`scalar_handoff.py`)
-from the start of that step. No lane sees another one, so results depend neither on the width nor on the order.
+gap; the root in the lanes whose gap has one for certain; impacts. A lane whose step shows anything else -- rest, slow impacts
+that may accumulate, a gap that cannot be decided, a limit, a number out of range -- is moved by the scalar kernel
+(`scalar_handoff.py`) from the start of that step. No lane sees another one, so results depend neither on the width nor on the
+order.
 
 A step may go past the end of a forcing period: the state there is then read off its series (`sampling.pass_ends`), and the next
 period begins, for all lanes at once (`begin_together`) or for those that are waited for (`forcing_periods.arrive`).

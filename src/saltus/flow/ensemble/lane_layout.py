@@ -80,7 +80,7 @@ class LaneSetting(IntEnum):
 
     TOLERANCE = 0
     SHORTEST_STEP = 1
-    SLOWEST_IMPACT = 2  # of the gap: what is slower is left to the scalar kernel
+    SLOWEST_IMPACT = 2  # of the gap: what is slower may be the end of an accumulation
 
 
 class LaneArray(IntEnum):

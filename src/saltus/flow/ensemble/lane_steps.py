@@ -209,12 +209,13 @@ def root_move(value, inverse, second, third):
 
 
 @inline_jit
-def first_guess(cubic, f, slope, pull):
-    """The root d in [0, 1], counted back from the end, of the sextic with these values and derivatives at both ends.
+def guess_from_end(cubic, end, sign, h):
+    """The root in [0, h] of the sextic that has the gap's values and derivatives at both ends of a step.
 
     Scaled to a step of 1: g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start; f, its slope, and half its curvature `pull` at the end.
-    One move from the root of the parabola at the end.
+    One move from the root of the parabola at the end, from which the root is counted back.
     """
+    f, slope, pull = sign * end[0], sign * end[1] * h, 0.5 * sign * end[2] * (h * h)
     g0, g1, g2, g3 = cubic
     a, b, c = g0 - f + slope - pull, g1 - slope + 2.0 * pull, g2 - pull  # what the parabola lacks at the start
     c3, c4 = 20.0 * a + 10.0 * b + 4.0 * c + g3, -45.0 * a - 25.0 * b - 11.0 * c - 3.0 * g3
@@ -234,21 +235,19 @@ def first_guess(cubic, f, slope, pull):
     r2 = fma(r1, d, q2)
     r3 = fma(r2, d, q3)
     third = fma(fma(fma(c6, d, r1), d, r2), d, r3)
-    return d + root_move(fma(p5, d, f), rough_inverse(fma(q4, d, p5)), fma(r3, d, q4), third)
+    d = d + root_move(fma(p5, d, f), rough_inverse(fma(q4, d, p5)), fma(r3, d, q4), third)
+    return h - d * h
 
 
 @inline_jit
-def only_root(m, at, row, order, h, start, sign, cubic, end, chosen):
-    """The root in (0, h] of gaps that have one there, not negative at 0 (if zero, then growing) and negative at h.
+def only_root(m, at, row, order, start, sign, guess, high, chosen):
+    """The root in (0, high] of gaps that have one there, not negative at 0 (if zero, then growing) and negative at `high`.
 
-    Moves as in `root_move` from `first_guess`, with bisection where one leaves the bracket; `sign` is 1 or -1. A lane stays where
+    Moves as in `root_move` from a guess, with bisection where one leaves the bracket; `sign` is 1 or -1. A lane stays where
     it has converged, whatever the others do. Returns the root and the velocity there.
     """
-    x, v, a = end
-    d = first_guess(cubic, sign * x, sign * v * h, 0.5 * sign * a * (h * h))
-    low, high, tau = splat(0.0), h, h - d * h
-    tau = select(mask(bits(tau > 0.0) & bits(tau <= h)), tau, 0.5 * h)  # the guess may have gone astray
-    speed, active = v, chosen
+    low, speed, active = splat(0.0), splat(0.0), chosen
+    tau = select(mask(bits(guess > 0.0) & bits(guess <= high)), guess, 0.5 * high)  # the guess may have gone astray
     for _ in range(60):
         x, v, a, jerk = motion_at(m, at, row, order, start, tau)
         inverse = rough_inverse(v)

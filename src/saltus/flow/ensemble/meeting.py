@@ -6,9 +6,9 @@ Its compiled part goes into one module with that of `driver.py`.
 from __future__ import annotations
 
 from saltus.flow.ensemble.lane_layout import TOUCH, Helper
-from saltus.flow.ensemble.lane_steps import lane_value, only_root, shape
+from saltus.flow.ensemble.lane_steps import guess_from_end, lane_value, only_root, root_move, shape
 from saltus.flow.memory_layout import SERIES_LENGTH, LanePart
-from saltus.taylor import WIDTH, bits, inline_jit, load, mask, select, vector_lane, with_lane
+from saltus.taylor import WIDTH, bits, fma, inline_jit, load, mask, maximum, rough_inverse, select, vector_lane, with_lane
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -27,11 +27,20 @@ def meet(at, row, m, order, h, sign, start, end, bend, skip, alive, helpers, spa
     doubtful = ((bits(g0 <= 0.0) & ~skip) | (bits(g1 <= 0.0) & skip)) & alive
     clear, falls, concave, convex = shape(cubic, bend, skip)
     over = bits(sign * x <= 0.0)
-    single = concave | (falls & ~skip) | (convex & over)
-    hit = alive & ~doubtful & ~clear & single & over
+    short, flight = short_flight(cubic, bend)
+    short &= skip & alive & ~doubtful
+    single = concave | (falls & ~skip) | (convex & over) | short
+    hit = (alive & ~doubtful & ~clear & single & over) | short
     tau, at_root = h, v
     if hit:
-        root, speed = only_root(m, at, row, order, h, start, sign, cubic, end, hit)
+        guess, high = flight, h
+        if hit & ~short:
+            guess = guess_from_end(cubic, end, sign, h)
+        if short:
+            higher = sign * load(m, first + 4) * (h * h) * (h * h), sign * load(m, first + 5) * (h * h) * (h * h * h)
+            guess = select(mask(short), guess_from_start(cubic, higher, flight) * h, guess)
+            high = select(mask(short), 2.0 * flight * h, h)
+        root, speed = only_root(m, at, row, order, start, sign, guess, high, hit)
         tau, at_root = select(mask(hit), root, h), select(mask(hit), speed, v)
     velocities = at[LanePart.VELOCITIES] + row * SERIES_LENGTH
     unclear = alive & ~doubtful & ~clear & ~single
@@ -45,6 +54,36 @@ def meet(at, row, m, order, h, sign, start, end, bend, skip, alive, helpers, spa
                 tau = with_lane(tau, lane, root)
                 at_root = with_lane(at_root, lane, lane_value(m, velocities, order, lane, root))
     return hit, doubtful, tau, at_root
+
+
+@inline_jit
+def short_flight(cubic, bend):
+    """Which flights from the contact end for certain within twice the time that they take under the pull at their start.
+
+    By the cubic and the bound of `shape`, on that part of the step alone: the pull may turn round later in it. Returns bits of
+    the lanes in which the gap is concave up to there and negative there, and half of that time as a share of the step.
+    """
+    _, g1, g2, g3 = cubic
+    flight = -g1 * rough_inverse(g2)
+    end = 2.0 * flight
+    rest, last = bend * (end * end), fma(6.0 * g3, end, 2.0 * g2)
+    concave = bits(maximum(2.0 * g2, last) < -rest)
+    over = bits(fma(fma(g3, end, g2), end, g1) + rest * end * (1.0 / 12.0) < 0.0)
+    return concave & over & bits(end <= 1.0), flight
+
+
+@inline_jit
+def guess_from_start(cubic, higher, flight):
+    """The end of a short flight, as a share of the step: a move from where it would end under the pull at its start.
+
+    `higher` are the terms of fourth and fifth order of the gap; those behind them are left out.
+    """
+    _, g1, g2, g3 = cubic
+    g4, g5 = higher
+    value = fma(fma(fma(fma(g5, flight, g4), flight, g3), flight, g2), flight, g1)
+    slope = fma(fma(fma(4.0 * g5, flight, 3.0 * g4), flight, 2.0 * g3), flight, g2)
+    second, third = fma(fma(6.0 * g5, flight, 3.0 * g4), flight, g3), fma(4.0 * g5, flight, g4)
+    return flight + root_move(value, rough_inverse(slope), second, third)
 
 
 @inline_jit

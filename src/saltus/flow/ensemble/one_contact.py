@@ -21,6 +21,7 @@ from saltus.flow.ensemble.lane_steps import (
 )
 from saltus.flow.ensemble.meeting import meet
 from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE, pass_ends, record_others, record_range
+from saltus.flow.kernel_layout import CHATTER_SPEED, LOSSLESS
 from saltus.flow.memory_layout import SERIES_LENGTH, LanePart
 from saltus.taylor import (
     WIDTH,
@@ -28,6 +29,7 @@ from saltus.taylor import (
     bits,
     inline_jit,
     jit,
+    lean_jit,
     load,
     mask,
     minimum,
@@ -70,6 +72,12 @@ def begin_contact(lane, code, sizes, at, m, lanes, env, state, piece):
 
 
 @inline_jit
+def rate_on(m, slot):
+    """The gap's rate of change with the coordinate, on the side that a slot says."""
+    return select(mask(bits(load(m, slot) > 0.0)), load(m, Slot.RATE_UP), load(m, Slot.RATE_DOWN))
+
+
+@inline_jit
 def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
     """The step of every lane up to its first contact, put at NEW_*.
 
@@ -90,8 +98,7 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
         sound &= margins_certain(m, at, sizes, h)
     hit, tau, at_root = 0, h, v
     if sizes[Size.SIDES] > 0:
-        rate = select(mask(bits(load(m, Slot.SIDE) > 0.0)), load(m, Slot.RATE_UP), load(m, Slot.RATE_DOWN))
-        sign = select(mask(bits(rate > 0.0)), splat(1.0), splat(-1.0))  # all that a root depends on
+        sign = select(mask(bits(rate_on(m, Slot.SIDE) > 0.0)), splat(1.0), splat(-1.0))  # all that a root depends on
         end, skip = (x, v, a), flags[Flag.AT_CONTACT]
         hit, doubtful, tau, at_root = meet(at, 0, m, order, h, sign, start, end, bend, skip, alive & sound, helpers, space)
         sound &= ~doubtful
@@ -113,14 +120,32 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
 def reset(code, at, m, settings, hit):
     """Impacts at the new state. Returns (bits that are resolved, bits for the scalar kernel, bits that are captured)."""
     code[Code.IMPACT](m)
-    before, after = load(m, at[LanePart.NEW_VELOCITY]), load(m, at[LanePart.AFTER_VELOCITY])
-    up, down = load(m, Slot.RATE_UP), load(m, Slot.RATE_DOWN)
-    old = select(mask(bits(load(m, Slot.SIDE) > 0.0)), up, down)
-    new = select(mask(bits(load(m, Slot.NEW_SIDE) > 0.0)), up, down)
-    speed = new * after
-    good = bits(old * before < 0.0) & bits(speed > settings[LaneSetting.SLOWEST_IMPACT]) & hit
+    approach = rate_on(m, Slot.SIDE) * load(m, at[LanePart.NEW_VELOCITY])
+    speed = rate_on(m, Slot.NEW_SIDE) * load(m, at[LanePart.AFTER_VELOCITY])
+    good = bits(approach < 0.0) & bits(speed > CHATTER_SPEED) & hit
+    slow = good & ~bits(speed > settings[LaneSetting.SLOWEST_IMPACT])
+    if slow:
+        good &= ~slow | loses_nothing(code, at, m, speed)
     captured = bits(speed < load(m, Slot.CAPTURE_SPEED)) & good
     return good, hit & ~good, captured
+
+
+@lean_jit
+def loses_nothing(code, at, m, speed):
+    """Bits of the lanes in which the next two impacts would leave the gap its `speed`: nothing accumulates there.
+
+    `contact.accumulation` asks the same of the scalar kernel's motions.
+    """
+    side, before = load(m, Slot.SIDE), load(m, at[LanePart.NEW_VELOCITY])
+    for _ in range(2):
+        store(m, Slot.SIDE, load(m, Slot.NEW_SIDE))
+        store(m, at[LanePart.NEW_VELOCITY], -load(m, at[LanePart.AFTER_VELOCITY]))
+        code[Code.IMPACT](m)
+    loss = speed - rate_on(m, Slot.NEW_SIDE) * load(m, at[LanePart.AFTER_VELOCITY])
+    store(m, Slot.SIDE, side)
+    store(m, at[LanePart.NEW_VELOCITY], before)
+    code[Code.IMPACT](m)
+    return bits(absolute(loss) < LOSSLESS * speed)
 
 
 @inline_jit

@@ -1,4 +1,4 @@
-"""A lane in the scalar kernel, for whatever is rare: rest, slow impacts, touches, limits, singularities.
+"""A lane in the scalar kernel, for whatever is rare: rest, slow impacts that may accumulate, touches, limits.
 
 Its compiled part goes into one module with that of `lane_state.py`; the driver calls it through a pointer.
 """
