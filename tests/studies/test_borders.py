@@ -16,7 +16,7 @@ from saltus.studies.chart.border_curves import curve_dataset, explained
 from saltus.studies.chart.changes import changes_of, keys_of, read_chart
 from saltus.studies.chart.endings import ChangeOutcome, Ways, trace
 from saltus.studies.chart.follow import lost
-from saltus.studies.chart.motions import MOTION
+from saltus.studies.chart.motions import motion_type
 from saltus.studies.chart.sampled_ends import sampled_ends
 from saltus.systems import System, VelocityReduction
 from saltus.theory import high_frequency_onset, unloaded_fold
@@ -212,7 +212,7 @@ def test_what_continuation_adds_to_a_chart_are_motions_that_repeat():
 def way(horizontal, goal):
     """The way of the motion at V = -0.5 from one horizontal load to another."""
     orbit = follow_stable(find_orbit(forced(H=0.04), theta=0.3), H, horizontal).points[-1].orbit
-    motion = np.zeros(1, MOTION)
+    motion = np.zeros(1, motion_type(2))
     motion["state"], motion["period"], motion["impact_count"] = orbit.state, 1, 2
     motion["amplitude"] = motion["other"] = orbit.amplitude
     start, end = ({H: np.array([value]), V: np.array([-0.5])} for value in (horizontal, goal))
@@ -243,7 +243,7 @@ def test_a_motion_that_more_than_doubles_between_two_cells_is_followed_to_its_en
     there = follow_stable(orbit, V, -0.30).points[-1]
     assert there.parameter == -0.30
     assert there.orbit.amplitude > 2 * orbit.amplitude
-    motion = np.zeros(1, MOTION)
+    motion = np.zeros(1, motion_type(2))
     motion["state"], motion["period"], motion["impact_count"] = orbit.state, 1, 2
     motion["amplitude"] = motion["other"] = orbit.amplitude
     start, end = ({H: np.array([0.075]), V: np.array([value])} for value in (-0.32, -0.30))

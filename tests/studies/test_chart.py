@@ -9,11 +9,11 @@ from shared_systems import forced
 
 from saltus.errors import ParameterError
 from saltus.orbits import find_orbit, search_orbits
-from saltus.studies import bordered_chart, stability_chart
+from saltus.studies import stability_chart
 from saltus.studies.chart.cells import beyond_limits, joined, seeds, starts
 from saltus.studies.chart.changes import monostable
-from saltus.studies.chart.motions import MOTION, distinct, has_alike
-from saltus.systems import Harmonic, Load, Metainterface, System, TwoLayer, VelocityReduction
+from saltus.studies.chart.motions import distinct, has_alike, motion_type
+from saltus.systems import Harmonic, Load, Metainterface, System, TwoStops, VelocityReduction
 from saltus.theory import equilibria, unloaded_fold
 from saltus.window import check_window
 
@@ -155,7 +155,7 @@ def test_limits_of_the_mechanism():
 
 def some(*rows):
     """Motions from (cell, period, impact_count, amplitude, other)."""
-    return np.array([(cell, 1, *row, 0.0, (0.0, float(i))) for i, (cell, *row) in enumerate(rows)], dtype=MOTION)
+    return np.array([(cell, 1, *row, 0.0, (0.0, float(i))) for i, (cell, *row) in enumerate(rows)], dtype=motion_type(2))
 
 
 def test_a_motion_and_its_mirror_image_are_one():
@@ -169,7 +169,7 @@ def test_a_motion_and_its_mirror_image_are_one():
 
 def test_seeds_are_what_the_neighbours_have_and_the_cell_has_not():
     known = distinct(some((0, 1, 2, 0.5, 0.5), (1, 1, 2, 0.49, 0.49), (1, 1, 6, 0.1, 0.1)))
-    cell, states = seeds(known, known, (2, 2))
+    cell, states = seeds(forced(), known, known, (2, 2))
     assert sorted(cell.tolist()) == [0, 2, 3, 3]  # the six impacts to the left and up, both motions up
     assert sorted(states[:, 1].tolist()) == [0.0, 1.0, 2.0, 2.0]
     assert has_alike(known, np.array([0, 0, 1]), known[[1, 2, 2]], 0.1).tolist() == [True, False, True]
@@ -178,15 +178,23 @@ def test_seeds_are_what_the_neighbours_have_and_the_cell_has_not():
 def test_a_seed_heads_on_in_a_straight_line_from_two_cells():
     known = distinct(some((0, 1, 2, 0.50, 0.5), (1, 1, 2, 0.51, 0.5)))
     known["state"] = [[0.30, 0.10], [0.32, 0.07]]
-    cell, states = seeds(known, known, (1, 3))
+    cell, states = seeds(forced(), known, known, (1, 3))
     assert cell.tolist() == [2]
     np.testing.assert_allclose(states, [[0.34, 0.04]])
     known["state"][0] = [-0.3, 0.1]  # at another phase of several periods: no line to go on
-    np.testing.assert_allclose(seeds(known, known, (1, 3))[1], [[0.32, 0.07]])
+    np.testing.assert_allclose(seeds(forced(), known, known, (1, 3))[1], [[0.32, 0.07]])
+
+
+def test_a_seed_that_heads_beyond_a_stop_is_reflected_there():
+    """Between stops at -1 and 1: from 0.90 and 0.98 to 1.06, which is 0.94."""
+    known = distinct(some((0, 1, 2, 0.90, 0.5), (1, 1, 2, 0.98, 0.5)))
+    known["state"] = [[0.90, 0.10], [0.98, 0.07]]
+    stops = System(model=TwoStops(stiffness=0.0), load=Load(frequency=1.0))
+    np.testing.assert_allclose(seeds(stops, known, known, (1, 3))[1], [[0.94, 0.04]])
 
 
 def test_motions_that_come_together_go_on_as_one_that_stands_for_all():
-    moving = np.zeros(5, MOTION)
+    moving = np.zeros(5, motion_type(2))
     moving["cell"], moving["starts"], moving["amplitude"] = [3, 1, 3, 3, 1], [1, 2, 3, 4, 5], 0.5
     moving["state"] = [[0.5, 0.0], [0.5, 0.0], [0.5002, 0.0], [0.5004, 0.0], [0.6, 0.0]]
     left = joined(moving)
@@ -233,8 +241,3 @@ def test_systems_without_a_chart_are_refused():
     still = type(forced(1.0))(model=forced(1.0).model, load=Load(horizontal=0.1, vertical=-0.5))
     with pytest.raises(ParameterError, match="frequency"):
         stability_chart(still)
-    two = type(forced(1.0))(
-        model=TwoLayer(beta0=1.4), load=Load(frequency=1.0, horizontal=Harmonic(amplitude=0.1), vertical=-0.5)
-    )
-    with pytest.raises(ParameterError, match="the borders of a chart is for models with one coordinate"):
-        bordered_chart(two)

@@ -9,7 +9,6 @@ import pytest
 
 import saltus
 from saltus import branch_of
-from saltus.errors import ParameterError
 from saltus.flow import Outcome
 from saltus.orbits import initial_states, orbits_near_returns, search_orbits, solved_near
 from saltus.plots import draw_diagram, draw_stability_chart
@@ -158,10 +157,38 @@ def test_a_search_finds_the_orbit_of_both_layers_and_says_what_it_searched():
     assert len(both.window) == 4
 
 
-def test_what_has_no_equations_for_several_contacts_is_refused_by_name():
-    both = layers(TwoLayer)
-    with pytest.raises(ParameterError, match="borders of a chart"):
-        bordered_chart(both, horizontal=[0.1, 0.2], vertical=[-0.5])
+def fold_between_stops(e):
+    """The force A below which a free mass has no motion with one impact at each stop a period.
+
+    With a = -k / A, b = 1 / A, c = -pi (1 + k) / (2 A) and k = (1 - e) / (2 e) the speed v at which it leaves a stop has
+    (a v)^2 + (b + c v)^2 = 1, whose two solutions meet where c^2 = a^2 (b^2 - 1).
+    """
+    return 1 / np.sqrt(1 + (math.pi / 2 * (1 + e) / (1 - e)) ** 2)
+
+
+def test_a_chart_between_stops_has_the_closed_form_as_its_border():
+    """In the plane of force and restitution: the curve of folds, and the ends of motions between cells, found by simulation."""
+    axes = {"horizontal": np.linspace(0.36, 0.6, 7), "vertical": np.linspace(0.04, 0.2, 5), "paths": (FORCE, "impact.e")}
+    made = bordered_chart(stops(), **axes, starts=6, curves=1)
+    curve = made["borders/curve_00"]
+    assert (curve.attrs["kind"], curve.attrs["period"]) == ("LP", 1)
+    assert np.abs(curve["horizontal"] - fold_between_stops(curve["vertical"])).max() < 1e-12
+    ends = made["borders/ends"].to_dataset()
+    ends = ends.where((ends["period"] == 1) & (ends["vertical"].isin(axes["vertical"])), drop=True)
+    assert ends.sizes["end"] == 5  # one in each row
+    beside = np.abs(ends["horizontal"] - fold_between_stops(ends["vertical"]))
+    assert (beside <= 1.02 * ends["uncertainty"] * 0.04).all()
+
+
+def test_what_simulation_says_of_the_ends_of_motions_of_both_layers_continuation_says_too():
+    """A sample of them is solved for as orbits; and where a gap touches without speed a motion goes on."""
+    both = layers(TwoLayer, amplitude=0.5).with_({"impact": NewtonImpact(e=0.0)})
+    made = bordered_chart(both, horizontal=np.linspace(0.05, 0.9, 18), vertical=np.linspace(-1.0, -0.2, 9), starts=8, curves=1)
+    counts = made["disagreements"].attrs
+    assert counts["located"] + counts["harmless"] == counts["changes"] >= 10
+    assert counts["sampled_agree"] == counts["sampled"] >= 6
+    curve = made["borders/curve_00"]
+    assert float(curve["residual"].max()) < 1e-9
 
 
 def test_orbits_of_a_loose_mass_that_no_wall_touches_are_a_continuum_and_no_branch():

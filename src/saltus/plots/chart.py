@@ -36,6 +36,7 @@ BORDER_NAMES = {"LP": "fold", "PD": "period doubling", "BPC": "symmetry breaking
 BESIDE_REST: dict[str, Any] = {"color": INK, "lw": 1.7}  # the border of the region with rest alone
 INSIDE: dict[str, Any] = {"color": "#333333", "lw": 0.4}  # where one motion among others begins or ends
 WHITE_GROUND = [Stroke(linewidth=2.9, foreground="white"), Normal()]  # so that a line is seen on every colour
+THIN_GROUND = [Stroke(linewidth=1.0, foreground="white", alpha=0.6), Normal()]
 STATIC_LINE: dict[str, Any] = {"color": UNSTABLE, "lw": 1.4}
 PRINTED_LINE: dict[str, Any] = {"color": UNSTABLE, "lw": 1.0, "ls": (0, (1, 1.2))}  # the paper's border where it is not true
 LINE_LIMIT: dict[str, Any] = {"color": LIMIT, "lw": 0.9}
@@ -78,7 +79,7 @@ def draw_lines(ax: Any, tree: Any) -> int:
     for curve in border_curves(tree):
         x, y, style = curve["horizontal"].values, curve["vertical"].values, BORDERS[str(curve.attrs["kind"])]
         beside = _is_beside_rest(chart, x, y)
-        ax.plot(x, y, **INSIDE, ls=style, zorder=4)
+        ax.plot(x, y, **INSIDE, ls=style, path_effects=THIN_GROUND, zorder=4)
         heavy = np.where(beside, x, np.nan)
         ax.plot(heavy, np.where(beside, y, np.nan), **BESIDE_REST, ls=style, path_effects=WHITE_GROUND, zorder=5)
     if "static" in tree.children:

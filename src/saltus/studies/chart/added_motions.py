@@ -9,7 +9,8 @@ import numpy as np
 from saltus.studies.chart.cell_outcomes import outcomes
 from saltus.studies.chart.cells import beyond_limits, spread
 from saltus.studies.chart.changes import ChartMotions
-from saltus.studies.chart.motions import ALIKE, KEPT, MOTION, by_cell, distinct, has_alike, read_motions, table
+from saltus.studies.chart.endings import SEEN
+from saltus.studies.chart.motions import ALIKE, KEPT, by_cell, distinct, has_alike, motion_type, read_motions, table
 from saltus.studies.chart.request import ChartRequest
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ ADDED = "added_by_continuation"  # an attribute of the chart: how many
 
 
 def with_motions(chart: xarray.Dataset, request: ChartRequest, cells: np.ndarray, found: np.ndarray) -> xarray.Dataset:
-    """The chart with motions in these cells, (n, 2) rows and columns, of dtype WAY, where these have them not yet, and with what
+    """The chart with motions in these cells, (n, 2) rows and columns, of `way_type`, where these have them not yet, and with what
     further motions starts from these lead to."""
     made = chart.transpose("vertical", "horizontal", ...).copy(deep=True).load()  # its arrays are written to
     shape, known = made["count"].shape, read_motions(made)
@@ -48,9 +49,9 @@ def has_motion(chart: ChartMotions, cell: np.ndarray, amplitude: float) -> bool:
 
 
 def _as_motions(cells: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """Motions on the way, of dtype WAY, as motions of cells."""
-    motions = np.zeros(len(found), MOTION)
+    """Motions on the way, of `way_type`, as motions of cells."""
+    motions = np.zeros(len(found), motion_type(found["state"].shape[1]))
     motions["cell"] = cells
-    for name in ("state", "period", "impact_count", "amplitude", "other"):
+    for name in SEEN:
         motions[name] = found[name]
     return by_cell(motions)

@@ -22,9 +22,9 @@ from saltus.progress import Progress
 from saltus.provenance import check_provenance, identity
 from saltus.studies.chart.border_curves import curve_dataset
 from saltus.studies.chart.changes import Changes, ChartMotions
-from saltus.studies.chart.endings import ENDING, Ways, trace
+from saltus.studies.chart.endings import Ways, ending_type, trace
 from saltus.studies.chart.follow import lost
-from saltus.studies.chart.motions import MOTION
+from saltus.studies.chart.motions import motion_type
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -56,9 +56,10 @@ class Workshop:
     workers: int | None = None
 
     def ends(self, chart: ChartMotions, changes: Changes, progress: Progress) -> np.ndarray:
-        """What becomes of each of these changes, of dtype ENDING."""
+        """What becomes of each of these changes, of `ending_type`."""
+        kind = ending_type(self.system.dimension)
         if not len(changes):
-            return np.zeros(0, ENDING)
+            return np.zeros(0, kind)
         motions = chart.motions[changes.motion]
         places = {
             "start": _values(chart, self.paths, changes.source),
@@ -66,10 +67,10 @@ class Workshop:
         }
         numbers = {"periods": self.periods, "max_period": self.max_period, "tol": self.tol, "least": chart.least}
         arguments = {name: {path: a.tolist() for path, a in values.items()} for name, values in places.items()} | numbers
-        arguments["motions"] = {name: motions[name].tolist() for name in MOTION.names or ()}
-        size = structured_to_unstructured(np.zeros(1, ENDING)).shape[1]
+        arguments["motions"] = {name: motions[name].tolist() for name in motions.dtype.names}
+        size = structured_to_unstructured(np.zeros(1, kind)).shape[1]
         found = self._run(ENDS, arguments, "change", len(motions), CHUNK, ("number", size), "f8", progress)
-        return np.asarray(unstructured_to_structured(found, ENDING))
+        return np.asarray(unstructured_to_structured(found, kind))
 
     def curves(self, starts: Sequence[Any], bounds: Any, progress: Progress) -> list[xarray.Dataset | None]:
         """The curve from the first of each of these lists of starts that leads to one, or None."""
@@ -126,13 +127,13 @@ def _checked_system(arguments: Mapping[str, Any]) -> System:
 
 def ends(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """What becomes of some changes of a chart, as rows of numbers."""
-    rows = np.asarray(block["change"], dtype=int)
-    motions = np.zeros(len(rows), MOTION)
-    for name in MOTION.names or ():
+    rows, system = np.asarray(block["change"], dtype=int), _checked_system(arguments)
+    motions = np.zeros(len(rows), motion_type(system.dimension))
+    for name in motions.dtype.names or ():
         motions[name] = np.array(arguments["motions"][name])[rows]
     start, end = ({path: np.array(values)[rows] for path, values in arguments[name].items()} for name in ("start", "end"))
     numbers = {name: arguments[name] for name in ("periods", "max_period", "tol")}
-    found = trace(Ways(_checked_system(arguments), start, end, motions, **numbers), float(arguments["least"]))
+    found = trace(Ways(system, start, end, motions, **numbers), float(arguments["least"]))
     return {"result": structured_to_unstructured(found, dtype=float)}
 
 
@@ -198,9 +199,11 @@ def curve_from(system: System, paths: Sequence[str], start: Mapping[str, Any], b
 def special_point(system: System, paths: Sequence[str], start: Mapping[str, Any]) -> SpecialPoint | None:
     """The special point at which a motion ends between two cells, by continuation of its orbit from close to it."""
     here = system.with_(dict(zip(paths, start["place"], strict=True)))
-    state: dict[str, Any] = {system.model.coordinates[0]: float(start["state"][0])}
+    names, state = system.model.coordinates, [float(value) for value in start["state"]]
+    velocity = state[1] if len(names) == 1 else tuple(state[len(names) :])
+    coordinates: dict[str, Any] = dict(zip(names, state, strict=False))
     try:
-        orbit = find_orbit(here, **state, velocity=float(start["state"][1]), period=int(start["period"]), settle=0)
+        orbit = find_orbit(here, **coordinates, velocity=velocity, period=int(start["period"]), settle=0)
         special = lost(follow_stable(orbit, paths[int(start["along"])], float(start["goal"])))
     except (MotionError, ParameterError):
         return None

@@ -21,7 +21,7 @@ from saltus.studies.chart.border_starts import border_starts, places
 from saltus.studies.chart.border_work import Workshop
 from saltus.studies.chart.cell_outcomes import flags
 from saltus.studies.chart.changes import Changes, ChartMotions, changes_of, keys_of, read_chart
-from saltus.studies.chart.endings import ENDING, ChangeOutcome
+from saltus.studies.chart.endings import ChangeOutcome, ending_type
 from saltus.studies.chart.request import ChartRequest
 from saltus.systems import System, check_system
 
@@ -51,7 +51,7 @@ class Borders:
     curves
         The curves on which motions end.
     endings
-        What becomes of each change, of dtype ENDING, by its key.
+        What becomes of each change, of `ending_type`, by its key.
 
     Examples
     --------
@@ -63,7 +63,7 @@ class Borders:
     endings: dict[tuple[int, ...], np.ndarray] = field(default_factory=dict)
 
     def of(self, chart: ChartMotions, changes: Changes) -> np.ndarray:
-        """What becomes of these changes, of dtype ENDING; of those that were not looked into nothing is known.
+        """What becomes of these changes, of `ending_type`; of those that were not looked into nothing is known.
 
         Parameters
         ----------
@@ -72,9 +72,10 @@ class Borders:
         changes
             The changes between its neighbouring cells.
         """
-        unknown = np.zeros((), ENDING)
+        kind = ending_type(chart.motions["state"].shape[1])
+        unknown = np.zeros((), kind)
         found = [self.endings.get(key, unknown) for key in keys_of(chart, changes)]
-        return np.array(found, dtype=ENDING).reshape(len(changes))
+        return np.array(found, dtype=kind).reshape(len(changes))
 
     def to_xarray(self, chart: ChartMotions) -> xarray.DataTree:
         """The curves as groups, and all changes of a chart in the group `ends`: `key` (see `keys_of`), the `outcome`,
@@ -150,7 +151,7 @@ def with_borders(
     >>> len(borders.curves)  # no border passes between these cells
     0
     """
-    check_system(system, "the borders of a chart", coordinates=1)
+    check_system(system, "the borders of a chart", several_contacts=True)
     check_count("curves", curves, 0)
     request = ChartRequest.of_chart(system, chart)
     numbers = {"periods": request.periods, "max_period": request.max_period, "tol": request.tol}

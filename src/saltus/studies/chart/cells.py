@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from saltus.flow import Recurrence, approached, find_recurrence
-from saltus.orbits import initial_states, rest_state
+from saltus.orbits import initial_states, rest_state, states_beside
 from saltus.studies.chart.cell_outcomes import outcomes
 from saltus.studies.chart.cell_verdicts import CellVerdicts
 from saltus.studies.chart.motions import ALIKE, SIDES, distinct, has_alike, is_alike, motion_type, motions_in, table
@@ -116,7 +116,7 @@ def stable_motions(request: ChartRequest) -> tuple[CellOutcomes, CellVerdicts, n
 def spread(request: ChartRequest, new: np.ndarray, known: np.ndarray) -> np.ndarray:
     """The known motions of all cells with those that starts from new ones lead to in neighbouring cells, and from these again."""
     for _ in range(SETTINGS.rounds):
-        cell, states = seeds(new, known, request.shape)
+        cell, states = seeds(request.system, new, known, request.shape)
         if not len(cell):
             break
         further = settle(request, cell, states, known).motions
@@ -245,8 +245,8 @@ def _arrived(motions: np.ndarray, known: np.ndarray) -> np.ndarray:
     return result
 
 
-def seeds(motions: np.ndarray, known: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Further starts, as cells (n,) and states (n, 2): the motions of neighbours that a cell has no motion alike to.
+def seeds(system: System, motions: np.ndarray, known: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Further starts, as cells (n,) and states (n, d): the motions of neighbours that a cell has no motion alike to.
 
     The state is the neighbour's, or is extrapolated where the cell behind the neighbour has such a motion too.
     """
@@ -257,17 +257,18 @@ def seeds(motions: np.ndarray, known: np.ndarray, shape: tuple[int, int]) -> tup
         step, source = side @ [shape[1], 1], motions[ahead]
         new = ~has_alike(known, source["cell"] + step, source, ALIKE.alike)
         source, behind = source[new], behind[ahead][new]
-        found.append((source["cell"] + step, _heading(source, known, np.where(behind, source["cell"] - step, -1))))
+        steps = _heading(source, known, np.where(behind, source["cell"] - step, -1))
+        found.append((source["cell"] + step, states_beside(system, source["state"], steps)))
     return np.concatenate([cell for cell, _ in found]), np.concatenate([states for _, states in found])
 
 
 def _heading(motions: np.ndarray, known: np.ndarray, behind: np.ndarray) -> np.ndarray:
-    """States a cell further on in a straight line from those of alike motions in the cells behind; else the states themselves."""
-    ahead = motions["state"].copy()
+    """The steps of states to those a cell further on, in a straight line from alike motions in the cells behind; else 0."""
+    ahead = np.zeros_like(motions["state"])
     for there, index in motions_in(known, behind):
         other = known[index]
         like = there & is_alike(other, motions, ALIKE.alike)
         step = motions["state"] - other["state"]
         like &= np.abs(step).max(axis=1) <= ALIKE.alike * motions["amplitude"]  # also at the same phase of several periods
-        ahead[like] = motions["state"][like] + step[like]
+        ahead[like] = step[like]
     return ahead

@@ -21,7 +21,7 @@ class ChartMotions:
 
     horizontal: np.ndarray
     vertical: np.ndarray
-    motions: np.ndarray  # of dtype MOTION, by cell and falling amplitude
+    motions: np.ndarray  # of `motion_type`, by cell and falling amplitude
     family: np.ndarray  # (n,): a number that motions share which have counterparts in neighbouring cells
     least: float  # amplitude that counts
     monostable: np.ndarray  # (rows, columns): rest is the only motion

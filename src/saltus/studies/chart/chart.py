@@ -115,7 +115,7 @@ def stability_chart(
 
 
 def _check_bordered(system: System, curves: int, progress: object, **options: Any) -> None:
-    check_system(system, "the borders of a chart", coordinates=1)
+    check_system(system, "the borders of a chart", several_contacts=True)
     check_count("curves", curves, 0)
     stability_chart.check(system, **options)
 

@@ -9,13 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 
 from saltus.enumerations import NumberedSentence
 from saltus.flow import approached, captured_between, find_recurrence, return_period
-from saltus.studies.chart.motions import ALIKE
+from saltus.orbits import states_beside
+from saltus.studies.chart.motions import ALIKE, motion_type
 from saltus.systems import System
 
 
@@ -43,20 +45,25 @@ class ChangeOutcome(NumberedSentence):
 
 ENDS = (ChangeOutcome.JUMP, ChangeOutcome.DOUBLING, ChangeOutcome.SYMMETRY)
 
-# A motion on the way: at which share of it, its state at phase 0, period, impacts, extrema; a period of 0 if it does not settle.
-WAY = np.dtype(
-    [
-        ("share", float),
-        ("state", float, (2,)),
-        ("period", np.int64),
-        ("impact_count", np.int64),
-        ("amplitude", float),
-        ("other", float),
-    ]
-)
-# The outcome, the last share of the way at which the motion has settled in time, the last at which it is the same motion, settled
-# or about to settle, and the next, at which it is another.
-ENDING = np.dtype([("outcome", np.int8), ("settled", float), ("last", WAY), ("next", WAY)])
+SEEN = ("state", "period", "impact_count", "amplitude", "other", "slowest")  # of a motion on the way, as of one of a cell
+
+
+@cache
+def way_type(dimension: int) -> np.dtype[Any]:
+    """The record of a motion on the way: at which share of it, and what is seen of it; a period of 0 if it does not settle."""
+    kept = motion_type(dimension)
+    return np.dtype([("share", float), *((name, kept[name]) for name in SEEN)])
+
+
+@cache
+def ending_type(dimension: int) -> np.dtype[Any]:
+    """The record of what becomes of a motion with so many state variables.
+
+    The outcome, the last share of the way at which the motion has settled in time, the last at which it is the same motion,
+    settled or about to settle, and the next, at which it is another.
+    """
+    way = way_type(dimension)
+    return np.dtype([("outcome", np.int8), ("settled", float), ("last", way), ("next", way)])
 
 
 @dataclass(frozen=True)
@@ -97,7 +104,7 @@ class Ways:
     system: System
     start: Mapping[str, np.ndarray]  # the parameters by dotted path, (n,), at the middle of the motions' cells
     end: Mapping[str, np.ndarray]
-    motions: np.ndarray  # (n,), of dtype MOTION
+    motions: np.ndarray  # (n,), of `motion_type`
     periods: int
     max_period: int
     tol: float
@@ -108,11 +115,11 @@ class Ways:
         return captured_between(self.system, self.start, self.end)
 
     def settled(self, rows: np.ndarray, last: np.ndarray, share: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the motions from states (n, 2) at a share of these ways settle on, of dtype WAY, and whether they have settled.
+        """What the motions from states (n, d) at a share of these ways settle on, of `way_type`, and whether they have settled.
 
-        What has come far from the last motion, of dtype WAY, is followed no further.
+        What has come far from the last motion is followed no further.
         """
-        found, settled = np.zeros(len(rows), WAY), np.zeros(len(rows), dtype=bool)
+        found, settled = np.zeros(len(rows), last.dtype), np.zeros(len(rows), dtype=bool)
         left = np.arange(len(rows))
         found["share"], found["state"] = share, states
         for part in SETTINGS.stages if len(rows) > SETTINGS.few_motions else SETTINGS.few_stages:
@@ -123,7 +130,7 @@ class Ways:
         return found, settled
 
     def followed(self, rows: np.ndarray, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
-        """Motions, of dtype WAY, so many forcing periods later at the most, and whether they have settled."""
+        """Motions, of `way_type`, so many forcing periods later at the most, and whether they have settled."""
         parameters = {path: a[rows] + motions["share"] * (self.end[path][rows] - a[rows]) for path, a in self.start.items()}
         ends = find_recurrence(
             self.system,
@@ -135,10 +142,14 @@ class Ways:
             kept=2 * self.max_period,
             extrema=True,
             impact_count=True,
+            speed=bool(self.system.model.contacts),
             tol=self.tol,
         )
-        ahead, _ = approached(ends.states, self.max_period)
-        size = np.nanmax(np.abs(ends.states[:, :, 0]), axis=1, initial=0.0)[:, None]
+        ahead = ends.last
+        if not self.system.model.held:  # what lies ahead in a straight line may lie beyond a contact
+            ahead, _ = approached(ends.states, self.max_period)
+        own = len(self.system.model.coordinates)
+        size = np.nanmax(np.abs(ends.states[:, :, :own]), axis=(1, 2), initial=0.0)[:, None]
         slow = return_period(ends.states, self.max_period, SETTINGS.slow * size)
         settled = ends.periodic | ends.rest
         ends = replace(ends, period=np.where(settled, ends.period, slow))
@@ -147,27 +158,28 @@ class Ways:
         found["impact_count"] = ends.impact_count
         high, low = ends.highest, -ends.lowest
         found["amplitude"], found["other"] = np.maximum(high, low), np.minimum(high, low)
-        for name in ("period", "impact_count", "amplitude", "other"):
+        found["slowest"] = 0.0 if ends.speeds is None else ends.slowest
+        for name in ("period", "impact_count", "amplitude", "other", "slowest"):
             found[name][ends.rest] = 0
         return found, settled
 
 
 def trace(ways: Ways, least: float) -> np.ndarray:
-    """What becomes of each motion on its way, of dtype ENDING; `least` is the amplitude that counts.
+    """What becomes of each motion on its way, of `ending_type`; `least` is the amplitude that counts.
 
     That it is lost counts only from a place no farther than the last halving: from afar its basin may be too small.
     """
     count = len(ways.motions)
-    result = np.zeros(count, ENDING)
+    result = np.zeros(count, ending_type(ways.system.dimension))
     last, following = result["last"], result["next"]
-    for name in ("state", "period", "impact_count", "amplitude", "other"):
+    for name in SEEN:
         last[name] = ways.motions[name]
     before, high, trial, going = last.copy(), np.ones(count), np.full(count, 0.5), np.ones(count, dtype=bool)
     for _ in range(SETTINGS.rounds):
         rows = np.flatnonzero(going)
         if not rows.size:
             break
-        found, settled = ways.settled(rows, last[rows], trial[rows], _heading(last[rows], before[rows], trial[rows]))
+        found, settled = ways.settled(rows, last[rows], trial[rows], _heading(ways.system, last[rows], before[rows], trial[rows]))
         same = _is_same(last[rows], found)
         on, lost = rows[same], rows[~same]
         before[on], last[on] = last[on], found[same]
@@ -196,14 +208,14 @@ def _wait(ways: Ways, result: np.ndarray) -> None:
     result["next"][rows[~same]], result["last"]["share"][rows[~same]] = found[~same], result["settled"][rows[~same]]
 
 
-def _heading(last: np.ndarray, before: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """States (n, 2) at these shares of the way, in a straight line through the last two; that of the last where these differ
+def _heading(system: System, last: np.ndarray, before: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """States (n, d) at these shares of the way, in a straight line through the last two; that of the last where these differ
     much, as at another phase of several periods."""
     step, gone = last["state"] - before["state"], last["share"] - before["share"]
     usable = (gone > 0.0) & (np.abs(step).max(axis=1) <= ALIKE.alike * last["amplitude"])
     with np.errstate(divide="ignore", invalid="ignore"):
         ahead = np.where(usable, (share - last["share"]) / gone, 0.0)
-    return np.asarray(last["state"] + ahead[:, None] * step)
+    return states_beside(system, last["state"], ahead[:, None] * step)
 
 
 def is_symmetric(motions: np.ndarray) -> np.ndarray:
@@ -212,10 +224,16 @@ def is_symmetric(motions: np.ndarray) -> np.ndarray:
 
 
 def is_near(last: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """Whether the extrema have changed by no more than those of one motion may in a step of this length."""
+    """Whether the extrema have changed by no more than those of one motion may in a step of this length.
+
+    So must the least speed of an impact, if their number is the same: one that appears at a grazing has none.
+    """
     size = np.maximum(last["amplitude"], found["amplitude"])
-    apart = np.maximum(*(np.abs(found[name] - last[name]) for name in ("amplitude", "other")))
-    return np.asarray(apart <= SETTINGS.change * np.sqrt(np.abs(found["share"] - last["share"])) * size)
+    near = SETTINGS.change * np.sqrt(np.abs(found["share"] - last["share"]))
+    apart = np.maximum(*(np.abs(found[name] - last[name]) for name in ("amplitude", "other"))) <= near * size
+    fastest = size + np.maximum(last["slowest"], found["slowest"])
+    alike = np.abs(found["slowest"] - last["slowest"]) <= near * fastest
+    return np.asarray(apart & (alike | (found["impact_count"] != last["impact_count"])))
 
 
 def _is_same(last: np.ndarray, found: np.ndarray) -> np.ndarray:

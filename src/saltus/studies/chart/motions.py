@@ -36,9 +36,6 @@ def motion_type(dimension: int) -> np.dtype[Any]:
     )
 
 
-MOTION = motion_type(2)  # with one coordinate
-
-
 @dataclass(frozen=True)
 class MotionTolerances:
     """By how much of their amplitude motions may differ."""

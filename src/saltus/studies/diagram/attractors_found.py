@@ -10,6 +10,7 @@ from saltus.enumerations import NumberedSentence
 from saltus.studies.chart.cells import seeds
 from saltus.studies.chart.motions import ALIKE, by_cell, is_alike, is_same, motion_type
 from saltus.studies.diagram.simulated import SimulatedMotions
+from saltus.systems import System
 
 
 class Place(NumberedSentence):
@@ -95,11 +96,13 @@ class AttractorsFound:
         runs = np.split(rows[order], 1 + np.flatnonzero(~alike)) if len(rows) else []
         return sorted(runs, key=lambda run: -len(run))
 
-    def seeds(self, grid: np.ndarray, known: np.ndarray, since: int) -> tuple[np.ndarray, np.ndarray]:
+    def seeds(self, system: System, grid: np.ndarray, known: np.ndarray, since: int) -> tuple[np.ndarray, np.ndarray]:
         """Further starts, values (n,) and states (n, d): attractors, at neighbours of their value that have none alike.
 
         Parameters
         ----------
+        system
+            What moves.
         grid
             The values whose neighbours are meant.
         known
@@ -110,7 +113,8 @@ class AttractorsFound:
         rows = self.rows[np.isin(self.motions.value[self.rows], grid)]
         mine = as_chart_motions(self.motions.only(rows))
         mine["cell"] = np.searchsorted(grid, self.motions.value[rows])
-        cell, states = seeds(by_cell(mine[rows >= since]), by_cell(np.concatenate([mine, known])), (1, len(grid)))
+        every = by_cell(np.concatenate([mine, known]))
+        cell, states = seeds(system, by_cell(mine[rows >= since]), every, (1, len(grid)))
         return grid[cell], states
 
 

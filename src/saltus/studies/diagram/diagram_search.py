@@ -209,7 +209,7 @@ class DiagramSearch:
         since, ended = 0, 0
         for number in range(SETTINGS.rounds):
             known = stable_motions(self.branches.placed, self.grid, self.system.dimension)
-            values, states = self.found.seeds(self.grid, known, since)
+            values, states = self.found.seeds(self.system, self.grid, known, since)
             more_values, more_states = self._beyond_ends(self.branches.placed[ended:] if number < self.effort.jumps else [])
             since, ended = len(self.found.motions), len(self.branches.placed)
             values, states = np.concatenate([values, more_values]), np.concatenate([states, more_states])
