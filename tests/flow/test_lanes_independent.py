@@ -72,6 +72,13 @@ def test_chunks_are_all_trajectories_once(count, threads):
     assert rows == list(range(count))
 
 
+def test_a_chunk_of_motions_of_which_much_is_kept_is_small():
+    most = lanes_run.SETTINGS.most_samples
+    for kept in (1, 64, 1000, 10**5):
+        for chunk in lanes_run.chunks(50_000, 1, kept):
+            assert chunk.stop - chunk.start <= max(lanes_run.SETTINGS.smallest_chunk, most // kept)
+
+
 @pytest.mark.parametrize("count", [100, 968, 4000])
 def test_no_thread_has_more_than_half_of_its_share_in_its_last_chunk(count):
     for threads in (2, 3):

@@ -60,7 +60,7 @@ def first_closing(sizes, at, m, h, alive, helpers, space):
         start = load(m, at[LanePart.POSITION] + row) - load(m, at[LanePart.CONTACTS] + i)
         x, v, a, bend = sweep(m, at, row, order, start, h)
         sign, skip = splat(1.0 * sizes[Size.CONTACTS + 1 + count + i]), bits(start * start <= 0.0)
-        closes, unclear, when, _ = meet(at, row, m, order, h, sign, start, (x, v, a), bend, skip, opened, helpers, space)
+        closes, unclear, _, when, _ = meet(at, row, m, order, h, sign, start, (x, v, a), bend, skip, opened, 0, helpers, space)
         doubtful |= unclear | (hit & closes & bits(absolute(when - tau) < TOGETHER * h))
         first = closes & (~hit | bits(when < tau))
         tau, which = select(mask(first), when, tau), select(mask(first), splat(1.0 * i), which)
@@ -151,7 +151,8 @@ def one_free_step(code, sizes, at, m, settings, limits, alive, helpers, space):
     sound = bits(natural > settings[LaneSetting.SHORTEST_STEP]) & bits(size < FAST)
     x, v, a, bend = sweep(m, at, 0, order, start, h)
     skip = bits(start * start <= 0.0)
-    hit, doubtful, tau, at_root = meet(at, 0, m, order, h, sign, start, (x, v, a), bend, skip, alive & sound, helpers, space)
+    end, ready = (x, v, a), alive & sound
+    hit, doubtful, _, tau, at_root = meet(at, 0, m, order, h, sign, start, end, bend, skip, ready, 0, helpers, space)
     sound &= ~doubtful
     for i in range(sizes[Size.GUARDS]):
         guard = at[LanePart.MARGINS] + i * SERIES_LENGTH

@@ -78,7 +78,7 @@ def impacts_between_checks(sizes):
 
 @inline_jit
 def begin_time(lane, sizes, m, numbers, labels):
-    """Set the forcing period and the time at which a trajectory starts."""
+    """Set the forcing period and the time at which a trajectory starts, and its first step."""
     start = numbers[JobNumber.START_TIME]
     put(m, Slot.NOW, lane, start)
     put(m, Slot.PERIOD_START, lane, start)
@@ -88,6 +88,7 @@ def begin_time(lane, sizes, m, numbers, labels):
     put(m, Slot.PERIODS_DONE, lane, 0.0)
     put(m, Slot.NEXT_CHECK, lane, impacts_between_checks(sizes))
     put(m, Slot.LAST_CHECK, lane, start)
+    put(m, Slot.STEP_SHARE, lane, 1.0)
 
 
 @inline_jit

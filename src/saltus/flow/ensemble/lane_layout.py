@@ -49,6 +49,7 @@ class Slot(IntEnum):
     NEW_SPEED = 31  # of an impact, before it, of a model with several contacts
     FREE_POSITION = LaneSlot.FREE_POSITION
     FREE_VELOCITY = LaneSlot.FREE_VELOCITY
+    STEP_SHARE = 34  # of the longest step, that the next one takes
 
 
 class Size(IntEnum):
@@ -198,5 +199,6 @@ class EndLabel(IntEnum):
 
 MOST_IMPACTS = 1e6  # of a unit of time, or of a shorter forcing period: more are an accumulation that is not being resolved
 BURST = 2e4  # of them at several contacts, over which that rate is looked for: each takes a pass of the scalar kernel
+SMALLEST_SHARE = 0.25  # of a step, in which the scalar kernel's search for roots tells what is not certain
 NO_ROOT, TOUCH = -1.0, -2.0  # instead of the time of a lane's root
 FAST = 1e300  # A state beyond this has left the range of numbers.

@@ -14,11 +14,12 @@ from saltus.taylor import WIDTH, bits, fma, inline_jit, load, mask, maximum, rou
 
 
 @inline_jit
-def meet(at, row, m, order, h, sign, start, end, bend, skip, alive, helpers, space):
-    """Which of the lanes in `alive` meet a contact within the step, which are in doubt, when, and with what velocity.
+def meet(at, row, m, order, h, sign, start, end, bend, skip, alive, patient, helpers, space):
+    """Which of the lanes in `alive` meet a contact within the step, which are in doubt, which wait, when, and with what velocity.
 
     The contact is met where `sign` times a coordinate falls to 0. `start` is the coordinate from the contact on at the start of
-    the step, `end` position, velocity and acceleration at its end. `skip` are the lanes in which the step starts at the contact.
+    the step, `end` position, velocity and acceleration at its end. `skip` are the lanes in which the step starts at the contact,
+    `patient` those that wait for a shorter step where nothing is certain.
     """
     x, v, _ = end
     g0, first = sign * start, at[LanePart.POSITIONS] + row * SERIES_LENGTH
@@ -44,6 +45,7 @@ def meet(at, row, m, order, h, sign, start, end, bend, skip, alive, helpers, spa
         tau, at_root = select(mask(hit), root, h), select(mask(hit), speed, v)
     velocities = at[LanePart.VELOCITIES] + row * SERIES_LENGTH
     unclear = alive & ~doubtful & ~clear & ~single
+    waits, unclear = unclear & patient, unclear & ~patient
     for lane in range(WIDTH if unclear else 0):
         if (unclear >> lane) & 1:
             root = scalar_root(at, row, m, order, lane, h, sign, g0, (skip >> lane) & 1, helpers, space)
@@ -53,7 +55,7 @@ def meet(at, row, m, order, h, sign, start, end, bend, skip, alive, helpers, spa
                 hit |= 1 << lane
                 tau = with_lane(tau, lane, root)
                 at_root = with_lane(at_root, lane, lane_value(m, velocities, order, lane, root))
-    return hit, doubtful, tau, at_root
+    return hit, doubtful, waits, tau, at_root
 
 
 @inline_jit

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.contact_side import side_of_state
-from saltus.flow.ensemble.lane_layout import FAST, Code, Flag, LaneArray, LaneSetting, Size, Slot
+from saltus.flow.ensemble.lane_layout import FAST, SMALLEST_SHARE, Code, Flag, LaneArray, LaneSetting, Size, Slot
 from saltus.flow.ensemble.lane_steps import (
     both_at,
     commit,
@@ -81,12 +81,13 @@ def rate_on(m, slot):
 def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
     """The step of every lane up to its first contact, put at NEW_*.
 
-    Returns (bits that hit, bits for the scalar kernel, h, tau, bend).
+    Returns (bits that hit, bits for the scalar kernel, bits that wait for a shorter step, h, tau, bend).
     """
     order = sizes[Size.ORDER]
     code[Code.SERIES](m, order)
     size = state_size(m, at, sizes)
-    natural = natural_step(m, at, sizes, limits, size)
+    share = load(m, Slot.STEP_SHARE)
+    natural = share * natural_step(m, at, sizes, limits, size)
     now, limit = load(m, Slot.NOW), load(m, Slot.STEP_LIMIT)
     h = minimum(natural, limit - now)
     alive = flags[Flag.BUSY] & ~flags[Flag.SCALAR]
@@ -96,11 +97,14 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
     x, v, a, bend = sweep(m, at, 0, order, start, h)
     if sizes[Size.MARGINS] > 0:
         sound &= margins_certain(m, at, sizes, h)
-    hit, tau, at_root = 0, h, v
+    hit, waits, tau, at_root = 0, 0, h, v
     if sizes[Size.SIDES] > 0:
         sign = select(mask(bits(rate_on(m, Slot.SIDE) > 0.0)), splat(1.0), splat(-1.0))  # all that a root depends on
         end, skip = (x, v, a), flags[Flag.AT_CONTACT]
-        hit, doubtful, tau, at_root = meet(at, 0, m, order, h, sign, start, end, bend, skip, alive & sound, helpers, space)
+        patient = bits(share > SMALLEST_SHARE)
+        hit, doubtful, waits, tau, at_root = meet(
+            at, 0, m, order, h, sign, start, end, bend, skip, alive & sound, patient, helpers, space
+        )
         sound &= ~doubtful
     impact = mask(hit)
     store(m, Slot.NEW_TIME, select(mask(bits(natural >= limit - now) & ~hit), limit, now + tau))
@@ -113,7 +117,8 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
         store(m, at[LanePart.NEW_VELOCITY] + row, w)
     if sizes[Size.CHECKED] > 0:
         sound &= series_true(code, m, at, sizes, settings[LaneSetting.TOLERANCE], tau, size)
-    return hit & sound & alive, alive & ~sound, h, tau, bend
+    store(m, Slot.STEP_SHARE, select(mask(waits), 0.5 * share, splat(1.0)))
+    return hit & sound & alive, alive & ~sound & ~waits, waits, h, tau, bend
 
 
 @inline_jit
@@ -151,13 +156,13 @@ def loses_nothing(code, at, m, speed):
 @inline_jit
 def step_all(code, scalar, sizes, at, m, flags, settings, limits, helpers, lanes, jobs, tables, space):
     """One step of all lanes. Returns bits for the scalar kernel, bits captured, and bits past the end of their forcing period."""
-    hit, scalar, h, tau, bend = propose(code, sizes, at, m, flags, settings, limits, helpers, space)
+    hit, scalar, waits, h, tau, bend = propose(code, sizes, at, m, flags, settings, limits, helpers, space)
     captured = 0
     resolved = hit
     if hit:
         resolved, doubtful, captured = reset(code, at, m, settings, hit)
         scalar |= doubtful
-    moved = flags[Flag.BUSY] & ~flags[Flag.SCALAR] & ~scalar
+    moved = flags[Flag.BUSY] & ~flags[Flag.SCALAR] & ~scalar & ~waits
     begin, v_begin = splat(0.0), load(m, at[LanePart.VELOCITY])
     past = moved & bits(load(m, Slot.NEW_TIME) > load(m, Slot.PERIOD_END))
     if past and sizes[Size.ENDS_ASKED] > 0:

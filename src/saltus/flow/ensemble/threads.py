@@ -27,9 +27,12 @@ WHAT = "following the motions"  # for the progress
 class ThreadSettings:
     """How trajectories are shared between threads, and how often these are looked after."""
 
-    largest_chunk: int = 1024  # Trajectories that one call of the driver runs at most: some milliseconds a forcing period.
-    # Trajectories of the smallest chunk, if there are as many for each thread: at the end of a chunk lanes stand empty, which
-    # costs more the fewer trajectories each lane had.
+    # Trajectories that one call of the driver runs at most, and of how many forcing periods it keeps something in all: 25 MB for
+    # one coordinate. At the end of a chunk lanes stand empty, for long where few motions have a thousand times the impacts of
+    # others.
+    largest_chunk: int = 8192
+    most_samples: int = 1 << 19
+    # Trajectories of the smallest chunk, if there are as many for each thread.
     smallest_chunk: int = 8 * WIDTH
     # Chunks that each thread still has before it, at least, when one is taken: the last ones are small, so that all threads end
     # at about the same time.
@@ -40,12 +43,16 @@ class ThreadSettings:
 SETTINGS = ThreadSettings()
 
 
-def chunks(count: int, threads: int) -> Iterator[slice]:
-    """The chunks of so many trajectories: large ones, then ever smaller ones, so that no thread is left alone at the end."""
+def chunks(count: int, threads: int, kept: int = 1) -> Iterator[slice]:
+    """The chunks of so many trajectories: large ones, then ever smaller ones, so that no thread is left alone at the end.
+
+    Of each trajectory something of so many forcing periods is kept.
+    """
     first, least = 0, min(SETTINGS.smallest_chunk, math.ceil(count / threads))
+    largest = min(SETTINGS.largest_chunk, max(least, SETTINGS.most_samples // kept))
     while first < count:
         share = (count - first) / (SETTINGS.chunks_ahead * threads) if threads > 1 else count
-        size = min(WIDTH * math.ceil(max(share, least) / WIDTH), SETTINGS.largest_chunk)
+        size = min(WIDTH * math.ceil(max(share, least) / WIDTH), largest)
         yield slice(first, min(first + size, count))
         first += size
 
@@ -115,7 +122,7 @@ class Lanes:
             np.empty((n, self.kept, len(self.sampled))),
         )
         controls = [np.zeros(2, dtype=np.int64) for _ in range(threads)]
-        waiting, lock = chunks(n, threads), threading.Lock()
+        waiting, lock = chunks(n, threads, self.kept), threading.Lock()
         compile_everything(self.several)  # here, not in each thread
         progress(0.0, WHAT)
         with ThreadPoolExecutor(threads) as pool:
