@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import atan2, cos, pi, sin, sqrt
+from math import asin, atan2, cos, hypot, pi, sin, sqrt
 from typing import Any, ClassVar
 
 import numpy as np
@@ -319,3 +319,16 @@ def test_frictions_without_meaning_are_refused(frictions: tuple[saltus.Friction,
     model = type("Given", (Rubbed,), {"given": frictions})()
     with pytest.raises(saltus.ParameterError, match=sentence):
         saltus.System(model=model)
+
+
+@pytest.mark.parametrize("beside", [-1e-11, -3e-13, -3e-14, 0.0, 3e-14, 3e-13, 1e-11])
+def test_a_speed_that_is_reached_where_friction_can_just_bear_the_force_is_kept(beside):
+    """x'' = -x + mu from x = mu - R, v = 0 with R^2 = (2 mu)^2 + w^2 has the speed w at x = -mu, where it needs all friction to
+    keep it, and less from then on: it sticks up to x = mu. Rounding made it neither stick nor slide."""
+    mu, speed = 0.4, 0.5
+    reach = hypot(2 * mu, speed)
+    motion = saltus.simulate(
+        belt(kinetic=mu, static=mu, belt_speed=speed), x=mu - reach + beside, velocity=0.0, duration=4.0, tol=1e-14
+    )
+    (slip,) = motion.events.of(saltus.EventKind.SLIP)
+    assert slip.time == pytest.approx(asin(speed / reach) + 2 * mu / speed, abs=1e-9)

@@ -21,7 +21,9 @@ from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-ALIKE = 1e-12  # Where mu_s = mu_k the acceleration with which sliding begins is 0, and smaller than this by rounding.
+# Where mu_s = mu_k the acceleration with which sliding begins is 0, and smaller than this by rounding. So is what friction could
+# bear beyond its force where the speed of the ground is reached just as it can: both have to be told by what follows.
+ALIKE = 1e-12
 
 
 @lean_jit
@@ -169,7 +171,7 @@ def slides_so(where, frictions, count, work, solver, candidates):
         if slides == 0:
             for b in range(2):
                 row = work[Work.MARGINS][count + 2 * k + b]
-                i = leading(row, 1 if reached == 1 + b else 0, order)
+                i = leading(row, 1 if reached == 1 + b or (reached > 0 and abs(row[0]) <= ALIKE) else 0, order)
                 if i < order and row[i] < 0.0:
                     return False
                 if i > 0:
