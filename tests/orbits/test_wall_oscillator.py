@@ -127,3 +127,14 @@ def test_below_the_grazing_the_orbit_is_the_steady_response(name):
         assert point.orbit.highest == pytest.approx(point.parameter / abs(family.impedance), abs=1e-11)
         assert point.parameter < family.grazing_amplitude * (1 + 1e-12)
         assert np.abs(point.orbit.multipliers) == pytest.approx([decay, decay], abs=1e-10)
+
+
+def test_at_a_resonance_without_damping_a_branch_ends_as_its_amplitude_grows():
+    """A linear oscillator far from its wall has the amplitude A / abs(1 - Omega^2): it was followed to the 20 000th point."""
+    free = walled(A=1.0, W=0.7, wall=1e6, c=0.0)
+    orbit = saltus.find_orbit(free, x=1.0 / (1.0 - 0.7**2), velocity=0.0, settle=0, period=1)
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.6, 1.6))
+    assert str(branch.ends[0]) == "bound 0.6"
+    assert branch.ends[1].reason is saltus.orbits.OrbitEnd.GROWS
+    np.testing.assert_allclose(branch.amplitudes, 1.0 / (1.0 - branch.parameters**2), rtol=1e-9)
+    assert 100.0 < branch.amplitudes[-1] < 200.0

@@ -48,6 +48,9 @@ class BranchLimits:
     steepest: float = 1e8
     on_circle: float = 1e-9  # Without damping multipliers lie on the unit circle, but for rounding that is below this.
     smallest: float = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
+    # An orbit of an amplitude above this, and above this many times that of the orbit with which its branch was begun, grows
+    # without end: it has taken a thousand of the longest steps to come there.
+    largest: float = 1e2
     same_fold: float = 1e-8  # A fold and a crossing of branches whose parameters differ by less than this are one point.
     # A complex pair of multipliers beyond the unit circle by more than this, where areas never grow, is an error of the package.
     impossible_pair: float = 1e-6
@@ -62,8 +65,11 @@ class OrbitEvents(Events):
     """The events along any curve of orbits."""
 
     def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
-        """The end of an orbit that has shrunk to rest."""
-        return End(OrbitEnd.SHRINKS, ahead.parameter) if ahead.orbit.amplitude < SETTINGS.smallest else None
+        """The end of an orbit that has shrunk to rest, or that grows without end."""
+        amplitude = ahead.orbit.amplitude
+        if amplitude > SETTINGS.largest * max(1.0, run.points[0].orbit.amplitude):
+            return End(OrbitEnd.GROWS, ahead.parameter, detail=f"{amplitude:.3g}")
+        return End(OrbitEnd.SHRINKS, ahead.parameter) if amplitude < SETTINGS.smallest else None
 
     def nearest(self, point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
         return nearest(point, place, other)

@@ -71,6 +71,7 @@ class OrbitEnd(EndReason):
     FIRST = "the first {kind}"
     UNSTABLE = "is no longer stable"
     SHRINKS = "shrinks to rest"
+    GROWS = "at {parameter:.10g} its amplitude has grown to {detail}, as without end at a resonance without damping"
     IMAGE = "meets its own image at a {kind}"
     GRAZES_ANOTHER = "ends at a grazing of the {detail}"
     COMES_BACK = (
