@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 import saltus
 from saltus.orbits import OrbitEnd
+from saltus.orbits.followed_problem import FollowedProblem
 
 
 def belt(frequency: float, amplitude: float = 1.0, **numbers: float) -> saltus.System:
@@ -211,3 +212,39 @@ def test_sections_move_away_from_events(over_frequency: saltus.Branch, layers: s
         assert max(orbit.residual for orbit in branch.orbits) < 1e-9
         again = saltus.orbits.orbits_of(branch.to_xarray())
         assert [orbit.signature.section for orbit in again] == [orbit.signature.section for orbit in branch.orbits]
+
+
+@pytest.fixture(scope="module")
+def bouncing() -> saltus.PeriodicOrbit:
+    """Both layers with a light lower mass: each closes once a period, with impacts that die away, while the other one is held."""
+    model = saltus.TwoLayer(beta0=np.deg2rad(80), damping=0.1, mass_ratio=0.01)
+    load = saltus.Load(frequency=0.5, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.5))
+    system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.5))
+    return saltus.find_orbit(system, theta_1=0.1, theta_2=-0.05, velocity=(0.0, 0.0))
+
+
+def test_the_section_lies_in_the_middle_of_the_longest_time_between_events(bouncing: saltus.PeriodicOrbit) -> None:
+    """And not between two impacts, where alone both layers are open: one of these soon comes to it along a branch."""
+    motion = bouncing.motion()
+    phases = np.sort(np.array([event.time for event in motion.events]) * bouncing.frequency % (2 * pi))
+    gaps = np.diff([*phases, phases[0] + 2 * pi])
+    apart = np.abs((phases - bouncing.signature.section + pi) % (2 * pi) - pi).min()
+    assert apart == pytest.approx(0.5 * gaps.max(), rel=1e-9)
+    branch = saltus.continue_orbit(bouncing, "load.frequency", (0.4, 0.6))
+    assert [str(end) for end in branch.ends] == ["bound 0.4", "bound 0.6"]
+    assert len({orbit.signature.section for orbit in branch.orbits}) == 1
+    assert max(orbit.defect for orbit in branch.orbits[::8]) < 1e-9
+
+
+def test_a_state_beside_a_section_at_which_a_layer_is_held_has_events(bouncing: saltus.PeriodicOrbit) -> None:
+    """A layer that is open by a little comes to rest by impacts as the first events of all: their list could not be read."""
+    problem, unknowns = bouncing.problem, bouncing.solution.unknowns
+    assert isinstance(problem, FollowedProblem)
+    held = problem.held(unknowns, bouncing.system)
+    assert len(held) == 2  # a coordinate and its velocity
+    for place in held:
+        for step in (-1e-6, 1e-6):
+            beside = unknowns.copy()
+            beside[place] += step
+            equations = problem.evaluate(beside, problem.values, with_extremes=True)
+            assert equations is None or equations.followed is not None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -73,6 +74,10 @@ class Events:
     def across(self, run: Continuation, cut: Cut) -> Any:
         """Where the curve goes on beyond a cut: at another point, or, if None, as it is."""
         return None
+
+    def first_step(self, points: Sequence[Any]) -> float:
+        """The longest first step with other equations, of a curve whose last point is the first one that solves them."""
+        return math.inf
 
     def stalled(self, run: Continuation, point: Any, step: float) -> Cut | End:
         """The end of the curve at a point from which even the shortest step fails, or the cut beyond which it goes on."""

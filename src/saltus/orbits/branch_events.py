@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,7 +26,7 @@ from saltus.orbits.images import (
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
 from saltus.orbits.switching_contacts import contact_change
-from saltus.orbits.switching_followed import beyond, change_at, events_at, refused_beyond, same_events, stalled_at
+from saltus.orbits.switching_followed import beyond, change_at, events_at, first_step, refused_beyond, same_events, stalled_at
 from saltus.orbits.symmetry import full_point
 from saltus.orbits.tolerances import TOLERANCES
 
@@ -187,6 +187,9 @@ class BranchEvents(OrbitEvents):
         if count > SETTINGS.most_impacts:
             return End(OrbitEnd.MANY_IMPACTS, value, detail=str(SETTINGS.most_impacts))
         return End(OrbitEnd.ACCUMULATES, value, detail=str(count)) if _accumulate(run, following) else following
+
+    def first_step(self, points: Sequence[OrbitPoint]) -> float:
+        return first_step(*points[-2:]) if isinstance(points[-1].orbit.problem, FollowedProblem) else math.inf
 
     def stalled(self, run: Run, point: OrbitPoint, step: float) -> Cut | End:
         """The end where even the shortest step fails: the orbit repels too strongly, or the reason is not known.

@@ -65,8 +65,10 @@ def _followed(base: Problem, motion: Motion, periods: int) -> tuple[Problem, np.
 def section_of(
     motion: Motion, frequency: float, phase: float | None = None, duration: float | None = None
 ) -> tuple[float, np.ndarray]:
-    """The phase farthest from all events at which the fewest coordinates are held, within the first `duration` of a motion, and
-    the state there; or the state at a phase that is given.
+    """The phase farthest from all events at which not all coordinates are held, within the first `duration` of a motion, and the
+    state there; or the state at a phase that is given.
+
+    The shorter the time between the events about it, the sooner one of them comes to it along a branch.
     """
     assert motion.dense is not None
     end = motion.time if duration is None else motion.start + duration
@@ -75,7 +77,8 @@ def section_of(
         spans, middles = np.diff(bounds), 0.5 * (bounds[1:] + bounds[:-1])
         closed, slides = modes_of(motion.system.model, motion.dense.states(middles)[2])
         held = sum((closed >> i & 1 for i in range(len(motion.system.model.contacts))), sum(s == 0 for s in slides))
-        time = float(middles[max(range(len(spans)), key=lambda i: (-held[i], spans[i]))])
+        moves = held < len(motion.system.model.coordinates)
+        time = float(middles[max(range(len(spans)), key=lambda i: (moves[i], spans[i]))])
     else:
         time = motion.start + (phase / frequency - motion.start) % (2.0 * np.pi / frequency)
     state = np.concatenate([np.atleast_1d(x) for x in motion.at(time)])

@@ -180,7 +180,8 @@ def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
     for last in np.flatnonzero(np.isin(codes[:, 0], (EventCode.HELD, EventCode.RESTING))):
         others = (codes[:last, 0] != EventCode.IMPACT) | (codes[:last, 1] & ~codes[last, 1] != 0)
         first = 1 + int(np.flatnonzero(others)[-1]) if others.any() else 0
-        growing = np.flatnonzero(speeds[first + 1 : last] > (1.0 + SETTINGS.grows) * speeds[first : last - 1])
+        run = speeds[first:last]
+        growing = np.flatnonzero(run[1:] > (1.0 + SETTINGS.grows) * run[:-1])
         dying[first + growing[-1] + 1 if growing.size else first : last] = True
     return dying
 

@@ -53,16 +53,24 @@ class FollowedProblem(Problem):
     def touching_speed(self, unknowns: np.ndarray, equations: Equations) -> float:
         return math.inf
 
-    def start_state(self, unknowns: np.ndarray, system: System) -> np.ndarray:
-        """The state at the section, with contacts closed, and frictions that stick, that are so but for rounding."""
-        state, own, names = unknowns.copy(), self.own, system.model.coordinates
+    def held(self, state: np.ndarray, system: System) -> dict[int, float]:
+        """The places of what does not move at a section, but for rounding, with its values there: coordinates that contacts hold,
+        their velocities, and the speeds of what sticks."""
+        found, own, names = dict[int, float](), self.own, system.model.coordinates
         for contact in system.model.contacts:
             place = names.index(contact.coordinate)
             if abs(contact.gap(state[place])) < CLOSED and abs(state[own + place]) < CLOSED:
-                state[place], state[own + place] = float(contact.position), 0.0
+                found |= {place: float(contact.position), own + place: 0.0}
         for friction in system.model.frictions:
             place, speed = own + names.index(friction.coordinate), float(friction.ground_speed)
-            state[place] = speed if abs(state[place] - speed) < CLOSED else state[place]
+            found |= {place: speed} if abs(state[place] - speed) < CLOSED else {}
+        return found
+
+    def start_state(self, unknowns: np.ndarray, system: System) -> np.ndarray:
+        """The state at the section, with contacts closed, and frictions that stick, that are so but for rounding."""
+        state = unknowns.copy()
+        for place, value in self.held(unknowns, system).items():
+            state[place] = value
         return state
 
     def within(self, unknowns: np.ndarray, equations: Equations, values: np.ndarray) -> tuple[np.ndarray, float]:

@@ -66,10 +66,10 @@ class CurveEvents(OrbitEvents):
             return found
         plain, change = without_condition(found.point), SpecialKind.GR
         if isinstance(point.orbit.problem, FollowedProblem):
-            special = change_at(replace(found.special, point=plain), without_condition(point)).special
-            if special is None:
-                return Cut(found.point, None)
-            change = SpecialKind[special.kind]
+            there = change_at(replace(found.special, point=plain), without_condition(point))
+            if isinstance(there, End) or there.special is None:
+                return there if isinstance(there, End) else Cut(found.point, None)
+            change = SpecialKind[there.special.kind]
         elif isinstance(point.orbit.problem, ContactProblem):
             change = contact_change(full_point(plain) if plain.orbit.symmetric else plain)
         kind = SpecialKind[f"{self.kind}_GR" if change is SpecialKind.GR else f"{self.kind}_SW"]

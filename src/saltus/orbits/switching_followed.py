@@ -39,12 +39,18 @@ class OtherSideSettings:
     # Distances at which an orbit is solved for on the other side: there the next event to change must not come before.
     probes: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
     near: float = 3.0  # How far from the point such an orbit may be, in these distances.
+    # Where the least of them led to none, the branch may turn round as soon: the first step is this many times the way to the
+    # orbit. A longer one goes over to the part beyond the fold.
+    first: float = 10.0
     # Where the map is continuous its residual so near to an orbit is no larger than this, a square root included.
     jump: float = 5e-3
     together: float = 1e-2  # Events of two orbits beside one another that are nearer than this are the same.
     refused: float = 10.0  # Steps ahead at which parameters are tried, where no step leads on.
     standing: float = 1e-11  # What moves by less sticks for good: slips grow as the third power of their duration.
     slow: float = 1e-2  # The largest speed of an impact that has just appeared.
+    # An orbit farther than this from other events, with none beside it, is at no change: what was solved for between two orbits
+    # lies on two branches.
+    far: float = 1e-3
     same: float = 0.01  # Share of such a distance within which two orbits at one value of the parameter are one.
     along: float = 1e-6  # The distance along a branch over which the section's tangent is carried to another section.
 
@@ -73,14 +79,17 @@ def same_events(reference: OrbitPoint) -> TestFunction:
     return TestFunction(SpecialKind.SW, value, 1e-12, one_sided=True)
 
 
-def change_at(zero: Zero, reference: OrbitPoint) -> Cut:
-    """The cut at a zero of `same_events`, with the kind of change; without a special point where none happens."""
+def change_at(zero: Zero, reference: OrbitPoint) -> Cut | End:
+    """The cut at a zero of `same_events`, with the kind of change; without a special point where none happens. An end where the
+    orbits beyond are none of the branch."""
     if _stands(zero.point):
         return Cut(zero.point, SpecialPoint(SpecialKind.AS, zero.point, zero.evidence))
     if events_at(zero.point).sequence == events_at(reference).sequence and _section_is_near(zero.point):
         return Cut(zero.point, None)
     sequence = events_at(reference).sequence
     other = next(_beside(zero.point, sequence), None)
+    if other is None and events_at(zero.point).distance > SETTINGS.far:
+        return End(CurveEnd.NOT_LOCATED, zero.parameter, SpecialKind.SW)
     if other is None:
         kind: SpecialKind | None = SpecialKind.SW
     elif _is_discontinuous(other):
@@ -101,7 +110,7 @@ def refused_beyond(point: OrbitPoint, step: float, bounds: Bounds) -> End | None
     return None
 
 
-def stalled_at(point: OrbitPoint, step: float) -> Cut | None:
+def stalled_at(point: OrbitPoint, step: float) -> Cut | End | None:
     """The cut at a point beyond which no step leads, if events change there: the branch turns round or ends."""
     sequence = events_at(point).sequence
     beside = next(_beside(point, sequence), None)
@@ -153,6 +162,12 @@ def other_events(point: OrbitPoint, sequence: EventSequence, points: Sequence[Or
     return End(reason, point.parameter, detail=detail)
 
 
+def first_step(point: OrbitPoint, ahead: OrbitPoint) -> float:
+    """The longest first step from an orbit with other events than those of the point beside it, or with another section."""
+    way = ahead.curve.norm(ahead.place - point.place)
+    return SETTINGS.first * way if way > SETTINGS.near * SETTINGS.probes[0] else np.inf
+
+
 def _lies_on(points: Sequence[OrbitPoint], ahead: OrbitPoint, same: float) -> bool:
     """Whether an orbit is one of a branch of these points: solved for between them, it is no farther away than `same`."""
     begun, sequence = End(OrbitEnd.START), events_at(ahead).sequence
@@ -179,8 +194,11 @@ def _is_discontinuous(equations: FollowedEquations) -> bool:
 
 def _beside(point: OrbitPoint, sequence: EventSequence) -> Iterator[FollowedEquations]:
     """The equations at places beside a point, not solved, at which the events are others than these or come at other times:
-    one for each other sequence at each distance."""
-    axes = np.eye(len(point.place)) / point.curve.weights
+    one for each other sequence at each distance. What is held at the section stays so, as it does on all orbits near."""
+    problem = point.curve.problem
+    assert isinstance(problem, FollowedProblem)
+    held = problem.held(point.solution.unknowns, problem.at(point.parameters))
+    axes = np.delete(np.eye(len(point.place)) / point.curve.weights, list(held), axis=0)
     for distance in SETTINGS.beside:
         known = set()
         for direction in (point.tangent, -point.tangent, *axes, *-axes):
