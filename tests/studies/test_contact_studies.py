@@ -9,10 +9,12 @@ import pytest
 
 import saltus
 from saltus import branch_of
-from saltus.flow import Outcome
+from saltus.attractors import Doubt, Unsettled, judge_unsettled
+from saltus.flow import Outcome, Stop
 from saltus.orbits import initial_states, orbits_near_returns, search_orbits, solved_near
 from saltus.plots import draw_diagram, draw_stability_chart
 from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
+from saltus.studies.chart.cell_outcomes import CellOutcome
 from saltus.studies.diagram.chaos_search import BandOrigin, BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EFFORTS, Effort
@@ -155,6 +157,23 @@ def test_a_search_finds_the_orbit_of_both_layers_and_says_what_it_searched():
     stable = [[orbit.amplitude for orbit in search.orbits if orbit.stable] for search in (both, reduced)]
     np.testing.assert_allclose(stable[0], stable[1], rtol=0, atol=1e-9)
     assert len(both.window) == 4
+
+
+def test_what_the_massless_hinge_ends_is_neither_rest_nor_settled():
+    """Without mass, under a large load: each motion ends at the hinge, so that it is not known where it would have gone."""
+    pressed = layers(TwoLayer, amplitude=0.9).with_({"load.vertical": -1.0})
+    window = check_window(None, pressed)
+    states = initial_states(pressed, 6, window, 0)
+    stops_of = {saltus.simulate(pressed, theta_1=a, theta_2=b, velocity=v, periods=400).stop for a, b, *v in states}
+    assert stops_of == {Stop.SINGULAR}
+    judged = judge_unsettled(pressed, states[None], {})
+    assert (judged.verdict[0], judged.doubt[0]) == (Unsettled.UNDECIDED, Doubt.LIMIT)
+    chart = stability_chart(pressed, horizontal=[0.9], vertical=[-1.0], starts=6)
+    assert (int(chart["outcome"][0, 0]), int(chart["unsettled"][0, 0])) == (CellOutcome.UNDECIDED, 6)
+    few = {"values": [1.0], "starts": 6, "max_period": 1, "bands": False}
+    diagram = response_spectrum(pressed, bounds=(0.995, 1.005), **few)
+    assert diagram["search"]["ended"].values.tolist() == [6]
+    assert diagram.attrs["ended_share"] > 0.9
 
 
 def fold_between_stops(e):

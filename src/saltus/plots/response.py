@@ -152,8 +152,10 @@ def draw_attractors(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: 
 def note_missed(ax: Any, spectrum: Any) -> None:
     """At the right above the axes: which share of a random sample of states ends on what the diagram lacks, with its interval."""
     share, low, high = (100 * float(spectrum.attrs.get(f"missed_{name}", np.nan)) for name in ("share", "low", "high"))
+    ended = 100 * float(spectrum.attrs.get("ended_share", 0.0))
     if np.isfinite(share):
-        ax.set_title(f"missed: {share:.2g} % ({low:.2g} to {high:.2g})", loc="right", pad=4, fontsize=7)
+        cut = f"; ended at a limit: {ended:.2g} %" if ended > 0 else ""
+        ax.set_title(f"missed: {share:.2g} % ({low:.2g} to {high:.2g}){cut}", loc="right", pad=4, fontsize=7)
 
 
 def draw_bands(ax: Any, spectrum: Any) -> None:

@@ -6,7 +6,7 @@ Charts and diagrams both ask this function, so that they cannot contradict each 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,7 @@ class Doubt(NumberedSentence):
     NEAR_ZERO = 1, "the largest exponent is not surely above or below 0"
     FEW_SETTLED = 2, "some motions settled, too few to tell a long transient from chaos beside one"
     NO_EXPONENT = 3, "the motions rest or end before an exponent is known"
+    LIMIT = 4, "a limit of the model ends all motions"
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class Judged:
     doubt: np.ndarray  # (n,): a `Doubt` each
     exponent: np.ndarray  # (n,): the largest one of what has not settled, per unit of time; nan where all settled at once
     error: np.ndarray  # (n,): half width of its 95 % interval
-    gone: np.ndarray  # (n,): how many companions have settled
+    gone: np.ndarray  # (n,): how many companions have settled, or were ended by a limit of the model
     life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the one that is excluded with 95 %
     period: np.ndarray  # (n,): forcing periods after which a periodic motion repeats itself, 0 where that is not known
     states: np.ndarray  # (n, companions, d): the last stroboscopic states, of survivors where there are any
@@ -103,14 +104,17 @@ class Judged:
 class SettledLater:
     """Periodic motions on which companions settled."""
 
-    question: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))  # (k,): the number of the question
-    state: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # (k, d): at phase 0
-    period: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))  # (k,): in forcing periods
+    question: np.ndarray  # (k,): the number of the question
+    state: np.ndarray  # (k, d): at phase 0
+    period: np.ndarray  # (k,): in forcing periods
+
+    @classmethod
+    def none(cls, dimension: int) -> SettledLater:
+        """No motions, of so many state variables."""
+        return cls(np.zeros(0, dtype=int), np.zeros((0, dimension)), np.zeros(0, dtype=int))
 
     def joined(self, other: SettledLater) -> SettledLater:
         """These and others."""
-        if not len(self.question):  # of as many state variables as the others
-            return other
         return SettledLater(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in ("question", "state", "period")))
 
 
@@ -177,12 +181,13 @@ class _Judgement:
     exponent: np.ndarray
     error: np.ndarray
     period: np.ndarray
-    gone: np.ndarray  # (n,): number of companions that have settled
+    gone: np.ndarray  # (n,): number of companions that have settled, or have ended
+    ended: np.ndarray  # (n,): number of those that a limit of the model has ended
     exposure: np.ndarray  # (n,): forcing periods of companions in all
     before: np.ndarray  # (n,): those of the rounds up to the last one in which any settled
     all_gone: np.ndarray  # (n,): whether no companion is left
     looked: np.ndarray  # (n,): whether a long period was looked for
-    settled: SettledLater = field(default_factory=SettledLater)
+    settled: SettledLater
 
     @classmethod
     def begin(
@@ -195,13 +200,13 @@ class _Judgement:
             chosen[row] = _companions(system, given[np.isfinite(given).all(axis=-1)], settings)
         columns = {path: np.broadcast_to(np.asarray(values, dtype=float), n) for path, values in parameters.items()}
         flags = (np.zeros(n, dtype=bool) for _ in range(4))
-        zeros = (np.zeros(n, dtype=int) for _ in range(4))
+        zeros = (np.zeros(n, dtype=int) for _ in range(5))
         positive, negative, all_gone, looked = flags
-        period, gone, exposure, before = zeros
+        period, gone, ended, exposure, before = zeros
         empty = np.full((2, n), np.nan)
         return cls(
             system, columns, settings, chosen, np.ones(n, dtype=bool), positive, negative, empty[0], empty[1],
-            period, gone, exposure, before, all_gone, looked,
+            period, gone, ended, exposure, before, all_gone, looked, SettledLater.none(system.dimension),
         )  # fmt: skip
 
     def take(self, earlier: Earlier) -> None:
@@ -235,6 +240,7 @@ class _Judgement:
         left = (~moving).sum(axis=1)
         self.exposure[rows] += np.ceil(ends.periods).astype(int).reshape(shape).sum(axis=1)
         self.gone[rows] += left
+        self.ended[rows] += ends.ended.reshape(shape).sum(axis=1)
         self.before[rows] = np.where(left > 0, self.exposure[rows], self.before[rows])
         for i, row in enumerate(rows):
             survivors = last[i][moving[i]]
@@ -307,8 +313,10 @@ class _Judgement:
         verdict, doubt = np.full(n, Unsettled.UNDECIDED), np.full(n, Doubt.NEAR_ZERO)
         lasts = self.positive & ~self.all_gone & self.lasts
         some = self.positive & ~self.lasts
-        transient = self.all_gone | (some & (self.gone >= self.settings.settled))
+        cut = self.all_gone & (self.ended == self.gone)
+        transient = (self.all_gone & ~cut) | (some & (self.gone >= self.settings.settled))
         doubt[some], doubt[np.isnan(self.exponent)] = Doubt.FEW_SETTLED, Doubt.NO_EXPONENT
+        doubt[cut] = Doubt.LIMIT
         periodic = (self.negative | (self.period > 0)) & ~self.all_gone
         for chosen, kind in ((periodic, Unsettled.PERIODIC), (transient, Unsettled.TRANSIENT), (lasts, Unsettled.CHAOTIC)):
             verdict[chosen], doubt[chosen] = kind, Doubt.NONE

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import Recurrence, approached, find_recurrence
+from saltus.flow import Outcome, Recurrence, approached, find_recurrence
 from saltus.orbits import initial_states, rest_state, states_beside
 from saltus.studies.chart.cell_outcomes import outcomes
 from saltus.studies.chart.cell_verdicts import CellVerdicts
@@ -58,6 +58,7 @@ class CellOutcomes:
     captured: np.ndarray  # at rest, for all later loads
     tiny: np.ndarray  # on motions smaller than those that count
     unsettled: np.ndarray  # chaotic, slow, or of a longer period
+    ended: np.ndarray  # by a limit of the model
     moving: np.ndarray  # of dtype `motion_type`: these motions, where they are at the end
 
 
@@ -84,13 +85,16 @@ def computed(request: ChartRequest) -> tuple[dict[str, np.ndarray], np.ndarray]:
 
 
 def _verdicts(settled: CellOutcomes, judged: CellVerdicts) -> dict[str, np.ndarray]:
-    """The variables of a chart that follow from the judgement; starts that settle after all are counted no longer."""
+    """The variables of a chart that follow from the judgement; starts that settle after all are counted no longer.
+
+    Of those that a limit of the model has ended nothing more can be known.
+    """
     unsettled, size = settled.unsettled.copy(), len(settled.unsettled)
     unsettled[judged.cell[judged.settles]] = 0
     columns = {"verdict": np.zeros(size, dtype=int), "exponent": np.full(size, np.nan), "exponent_error": np.full(size, np.nan)}
     for name, values in zip(columns, (judged.verdict, judged.exponent, judged.error), strict=True):
         columns[name][judged.cell] = values
-    return columns | {"unsettled": unsettled}
+    return columns | {"unsettled": unsettled + settled.ended}
 
 
 def beyond_limits(system: System, parameters: Mapping[str, np.ndarray], amplitude: np.ndarray) -> dict[str, np.ndarray]:
@@ -136,7 +140,7 @@ def starts(system: System, count: int, window: Window, seed: int) -> np.ndarray:
 def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: np.ndarray | None = None) -> CellOutcomes:
     """Follow motions from states (n, d) at phase 0 in the cells of these numbers until they settle, or come to a known one."""
     total, least = math.prod(request.shape), request.least
-    captured, tiny, unsettled = (np.zeros(total, dtype=np.int64) for _ in range(3))
+    captured, tiny, unsettled, ended = (np.zeros(total, dtype=np.int64) for _ in range(4))
     record = motion_type(request.system.dimension)
     moving, found, left = np.zeros(len(cell), record), [np.empty(0, record)], []
     moving["cell"], moving["state"], moving["starts"], moving["amplitude"] = cell, states, 1, np.inf
@@ -145,7 +149,10 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
             many = np.bincount(moving["cell"], minlength=total)[moving["cell"]] > SETTINGS.patient_with
             left.append(moving[many])
             moving = moving[~many]
-        moving, rests, fading = _followed(request, moving, math.ceil(share * request.periods))
+        moving, outcome, fading = _followed(request, moving, math.ceil(share * request.periods))
+        _count(ended, moving[outcome == Outcome.ENDED])
+        moving, outcome, fading = (values[outcome != Outcome.ENDED] for values in (moving, outcome, fading))
+        rests = outcome == Outcome.REST
         _count(captured, moving[rests])
         settled = moving["period"] > 0
         # The first one that comes to rest in its cell shows that there is rest, however many impacts it takes.
@@ -160,7 +167,7 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
     _count(tiny, moving[small])
     unfinished = np.concatenate([*left, moving[~small]])
     _count(unsettled, unfinished)
-    return CellOutcomes(distinct(np.concatenate(found)), captured, tiny, unsettled, unfinished)
+    return CellOutcomes(distinct(np.concatenate(found)), captured, tiny, unsettled, ended, unfinished)
 
 
 def _count(number: np.ndarray, motions: np.ndarray) -> None:
@@ -169,14 +176,14 @@ def _count(number: np.ndarray, motions: np.ndarray) -> None:
 
 
 def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The motions some forcing periods later, with the period of those that have settled, which of them are captured, and the
+    """The motions some forcing periods later, with the period of those that have settled, the `Outcome` of each, and the
     amplitude in the last period of those that fade.
 
     What is about to settle is put where it is going.
     """
     motions = motions.copy()
     if not len(motions):
-        return motions, np.zeros(0, dtype=bool), np.zeros(0)
+        return motions, np.zeros(0, dtype=int), np.zeros(0)
     ends = find_recurrence(
         request.system,
         motions["state"],
@@ -198,7 +205,7 @@ def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple
     motions["slowest"] = 0.0 if ends.speeds is None else ends.slowest
     motions["state"], motions["period"], motions["impact_count"] = state, ends.period, ends.impact_count
     motions["amplitude"], motions["other"] = np.maximum(high, low), np.minimum(high, low)
-    return motions, ends.rest, _fading(ends, motions["amplitude"])
+    return motions, ends.outcome, _fading(ends, motions["amplitude"])
 
 
 def _fading(ends: Recurrence, amplitude: np.ndarray) -> np.ndarray:

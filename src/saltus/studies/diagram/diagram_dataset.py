@@ -55,6 +55,7 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
         missed_share=search.missed.share,
         missed_low=low,
         missed_high=high,
+        ended_share=search.missed.ended_share,
         missed=search.missed.missed,
         samples_tried=search.missed.samples,
     )
@@ -167,9 +168,11 @@ def _searched(search: DiagramSearch) -> xarray.Dataset:
     import xarray
 
     first = search.found.motions.only(slice(0, len(search.grid) * search.effort.starts))
-    unsettled, at_rest = (which.reshape(len(search.grid), -1).sum(axis=1) for which in (first.unsettled, first.at_rest))
+    outcomes = (first.unsettled, first.at_rest, first.ended)
+    unsettled, at_rest, ended = (which.reshape(len(search.grid), -1).sum(axis=1) for which in outcomes)
     columns = {
         "unsettled": ("searched", unsettled, {"long_name": "motions that did not settle: slow, of a long period, or chaotic"}),
         "at_rest": ("searched", at_rest, {"long_name": "motions that came to rest"}),
+        "ended": ("searched", ended, {"long_name": "motions that a limit of the model ended"}),
     }
     return xarray.Dataset(columns, coords={"searched": ("searched", search.grid, {"long_name": search.path})})

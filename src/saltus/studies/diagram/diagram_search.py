@@ -49,11 +49,17 @@ class MissedShare:
     missed: int = 0  # motions of the sample that do
     sample: int = 0
     samples: int = 0  # how many samples were tried; this is the last one
+    ended: int = 0  # motions of the sample that a limit of the model ends: it is not known where they would have gone
 
     @property
     def share(self) -> float:
         """The estimate; nan without a sample."""
         return self.missed / self.sample if self.sample else np.nan
+
+    @property
+    def ended_share(self) -> float:
+        """The share of the sample that a limit of the model ends; nan without a sample."""
+        return self.ended / self.sample if self.sample else np.nan
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -258,7 +264,7 @@ class DiagramSearch:
             self._place()
             unknown = self.found.place[self.found.attractor[first:]] != Place.ON_BRANCH
             missed = (motions.periodic & unknown) | (motions.unsettled & ~self._in_bands(motions.value))
-            self.missed = MissedShare(int(missed.sum()), len(motions), number + 1)
+            self.missed = MissedShare(int(missed.sum()), len(motions), number + 1, int(motions.ended.sum()))
             if not follow or not missed.any():
                 return
             self.found.reopen(np.arange(first, len(self.found.motions)))

@@ -74,6 +74,11 @@ class SimulatedMotions:
         return np.asarray(self.outcome == Outcome.MOVING)
 
     @property
+    def ended(self) -> np.ndarray:
+        """Which a limit of the model has ended, (n,)."""
+        return np.asarray(self.outcome == Outcome.ENDED)
+
+    @property
     def at_rest(self) -> np.ndarray:
         """Which are at rest at the contact, (n,)."""
         return np.asarray((self.outcome == Outcome.REST) | (self.outcome == Outcome.HELD))
