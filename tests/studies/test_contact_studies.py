@@ -119,6 +119,19 @@ def test_chaos_between_two_walls_is_a_band_and_regular_motion_beside_it_is_none(
     assert abs(np.mean(growth[20:]) / length - found) < 3 * math.hypot(error, its_error / 2)
 
 
+def test_chaos_at_inner_values_alone_is_followed_to_the_ends_of_the_range():
+    """Between two stops there is chaos up to the end of the range, and none at its beginning. A band ended at the outermost value
+    that was given, as if the range did."""
+    coarse = replace(EFFORTS[Effort.QUICK].chaos, step=0.3, fine_step=0.3, edge=0.3, beside=())
+    at, area = np.full(4, 1.7), check_window(None, stops())
+    begun = followed(stops(0.9), FORCE, at, initial_states(stops(), 4, area, 0), 300)
+    search = BandSearch(DiagramWork(stops(0.9), FORCE), (1.1, 1.9), coarse)
+    search.look(begun)
+    (band,) = search.bands.bands
+    assert band.high == 1.9
+    assert 1.1 < band.lower.outer < band.low <= 1.7
+
+
 def test_a_chart_of_both_layers_is_the_reduced_one_where_the_closed_layer_stays_closed():
     """At V = -1 the closed layer stays closed for H up to 0.25, at V = -0.5 and H = 0.25 it does not (docs/both_layers.md)."""
     axes = {"horizontal": [0.05, 0.15, 0.25], "vertical": [-1.0, -0.5], "starts": 6}

@@ -211,8 +211,12 @@ class BandSearch:
             self.place(float(motions.value[i])).settle(*facts, motions.last[i])
 
     def spread(self) -> None:
-        """Carry what goes on to neighbouring values: motions begun on it, as long as they find more."""
+        """Carry what goes on to neighbouring values, and chaos to the ends of the range where no value lies beyond: motions begun
+        on it, as long as they find more."""
         while True:
+            for bound, outermost in zip(self.bounds, (self.places[:1], self.places[-1:]), strict=True):
+                if any(place.chaotic for place in outermost):
+                    self.place(bound)
             marked = [(place, place.goes_on) for place in self.places]
             pairs = [(a, b) if on else (b, a) for (a, on), (b, other) in pairwise(marked) if on != other]
             fresh = [(a, b) for a, b in pairs if (a.value, b.value) not in self.carried]
