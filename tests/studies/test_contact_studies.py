@@ -251,7 +251,7 @@ def test_a_stored_diagram_of_two_stops_is_the_one_without_a_store_and_is_found_a
 
 def test_of_special_points_that_crowd_only_some_are_looked_beside(monkeypatch):
     begun = []
-    settings = replace(EFFORTS[Effort.QUICK].chaos, beside=(0.0,), apart=0.1)
+    settings = replace(EFFORTS[Effort.QUICK].chaos, beside=(0.0,), spacing=0.1)
     search = BandSearch(DiagramWork(stops(), FORCE), (1.0, 2.0), settings)
     monkeypatch.setattr(search, "follow", lambda values, starts: begun.extend(values))
     search.beside_special_points([BandOrigin("LP", value, (0.0, 0.5)) for value in (1.3, 1.0, 1.05, 1.125)])

@@ -229,7 +229,7 @@ class BandSearch:
         """Begin motions on the orbits of special points at values beside these."""
         chosen: list[BandOrigin] = []
         for origin in sorted(special, key=lambda origin: origin.value):
-            if not chosen or origin.value - chosen[-1].value >= self.settings.apart * self.span:
+            if not chosen or origin.value - chosen[-1].value >= self.settings.spacing * self.span:
                 chosen.append(origin)
         values = [(origin.value + share * self.span, origin.state) for origin in chosen for share in self.settings.beside]
         inside = [(value, state) for value, state in values if self.bounds[0] <= value <= self.bounds[1]]

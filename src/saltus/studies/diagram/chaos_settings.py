@@ -25,7 +25,7 @@ class ChaosSettings:
     states: int = 8  # Last states of each unsettled motion that are given to the judgement.
     # Shares of the range beside a special point at which motions from its orbit are begun: narrow bands begin there.
     beside: tuple[float, ...] = (-4e-4, -1.5e-4, 1.5e-4, 4e-4)
-    apart: float = 0.0  # Share of the range: of special points that are nearer to one another only the first one is taken.
+    spacing: float = 0.0  # Share of the range: of special points that are nearer to one another only the first one is taken.
     same: float = 1e-7  # Special points are one that differ by less than this in their states and, as a share, in the parameter.
     # Judgements of rising care. The first one is made at all values, and excludes lives below 660 forcing periods; the second one
     # at edges and at some values between them (6600). The third one is made at those of them beside which companions settled,

@@ -62,7 +62,7 @@ EFFORTS = {
             edge=1e-3,
             judgements=(replace(CHAOS.judgements[0], longest_run=400, patience=1000),),
             beside=(-4e-4, 4e-4),
-            apart=1e-2,
+            spacing=1e-2,
         ),
     ),
     Effort.STANDARD: EffortSettings(
