@@ -313,21 +313,6 @@ def check_reached(model: Any, coordinate: str, values: Any, name: str) -> None:
             raise ParameterError(f"{coordinate} = {beyond[0]:g} lies beyond {where}; leave such values out", name)
 
 
-def check_leaving(model: Any, coordinate: str, positions: Any, velocities: Any, name: str) -> None:
-    """Refuse starts at one of several contacts that move into it.
-
-    Raises
-    ------
-    ParameterError
-        Of the argument `name`, with the first such velocity and the contact.
-    """
-    at, rates = np.broadcast_arrays(np.atleast_1d(positions), np.atleast_1d(velocities))
-    for contact in model.contacts:
-        if contact.coordinate == coordinate and (into := rates[(contact.gap(at) == 0.0) & (contact.sign * rates < 0.0)]).size:
-            where = f"the contact {contact.name!r} at {coordinate} = {float(contact.position):g}"
-            raise ParameterError(f"a velocity of {into[0]:g} moves into {where}; leave such starts out", name)
-
-
 def check_names(name: str, values: Any, meaning: str) -> tuple[str, ...]:
     """The texts of a list, or a single one.
 

@@ -13,10 +13,10 @@ from saltus.attractors.attractor import REST, UNDECIDED, Attractor, Attractors
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.registry import NoLabel, Registry
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.checks import check_count, check_leaving, check_number, check_reached, check_starts, check_states
+from saltus.checks import check_count, check_number, check_reached, check_starts, check_states
 from saltus.errors import ParameterError
 from saltus.flow import RECURRENCE, find_recurrence
-from saltus.orbits import Branch, PeriodicOrbit, initial_states
+from saltus.orbits import Branch, PeriodicOrbit, before_impacts, initial_states
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.systems import System
@@ -43,7 +43,6 @@ def _check(
     further = check_states("also", also, system.dimension)
     for place, coordinate in enumerate(system.model.coordinates):
         check_reached(system.model, coordinate, further[:, place], "also")
-        check_leaving(system.model, coordinate, further[:, place], further[:, len(system.model.coordinates) + place], "also")
     check_starts(starts)
     check_count("max_period", max_period, 1, RECURRENCE.compiled_max_period)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
@@ -90,7 +89,8 @@ def find_attractors(
     known
         Stable orbits, or branches of which those at the system's parameter are taken, that count as attractors too.
     also
-        Further initial states (n, d), coordinates and velocities, which do not count in the shares.
+        Further initial states (n, d), coordinates and velocities, which do not count in the shares; those at a contact that move
+        into it are taken just before the impact.
     tol
         The error of a step, as for `simulate_many`.
     progress
@@ -112,7 +112,8 @@ def find_attractors(
     states, registry = initial_states(clock, starts, area, seed), Registry(clock)
     for orbit in _known(system, known):
         registry.add_orbit(orbit)
-    labels = _assigned(registry, np.concatenate([states, further]), max_period, tol, progress)
+    begun = np.concatenate([states, before_impacts(clock, further)])
+    labels = _assigned(registry, begun, max_period, tol, progress)
     registry.add_images()
     final = final_labels(registry.members)
     counts = np.bincount(labels[:starts][labels[:starts] >= 0], minlength=len(registry.members))

@@ -94,6 +94,19 @@ def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.
     return moved
 
 
+def before_impacts(system: System, states: np.ndarray) -> np.ndarray:
+    """States (..., d) in which what is at one of several contacts and moves into it is short of it by one rounding.
+
+    That is the state just before its impact, which comes at once.
+    """
+    names, moved = system.model.coordinates, states.copy()
+    for contact in system.model.contacts:
+        place, position = names.index(contact.coordinate), float(contact.position)
+        into = (np.asarray(contact.gap(moved[..., place])) == 0.0) & (contact.sign * moved[..., len(names) + place] < 0.0)
+        moved[..., place] = np.where(into, np.nextafter(position, position + contact.sign), moved[..., place])
+    return moved
+
+
 def held_by_contacts(system: System, states: np.ndarray) -> np.ndarray:
     """Which of the variables of states (..., d) are those of coordinates at rest at a contact, (..., d)."""
     names, held = system.model.coordinates, np.zeros(states.shape, dtype=bool)

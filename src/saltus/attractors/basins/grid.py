@@ -21,7 +21,6 @@ from saltus.checks import (
     LIMITS,
     check_axis,
     check_count,
-    check_leaving,
     check_memory,
     check_number,
     check_reached,
@@ -73,11 +72,8 @@ def _check(
 ) -> None:
     grid = _grid(with_clock(system), velocity, coordinates, found)
     axes = dict(zip(grid.plane, (grid.horizontal, grid.vertical), strict=True))
-    model, names = system.model, state_names(system.model.coordinates)
-    for name, speed in zip(names[: len(names) // 2], names[len(names) // 2 :], strict=True):
-        check_reached(model, name, axes.get(name, grid.fixed[name]), name)
-        if name not in axes:
-            check_leaving(model, name, grid.fixed[name], axes.get(speed, grid.fixed[speed]), speed)
+    for name in system.model.coordinates:
+        check_reached(system.model, name, axes.get(name, grid.fixed[name]), name)
     check_count("periods", periods, 32)
     check_number("within", within, above=0.0)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)

@@ -9,6 +9,7 @@ import numpy as np
 from saltus.attractors.attractor import SAME_STATE, UNDECIDED, Target
 from saltus.attractors.kind import AttractorKind
 from saltus.flow import Recurrence, find_recurrence
+from saltus.orbits import before_impacts
 from saltus.progress import Progress, silent
 from saltus.systems import System
 
@@ -39,7 +40,11 @@ class Labelling:
     tol: float
 
     def of(self, states: np.ndarray, progress: Progress = silent) -> tuple[np.ndarray, np.ndarray]:
-        """The labels of states (n, 2), UNDECIDED where no label is certain, and the times to reach the attractors, (n,) each."""
+        """The labels of states (n, d), UNDECIDED where no label is certain, and the times to reach the attractors, (n,) each.
+
+        States at a contact that move into it are those just before the impact.
+        """
+        states = before_impacts(self.system, states)
         label, time = np.empty(len(states), dtype=np.int16), np.empty(len(states))
         size = max(SETTINGS.fewest, SETTINGS.most_states // self.periods)
         for start in range(0, len(states), size):
