@@ -61,7 +61,7 @@ def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
     handles = _cell_handles(chart)
     if chart is not data:
         dots = draw_lines(ax, data)
-        handles += _line_handles(border_curves(data), "static" in data.children)
+        handles += _line_handles(border_curves(data), "static" in data.children, bool(_resting(chart).any()))
         handles += [Line2D([], [], **DOT, label="end of motions")] if dots else []
     if handles:
         legend_of(ax, own, handles, ncols=2, columnspacing=1.4, handletextpad=0.6)
@@ -232,7 +232,7 @@ def _cell_handles(chart: Any) -> list[Any]:
     return [handle for where, handle in handles if bool(where.any())]
 
 
-def _line_handles(curves: Iterable[Any], static: bool) -> list[Any]:
+def _line_handles(curves: Iterable[Any], static: bool, rest: bool) -> list[Any]:
     """What the lines of borders mean, those that are there."""
     kinds = {str(curve.attrs["kind"]) for curve in curves}
     handles = [
@@ -240,13 +240,13 @@ def _line_handles(curves: Iterable[Any], static: bool) -> list[Any]:
         Line2D([], [], **PRINTED_LINE, label=r"$\widehat{\mathcal{H}}_{cr}^{QS}$ where it is not"),
     ]
     exact = [Line2D([], [], color=INK, lw=0.7, ls=BORDERS[kind], label=BORDER_NAMES[kind]) for kind in BORDERS if kind in kinds]
-    heavy = [Line2D([], [], **BESIDE_REST, label="beside rest alone")] if exact else []
+    heavy = [Line2D([], [], **BESIDE_REST, label="beside rest alone")] if exact and rest else []
     return (handles if static else []) + heavy + exact
 
 
 def chart_legend(figure: Any, charts: Sequence[Any], curves: Sequence[Any], closed_form: bool = False) -> None:
     """What the lines and fillings mean, below all panels."""
-    handles = _line_handles(curves, static=True)
+    handles = _line_handles(curves, static=True, rest=True)
     handles.append(Line2D([], [], **LINE_LIMIT, label=r"max$|\theta|=\pi-\beta_0$"))
     handles += _fillings(charts)
     if closed_form:
