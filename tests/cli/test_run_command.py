@@ -151,9 +151,11 @@ REFUSED = {
     "two_attractors": (TWO + "[attractors]\nwindow = [[-1, 1], [-1, 1]]\n", ", line 9", "4 pairs (least, largest)"),
     "two_diagram": (TWO + "[response_spectrum]\nwindow = [[-1, 1], [-1, 1]]\n", ", line 9", "4 pairs (least, largest)"),
     "two_chart": (
-        TWO + "[stability_chart]\ncurves = 2\n",
-        ", line 8",
-        "the borders of a chart is for models with one coordinate",
+        TWO
+        + '[stability_chart]\npaths = ["load.frequency", "load.vertical"]\nhorizontal = [0.5, 1]\n'
+        + "window = [[-1, 1], [-1, 1]]\ncurves = 2\n",
+        ", line 11",
+        "4 pairs (least, largest)",
     ),
     "curves": (FORCED + RESTITUTION + "[basins]\ncurves = true\n", ", line 12", "cannot be followed backward"),
     "constant_chart": (CONSTANT + CHART, ", line 8", "a stability chart needs a load with a frequency"),
