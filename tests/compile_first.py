@@ -1,16 +1,29 @@
 """Compile what nearly every test needs, two parts at a time: workers that start together would each compile it for themselves."""
 
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 
-from saltus.flow.compiled import load_kernel, load_segments
+from saltus.flow.compiled import load_contact_segments, load_contacts_kernel, load_kernel, load_segments
 from saltus.flow.ensemble.compiled_lanes import load_driver, load_helpers
+
+# The kernels that all models share, those that take longest first.
+PARTS = {
+    "driver": load_driver,
+    "driver for contacts": partial(load_driver, several=True),
+    "kernel": load_kernel,
+    "kernel for contacts": load_contacts_kernel,
+    "segments for contacts": load_contact_segments,
+    "segments": load_segments,
+    "helpers": load_helpers,
+    "helpers for contacts": partial(load_helpers, several=True),
+}
 
 
 def compile_part(name: str) -> None:
     """One of the kernels that all models share."""
-    {"driver": load_driver, "kernel": load_kernel, "segments": load_segments, "helpers": load_helpers}[name]()
+    PARTS[name]()
 
 
 if __name__ == "__main__":
     with ProcessPoolExecutor(2) as processes:
-        list(processes.map(compile_part, ("driver", "kernel", "segments", "helpers")))
+        list(processes.map(compile_part, PARTS))
