@@ -11,7 +11,7 @@ import numpy as np
 from saltus.attractors.stroboscopic_section import section_states
 from saltus.errors import MotionError
 from saltus.flow import EventKind, Stop, nearest_return, simulate
-from saltus.orbits import PeriodicOrbit, Signature, orbit_from, problem_of
+from saltus.orbits import PeriodicOrbit, Signature, orbit_from, problem_of, start_at
 from saltus.systems import System
 
 
@@ -109,15 +109,3 @@ def stays_at_rest(system: System, state: np.ndarray) -> bool:
     motion = simulate(system, **start_at(system, state), periods=1, dense=False)
     lets_go = (EventKind.IMPACT, EventKind.RELEASE, EventKind.SLIP)
     return motion.stop is Stop.REST and not any(event.kind in lets_go for event in motion.events)
-
-
-def start_at(system: System, state: np.ndarray) -> dict[str, Any]:
-    """A state (coordinates, velocities) as `simulate` takes it."""
-    names = system.model.coordinates
-    velocities = tuple(map(float, state[len(names) :]))
-    return {**dict(zip(names, map(float, state), strict=False)), "velocity": velocities[0] if len(names) == 1 else velocities}
-
-
-def state_vector(system: System, state: dict[str, Any]) -> np.ndarray:
-    """The inverse of `start_at`: coordinates, then velocities, (d,)."""
-    return np.append([state[name] for name in system.model.coordinates], state["velocity"])

@@ -9,11 +9,11 @@ import numpy as np
 
 from saltus.attractors.attractor import SAME_STATE, UNDECIDED, Attractor, Target
 from saltus.attractors.kind import AttractorKind
-from saltus.attractors.orbit_certificate import solved_orbit, start_at, state_vector, stays_at_rest
+from saltus.attractors.orbit_certificate import solved_orbit, stays_at_rest
 from saltus.attractors.stroboscopic_section import section_states
 from saltus.attractors.verdict.classification import classify
 from saltus.flow import Recurrence, extrema_names, motions_from, stroboscopic
-from saltus.orbits import PeriodicOrbit, is_symmetric, rest_state
+from saltus.orbits import PeriodicOrbit, is_symmetric, rest_state, start_at, state_vector
 from saltus.systems import System, image_of
 
 

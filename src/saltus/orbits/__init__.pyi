@@ -16,7 +16,17 @@ from .signature import Signature
 from .special_curve import SpecialCurve
 from .special_curve_continuation import continue_special
 from .special_point import OrbitEnd, SpecialKind, SpecialPoint
-from .starts import before_impacts, even_steps, initial_states, is_still, rest_state, states_beside, within_window
+from .starts import (
+    before_impacts,
+    even_steps,
+    initial_states,
+    is_still,
+    rest_state,
+    start_at,
+    state_vector,
+    states_beside,
+    within_window,
+)
 from .switching import Cascade, doubling_cascade, switch_branch
 from .symmetry import is_symmetric, keeps_symmetry
 from .verify import closing_distances, closing_rows, defects, same_orbit
@@ -64,6 +74,8 @@ __all__ = [
     "search_orbits",
     "solve",
     "solved_near",
+    "start_at",
+    "state_vector",
     "states_beside",
     "switch_branch",
     "transmissibility",

@@ -17,7 +17,7 @@ from saltus.orbits.contact_problem import problem_of
 from saltus.orbits.find import orbit_from
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
-from saltus.orbits.starts import held_by_contacts, states_beside
+from saltus.orbits.starts import held_by_contacts, start_at, states_beside
 from saltus.orbits.verify import same_orbit
 from saltus.systems import System
 
@@ -80,10 +80,8 @@ def orbits_near_returns(
 
 def solved_near(system: System, path: str, state: np.ndarray, period: int) -> PeriodicOrbit | None:
     """The orbit of a system near a state at phase 0 that nearly repeats itself, to be followed along a parameter; or None."""
-    names, base = system.model.coordinates, problem_of(system, Signature((), 1), (path,))
-    velocity: Any = float(state[1]) if len(names) == 1 else tuple(map(float, state[len(names) :]))
     try:
-        orbit = orbit_from(base, {**dict(zip(names, map(float, state), strict=False)), "velocity": velocity}, period)
+        orbit = orbit_from(problem_of(system, Signature((), 1), (path,)), start_at(system, state), period)
     except MotionError:
         return None
     return orbit if orbit is not None and orbit.admissible and orbit.amplitude > SETTINGS.still else None

@@ -19,6 +19,7 @@ from saltus.orbits.followed_problem import FollowedProblem
 from saltus.orbits.newton import NEWTON_ITERATIONS, Solution, solve
 from saltus.orbits.problem import Problem
 from saltus.orbits.signature import Signature
+from saltus.orbits.starts import start_at
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.public_functions import answering
 from saltus.result import Result
@@ -240,20 +241,14 @@ class PeriodicOrbit(Result):
         """
         if isinstance(self.problem, (ContactProblem, FollowedProblem)):
             state, time = self.problem.within(self.solution.unknowns, self.solution.equations, self.solution.values)
-            return {**self._named(state), "time": time}
+            return {**start_at(self.system, state), "time": time}
         if not self.signature.sides:
-            return self._named(self.solution.unknowns)
+            return start_at(self.system, self.solution.unknowns)
         model, load, impact = self.system.model, self.system.load, self.system.impact
         side, time = int(self.sides[0]), float(self.impact_times[0])
         inward = -np.sign(float(model.gap(model.contact + 1.0, side)) - float(model.gap(model.contact, side)))
         _, after = model.reset(time, float(inward * self.speeds[0]), side, load, impact)
         return {model.coordinates[0]: float(model.contact), "velocity": float(after), "time": time}
-
-    def _named(self, state: np.ndarray) -> dict[str, Any]:
-        """A state by the names that `simulate` takes."""
-        n = self.problem.own
-        velocity = float(state[n]) if n == 1 else tuple(map(float, state[n:]))
-        return {**dict(zip(self.system.model.coordinates, map(float, state[:n]), strict=True)), "velocity": velocity}
 
     def motion(self, periods: float | None = None, tol: float = 1e-13) -> Motion:
         """The exact motion from its state, over one period of the orbit if nothing else is given.

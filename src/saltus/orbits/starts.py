@@ -135,3 +135,15 @@ def _held(system: System, states: np.ndarray, window: Window) -> np.ndarray:
             states[..., rows, place] = positions[np.abs(at[..., None] - positions).argmin(axis=-1)]
             states[..., rows, len(names) + place] = 0.0
     return states
+
+
+def start_at(system: System, state: np.ndarray) -> dict[str, Any]:
+    """A state (coordinates, velocities) as `simulate` takes it."""
+    names = system.model.coordinates
+    velocities = tuple(map(float, state[len(names) :]))
+    return {**dict(zip(names, map(float, state), strict=False)), "velocity": velocities[0] if len(names) == 1 else velocities}
+
+
+def state_vector(system: System, state: dict[str, Any]) -> np.ndarray:
+    """The inverse of `start_at`: coordinates, then velocities, (d,)."""
+    return np.append([state[name] for name in system.model.coordinates], state["velocity"])

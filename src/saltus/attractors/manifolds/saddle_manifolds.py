@@ -19,12 +19,11 @@ import numpy as np
 
 from saltus.attractors.attractors_dataset import state_plane, state_units
 from saltus.attractors.manifolds.manifold_growth import Growth, GrowthEnd, Level, Segment
-from saltus.attractors.orbit_certificate import start_at
 from saltus.attractors.stroboscopic_section import section_states
 from saltus.checks import check_count, check_number
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import last_states, motions_from, sensitivities
-from saltus.orbits import PeriodicOrbit
+from saltus.orbits import PeriodicOrbit, start_at
 from saltus.public_functions import answered
 from saltus.result import Result, result_dataset
 from saltus.systems import System, reversed_system

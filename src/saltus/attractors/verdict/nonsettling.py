@@ -9,13 +9,13 @@ import numpy as np
 
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.lyapunov.spectrum import Exponents, lyapunov_spectrum
-from saltus.attractors.orbit_certificate import certify, start_at, state_vector
+from saltus.attractors.orbit_certificate import certify
 from saltus.attractors.verdict.reason import Reason
 from saltus.attractors.verdict.tori import excludes_tori
 from saltus.attractors.verdict.verdict import Verdict, VerdictRequest, on_orbit, settled
 from saltus.attractors.verdict.zero_one_test import FEWEST_ENTRIES, ZeroOne, zero_one_test
 from saltus.flow import Recurrence
-from saltus.orbits import states_beside
+from saltus.orbits import start_at, state_vector, states_beside
 from saltus.progress import part_of
 
 

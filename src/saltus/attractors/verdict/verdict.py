@@ -10,13 +10,13 @@ import numpy as np
 from saltus.attractors.attractors_dataset import state_plane, state_units
 from saltus.attractors.kind import AttractorKind
 from saltus.attractors.lyapunov.spectrum import Exponents
-from saltus.attractors.orbit_certificate import Certificate, certify, start_at, state_vector, stays_at_rest
+from saltus.attractors.orbit_certificate import Certificate, certify, stays_at_rest
 from saltus.attractors.verdict.reason import Reason
 from saltus.attractors.verdict.zero_one_test import ZeroOne
 from saltus.errors import MotionError
 from saltus.flow import Recurrence, find_recurrence, simulate
 from saltus.notebook import html_table
-from saltus.orbits import PeriodicOrbit
+from saltus.orbits import PeriodicOrbit, start_at, state_vector
 from saltus.progress import Progress, part_of
 from saltus.result import Result, result_dataset
 from saltus.systems import System

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.lib.recfunctions import structured_to_unstructured, unstructured_to_structured
 
 from saltus.errors import MotionError, ParameterError
-from saltus.orbits import SpecialPoint, continue_special, find_orbit, follow_stable
+from saltus.orbits import SpecialPoint, continue_special, find_orbit, follow_stable, start_at
 from saltus.progress import Progress
 from saltus.provenance import check_provenance, identity
 from saltus.studies.chart.border_curves import curve_dataset
@@ -199,11 +199,8 @@ def curve_from(system: System, paths: Sequence[str], start: Mapping[str, Any], b
 def special_point(system: System, paths: Sequence[str], start: Mapping[str, Any]) -> SpecialPoint | None:
     """The special point at which a motion ends between two cells, by continuation of its orbit from close to it."""
     here = system.with_(dict(zip(paths, start["place"], strict=True)))
-    names, state = system.model.coordinates, [float(value) for value in start["state"]]
-    velocity = state[1] if len(names) == 1 else tuple(state[len(names) :])
-    coordinates: dict[str, Any] = dict(zip(names, state, strict=False))
     try:
-        orbit = find_orbit(here, **coordinates, velocity=velocity, period=int(start["period"]), settle=0)
+        orbit = find_orbit(here, **start_at(system, start["state"]), period=int(start["period"]), settle=0)
         special = lost(follow_stable(orbit, paths[int(start["along"])], float(start["goal"])))
     except (MotionError, ParameterError):
         return None

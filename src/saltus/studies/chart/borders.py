@@ -80,12 +80,13 @@ class Borders:
     def to_xarray(self, chart: ChartMotions) -> xarray.DataTree:
         """The curves as groups, and all changes of a chart in the group `ends`: `key` (see `keys_of`), the `outcome`,
         `horizontal` and `vertical` of the place at which the motion ends, up to how many cells it may be off (`uncertainty`),
+        the `amplitude` and the `period` there.
 
         Parameters
         ----------
         chart
             The motions of a chart.
-        the `amplitude` and the `period` there."""
+        """
         import xarray as xr
 
         changes = changes_of(chart)
