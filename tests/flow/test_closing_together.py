@@ -172,3 +172,38 @@ def test_dampers_between_masses_leave_derivatives_from_one_side_only():
     one, other = -between * (1 + e) ** 2 * v * np.abs(np.diff(delays))
     assert one < -0.5
     np.testing.assert_allclose((above - below)[3:, 0], [one, one + other, other], rtol=0, atol=2e-3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pushed(Row):
+    """The first mass has a further force."""
+
+    push: float = 0.0
+
+    def force(self, t, x, v, load):
+        first, *others = Row.force(self, t, x, v, load)
+        return (first + self.push, *others)
+
+
+def test_a_release_of_several_has_a_derivative_only_to_what_keeps_them_together():
+    """Masses at their walls leave where F(t) = k x_wall: dt = x_wall dk / F'(t), while a push on one moves its instant alone."""
+    W, wall = 1.3, 0.2
+    load = Load(frequency=W, force=-0.2 + Harmonic(amplitude=0.5))
+    system = System(model=Pushed(wall=wall), load=load, impact=NewtonImpact(e=(0.0,) * 3))
+    start = dict.fromkeys(system.model.coordinates, wall)
+    paths = ("model.stiffness", "model.push")
+    result = saltus.sensitivities(system, velocity=(0.0,) * 3, duration=2.0, parameters=paths, tol=1e-14, **start)
+    *_, release = result.motion.events
+    assert (release.kind, release.contact) == (EventKind.RELEASE, "wall_1+wall_2+wall_3")
+    instant = np.arcsin((0.2 + 0.4 * wall) / 0.5) / W
+    assert release.time == pytest.approx(instant, abs=1e-14)
+    assert result.event_times[-1, 6] == pytest.approx(wall / (0.5 * W * np.cos(W * instant)), rel=1e-12)
+    assert np.isnan(result.event_times[-1, 7])
+    alone = saltus.sensitivities(
+        system.with_({"model.push": -0.01}), velocity=(0.0,) * 3, duration=2.0, parameters=paths, **start
+    )
+    slope = -1.0 / (0.5 * W * np.cos(W * alone.motion.events[-1].time))
+    assert [event.contact for event in alone.motion.events.of(EventKind.RELEASE)] == ["wall_2+wall_3", "wall_1"]
+    np.testing.assert_allclose(alone.event_times[-2:, 7], [0.0, slope], rtol=1e-12)
+    assert np.isfinite(result.state).all()
+    assert np.isfinite(result.parameters).all()

@@ -51,8 +51,8 @@ class Sensitivities(Result):
     starts at contact, is released by a jump of the load, ends on an event, or grazes the contact (see `grazings`).
 
     `event_times` has a row for each of `motion.events` and a column for each initial coordinate, initial velocity and
-    parameter: the derivative of its time. It is nan where the event has none (a grazing, the beginning of chatter, impacts that
-    come at several instants beside this motion) or where the motion had lost its derivative before.
+    parameter: the derivative of its time. It is nan where the event has none (a grazing, the beginning of chatter, impacts or
+    releases of several contacts that come at several instants beside this motion) or where the motion had lost its derivative before.
 
     Attributes
     ----------

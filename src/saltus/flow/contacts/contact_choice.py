@@ -6,7 +6,7 @@ Its compiled part goes into one module with that of `contacts_kernel.py`, whose 
 from __future__ import annotations
 
 from saltus.flow.contacts.contact_impacts import contact_position, gap_series, hold_coordinates
-from saltus.flow.contacts.contact_layout import ContactColumn
+from saltus.flow.contacts.contact_layout import TIED, ContactColumn
 from saltus.flow.contacts.frictions import choose_slides, hold_frictions, slides_so
 from saltus.flow.kernel_layout import Where, Work
 from saltus.flow.roots import leading
@@ -14,8 +14,6 @@ from saltus.flow.steps import expand
 from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
-
-TIED = 1e-12  # A smaller reaction vanishes together with that of another contact: rounding of the loads that hold them.
 
 
 @lean_jit

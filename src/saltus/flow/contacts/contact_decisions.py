@@ -102,6 +102,9 @@ def end_accumulation_of(where, state, settings, env, model, contacts, frictions,
 @lean_jit
 def event_shifts(where, state, contacts, events, solver):
     """Fill `EVENT_SHIFTS` by those of the columns, or of an impact that has just been noted: nan if it is of several instants."""
+    for i in range(contacts.shape[0]):
+        if contacts[i, ContactColumn.RELEASED] == 1:
+            return  # `release_columns` has filled them
     first, last = 1 + 2 * where[Where.OWN] + contacts.shape[0], where[Where.EVENTS] - 1
     for j in range(where[Where.COLUMNS]):
         solver[Solver.EVENT_SHIFTS][j] = state[State.COORDINATES + 2 * where[Where.DOF] + j]
@@ -150,7 +153,10 @@ def decide_contacts(where, state, settings, env, model, contacts, frictions, wor
     opened = candidates & ~closed_bits(contacts)
     if opened and where[Where.LEAVE_BY] == 0:
         record_contact_event(where, state, contacts, events, EventCode.RELEASE, opened, t)
-        note_shifts(where, state, contacts, events, state, shifts)
+        if opened & (opened - 1):
+            note_shifts(where, state, contacts, events, solver[Solver.EVENT_SHIFTS], 0)
+        else:
+            note_shifts(where, state, contacts, events, state, shifts)
     if where[Where.LEAVE_BY] == 0:
         record_slides(where, state, contacts, frictions, events, before, t, shifts)
     decide_columns(where, state, env, model, contacts, frictions, work, solver, t, origin)

@@ -54,7 +54,7 @@ class Solver(IntEnum):
     FALLING_PULLS = 13
     SLOPES = 14  # a row for each column of the tangent: the derivatives of `NUMBERS`
     JUMP = 15  # of the velocities at an impact
-    EVENT_SHIFTS = 16  # by how much an impact, or the end of an accumulation, moves with each column
+    EVENT_SHIFTS = 16  # by how much an impact, a release or the end of an accumulation moves with each column
     PULL_SLOPES = 17  # the derivatives of `PULLS`, a row for each column
 
 
@@ -115,3 +115,4 @@ VANISHED = 1e-16  # A contact whose impacts are slower than the first one of an 
 FINISHED = 1e-14  # All that is slower than that by this factor is over: accumulations of one contact within those of another
 # are cut off at VANISHED, and near that scale the cuts would keep the other one going.
 TRIED_AGAIN = 32  # Of the impacts that were followed ahead in vain, one in so many has to come before they are followed again.
+TIED = 1e-12  # A smaller reaction vanishes together with that of another contact: rounding of the loads that hold them.

@@ -16,7 +16,7 @@ import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, invert
 from saltus.flow.contacts.contact_impacts import frozen_accumulation, restitution
-from saltus.flow.contacts.contact_layout import APART, RELATIVE_STEP, ContactColumn, ContactPart, ImpactDetail, Solver
+from saltus.flow.contacts.contact_layout import APART, RELATIVE_STEP, TIED, ContactColumn, ContactPart, ImpactDetail, Solver
 from saltus.flow.kernel_layout import Where, Work
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.steps import expand
@@ -86,12 +86,31 @@ def hold_columns(where, state, contacts, solver, chosen):
 
 
 @lean_jit
-def release_columns(where, state, env, model, work, t, origin, i):
-    """Take the columns to the instant at which a reaction reaches 0."""
-    expand(where, state, env, model, work, t, origin, 1.0, 1)
+def release_shifts(where, state, env, model, work, t, origin, i):
+    """By how much the instant moves at which a reaction reaches 0, of which the series is known."""
     model[ContactPart.TANGENT](EventCode.RELEASE, i, t, origin, 1.0, env, where[Where.PIECE], state)
     for j in range(where[Where.COLUMNS]):
         state[State.COORDINATES + 2 * where[Where.DOF] + j] /= -work[Work.MARGINS][i, 1]
+
+
+@lean_jit
+def release_columns(where, state, env, model, contacts, work, solver, t, origin, released):
+    """Take the columns to the instant at which a reaction reaches 0.
+
+    `EVENT_SHIFTS` are by how much it moves, nan where another reaction that reaches 0 at that instant moves otherwise.
+    """
+    first, shifts = State.COORDINATES + 2 * where[Where.DOF], solver[Solver.EVENT_SHIFTS]
+    expand(where, state, env, model, work, t, origin, 1.0, 1)
+    release_shifts(where, state, env, model, work, t, origin, released)
+    for j in range(where[Where.COLUMNS]):
+        shifts[j] = state[first + j]
+    for i in range(contacts.shape[0]):
+        if i != released and contacts[i, ContactColumn.CLOSED] == 1 and abs(work[Work.MARGINS][i, 0]) <= TIED:
+            release_shifts(where, state, env, model, work, t, origin, i)
+            for j in range(where[Where.COLUMNS]):
+                if abs(state[first + j] - shifts[j]) > APART * (abs(state[first + j]) + abs(shifts[j])):
+                    shifts[j] = math.nan
+    release_shifts(where, state, env, model, work, t, origin, released)
     move_columns(where, state, work, 1.0)
 
 

@@ -188,7 +188,7 @@ def contact_arc(where, state, settings, env, model, contacts, frictions, work, s
         return contact_impact(where, state, env, model, contacts, frictions, work, solver, events, t, origin, bits)
     if hit >= 0:
         if where[Where.COLUMNS] > 0:
-            release_columns(where, state, env, model, work, state[State.TIME], origin, hit)
+            release_columns(where, state, env, model, contacts, work, solver, state[State.TIME], origin, hit)
         where[Where.MODE], contacts[hit, ContactColumn.RELEASED] = Mode.CONTACT, 1 if first > 0.0 else 0
     if rubs >= 0:
         fill_slopes(where, state, env, model, solver)
