@@ -272,7 +272,11 @@ class PointedFunction(types.FunctionType):
 def _address(kind: PointedFunction, given: Any, boundary: Any) -> NativeValue:
     """A `Pointer` in compiled code."""
     made = boundary.context.make_helper(boundary.builder, kind)  # all of its members are 0
-    made.c_addr = boundary.pyapi.long_as_voidptr(given)
+    address = boundary.pyapi.long_as_voidptr(given)
+    try:
+        made.c_addr = address
+    except KeyError:
+        made.addr = address  # its name in numba 0.60
     return NativeValue(made._getvalue())
 
 
