@@ -81,4 +81,6 @@ def test_from_no_load_on_the_onset_is_a_fold_and_what_is_too_small_to_see_is_cou
     assert any("near 0.09" in end for end in main.attrs["ends"])
     small = main["special_amplitude"].values < 0.01 * float(main["amplitude"].max())
     assert tree.attrs["left"] == np.count_nonzero(small & (main["kind"].values == "BPC")) > 0
-    assert all(branch["amplitude"].max() > 0.01 * main["amplitude"].max() for branch in branches)
+    switched = [branch for branch in branches if branch.attrs["origin"] != "start"]  # not begun at a motion that was simulated
+    assert switched
+    assert all(branch["amplitude"].max() > 0.01 * main["amplitude"].max() for branch in switched)
