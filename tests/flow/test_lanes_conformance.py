@@ -39,7 +39,7 @@ def system_of(model):
 
 
 def states_of(system, n=24):
-    """States on every side of the contact, or on the open side of several: by the margins that stop the motion, and by the gaps."""
+    """States on every side of the contact, or on the open side of several, by the gaps and by what stops the motion."""
     rng, model = np.random.default_rng(4), system.model
     own, found = len(model.coordinates), []
     for _ in range(100_000):

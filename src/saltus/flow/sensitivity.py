@@ -52,7 +52,8 @@ class Sensitivities(Result):
 
     `event_times` has a row for each of `motion.events` and a column for each initial coordinate, initial velocity and
     parameter: the derivative of its time. It is nan where the event has none (a grazing, the beginning of chatter, impacts or
-    releases of several contacts that come at several instants beside this motion) or where the motion had lost its derivative before.
+    releases of several contacts that come at several instants beside this motion) or where the motion had lost its derivative
+    before.
 
     Attributes
     ----------
