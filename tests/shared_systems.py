@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from saltus import (
+    BeltOscillator,
     EnergyRestitution,
     Harmonic,
     InelasticImpact,
@@ -150,3 +151,12 @@ class Pair(Model):
 def paired(force=0.5, W=1.2, **numbers):
     """The smooth pair under a harmonic force on the first mass."""
     return System(model=Pair(**numbers), load=Load(frequency=W, force=Harmonic(amplitude=force)))
+
+
+class Falling(BeltOscillator):
+    """The friction falls with the sliding speed, as in the forced oscillators of Popp and Stelter (Phil. Trans. R. Soc. A 332
+    (1990) 89), whose motions may be chaotic: mu N / (1 + 2 (x' - w)^2)."""
+
+    def normal_forces(self, t, x, velocity, load):
+        sliding = velocity - self.belt_speed
+        return (self.normal_force / (1.0 + 2.0 * sliding * sliding),)

@@ -4,19 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from shared_systems import Falling
 
 import saltus
 from saltus.attractors import classify, lyapunov_many, lyapunov_spectrum
 from saltus.systems import BeltOscillator, Harmonic, Load, System
-
-
-class Falling(BeltOscillator):
-    """The friction falls with the sliding speed, as in the forced oscillators of Popp and Stelter (Phil. Trans. R. Soc. A 332
-    (1990) 89), whose motions may be chaotic: mu N / (1 + 2 (x' - w)^2)."""
-
-    def normal_forces(self, t, x, velocity, load):
-        sliding = velocity - self.belt_speed
-        return (self.normal_force / (1.0 + 2.0 * sliding * sliding),)
 
 
 def forced(amplitude, frequency, model=BeltOscillator, **numbers):

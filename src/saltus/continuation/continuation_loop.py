@@ -68,7 +68,7 @@ class Continuation:
             elif isinstance(ahead, Cut):
                 step = min(self.steps.restart, self.events.first_step(self.points) if self._cross(ahead) else np.inf)
             elif self._accept(point, ahead, born):
-                step = min(self.steps.restart, 0.1 * step, self.events.first_step(self.points))
+                step = min(self.steps.restart, max(0.1 * step, self.steps.renewed), self.events.first_step(self.points))
             before, born = point, False
             if self.end is None and len(self.points) > self.steps.most_points:
                 self.end = End(CurveEnd.MOST_POINTS, self.points[-1].parameter, detail=str(self.steps.most_points))

@@ -14,6 +14,8 @@ class StepSettings:
     longest: float = 0.1  # a thirtieth of the range of the parameter, or a tenth of a unit of the unknowns
     first: float = 1e-3  # the length of the first step
     restart: float = 1e-3  # the largest length of the first step after the equations have changed
+    # The least such length: steps that end at a change may have shrunk to nothing, as the equations have no solution beyond it.
+    renewed: float = 1e-6
     least: float = 1e-11  # the length below which steps have shrunk to nothing
     shrink: float = 0.4  # the length of a step that has to be taken again, as a share of the one that failed
     grow: tuple[float, float] = (0.5, 2.0)  # the least and the largest ratio of a step to the one before

@@ -72,7 +72,8 @@ def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero 
         known.append(KnownPlace(share, point, value))
         known.sort(key=lambda place: place.share)
     i = _bracket(known, before) if before != 0.0 else 0
-    best = min(known[i : i + 2], key=lambda place: abs(place.value))
+    # beyond a zero that tells on one side only other equations hold, of which what is found before it must not be made up
+    best = known[i] if test.one_sided else min(known[i : i + 2], key=lambda place: abs(place.value))
     evidence = Evidence(best.point.residual, _brackets(best.point, before, known), before, after, best.value)
     zero: Zero = best.point.zero_type(test.kind, best.point, evidence)
     return zero

@@ -17,16 +17,27 @@ from saltus.orbits.images import (
     beside_image,
     falls_onto_image,
     halves,
+    is_image,
     nearest,
     on_family,
+    parent_of,
     passes_image,
     repetition,
     with_section_of,
 )
 from saltus.orbits.orbit_curve import OrbitPoint
-from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
+from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.switching_contacts import contact_change
-from saltus.orbits.switching_followed import beyond, change_at, events_at, first_step, refused_beyond, same_events, stalled_at
+from saltus.orbits.switching_followed import (
+    beyond,
+    change_at,
+    events_at,
+    first_step,
+    jump_over,
+    refused_beyond,
+    same_events,
+    stalled_at,
+)
 from saltus.orbits.symmetry import full_point
 from saltus.orbits.tolerances import TOLERANCES
 
@@ -178,9 +189,14 @@ class BranchEvents(OrbitEvents):
             run.special.pop()
             return End(OrbitEnd.COMES_BACK, graze.parameter)
         followed = isinstance(cut.point.orbit.problem, FollowedProblem)
+        if followed and (parent := _parent_at(run, cut)) is not None:
+            run.special.append(parent)
+            return End(OrbitEnd.IMAGE, parent.parameter, parent.kind)
         following = beyond(cut, run.points) if followed else other_side(cut.point)
         if isinstance(following, End):
             return following
+        if followed and (jumped := jump_over(cut, following)) is not None:
+            run.special.append(jumped)
         count, value = _impact_count(following), following.parameter
         if (shorter := repetition(following)) is not None:
             return End(OrbitEnd.GRAZES_ANOTHER, value, detail=shorter)
@@ -207,6 +223,14 @@ class BranchEvents(OrbitEvents):
         if largest > SETTINGS.steepest and not point.orbit.grazes:
             return End(OrbitEnd.REPELS, point.parameter, detail=f"{largest:.1g}")
         return super().stalled(run, point, step)
+
+
+def _parent_at(run: Run, cut: Cut) -> SpecialPoint | None:
+    """The special point of its parent at which a family ends where events change: there multipliers jump, see `jump_over`."""
+    parent = None if cut.special is None else parent_of(cut.point)
+    if parent is None or cut.special is None or all(is_image(point, TOLERANCES.grazing_orbits) for point in run.points):
+        return None
+    return SpecialPoint(SpecialKind.BPC if cut.point.orbit.period % 2 else SpecialKind.PD, parent, cut.special.evidence)
 
 
 def _impact_count(point: OrbitPoint) -> int:

@@ -94,6 +94,23 @@ def falls_onto_image(a: OrbitPoint, b: OrbitPoint) -> bool:
     )
 
 
+def is_image(point: OrbitPoint, within: float = 1e-2 * TOLERANCES.image) -> bool:
+    """Whether an orbit is its own image, as another one gone round twice is, that was solved for as if it were none."""
+    difference = asymmetry(point)
+    return difference is not None and bool(np.abs(difference).max() < within)
+
+
+def parent_of(point: OrbitPoint) -> OrbitPoint | None:
+    """The orbit that is gone round twice, or from its image back to itself, of one that is its own image but for the square root
+    of rounding; None for others."""
+    problem = point.curve.problem.halved
+    if problem is None or not is_image(point, TOLERANCES.grazing_orbits):
+        return None
+    curve = point.curve.with_problem(problem)
+    parent: OrbitPoint | None = curve.solve_at(point.place, np.append(np.zeros(problem.size), 1.0))
+    return parent
+
+
 def repetition(point: OrbitPoint) -> str | None:
     """What an orbit is that is another one gone round several times, or its own mirror image; None for one that is not."""
     signature, n = point.orbit.signature, len(point.orbit.signature.sides)

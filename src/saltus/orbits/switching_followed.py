@@ -17,11 +17,12 @@ import numpy as np
 from saltus.continuation import Bounds, Corrected, Course, CurveEnd, Cut, End, Evidence, TestFunction, Zero
 from saltus.errors import SaltusError
 from saltus.flow import EventCode
+from saltus.orbits.bifurcations import FLIP
 from saltus.orbits.contact_signature import section_of
 from saltus.orbits.followed_events import SETTINGS as EVENTS
 from saltus.orbits.followed_events import FollowedEvents, OrbitEvent
 from saltus.orbits.followed_problem import FollowedEquations, FollowedProblem
-from saltus.orbits.images import nearest
+from saltus.orbits.images import is_image, nearest, parent_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
@@ -84,18 +85,19 @@ def change_at(zero: Zero, reference: OrbitPoint) -> Cut | End:
     orbits beyond are none of the branch."""
     if _stands(zero.point):
         return Cut(zero.point, SpecialPoint(SpecialKind.AS, zero.point, zero.evidence))
-    if events_at(zero.point).sequence == events_at(reference).sequence and _section_is_near(zero.point):
+    if _section_comes(zero.point):
         return Cut(zero.point, None)
-    sequence = events_at(reference).sequence
-    other = next(_beside(zero.point, sequence), None)
+    parent = parent_of(zero.point)  # it changes alike in both of its halves, while those of its family change places
+    here, before = (zero.point, events_at(reference)) if parent is None else (parent, events_at(parent))
+    other = next(_beside(here, before.sequence), None)
     if other is None and events_at(zero.point).distance > SETTINGS.far:
         return End(CurveEnd.NOT_LOCATED, zero.parameter, SpecialKind.SW)
     if other is None:
         kind: SpecialKind | None = SpecialKind.SW
     elif _is_discontinuous(other):
-        kind = first_change(events_at(zero.point), events_of_equations(other))
+        kind = first_change(events_at(here), events_of_equations(other))
     else:
-        kind = kind_between(events_at(reference), events_of_equations(other))
+        kind = kind_between(before, events_of_equations(other))
     return Cut(zero.point, None if kind is None else SpecialPoint(kind, zero.point, zero.evidence))
 
 
@@ -112,8 +114,8 @@ def refused_beyond(point: OrbitPoint, step: float, bounds: Bounds) -> End | None
 
 def stalled_at(point: OrbitPoint, step: float) -> Cut | End | None:
     """The cut at a point beyond which no step leads, if events change there: the branch turns round or ends."""
-    sequence = events_at(point).sequence
-    beside = next(_beside(point, sequence), None)
+    here = parent_of(point) or point
+    beside = next(_beside(here, events_at(here).sequence), None)
     if beside is None:
         return None
     test, width = same_events(point), step * np.abs(np.array(point.curve.scales))
@@ -132,16 +134,17 @@ def beyond(cut: Cut, points: Sequence[OrbitPoint]) -> OrbitPoint | End:
     """Where a branch of these points, the last one at a cut, goes on beyond it: with other events, or from another section."""
     if _stands(cut.point):
         return End(OrbitEnd.STICKS, cut.point.parameter)
-    sequence = events_at(points[-2:][0]).sequence
+    born = parent_of(cut.point) is not None  # at a change of its parent's events: rounding tells which ones it has
+    sequence = None if born else events_at(cut.point).sequence
     if cut.special is not None and cut.special.kind == SpecialKind.CH:
         return End(OrbitEnd.REST_VANISHES, cut.point.parameter)
-    if events_at(cut.point).sequence == sequence and _section_is_near(cut.point):
+    if _section_comes(cut.point):
         return _from_another_section(cut.point) or End(OrbitEnd.NO_SECTION, cut.point.parameter)
     return other_events(cut.point, sequence, points)
 
 
-def other_events(point: OrbitPoint, sequence: EventSequence, points: Sequence[OrbitPoint] = ()) -> OrbitPoint | End:
-    """An orbit beside a point that has other events than these, with the direction away from it; or why there is none.
+def other_events(point: OrbitPoint, sequence: EventSequence | None, points: Sequence[OrbitPoint] = ()) -> OrbitPoint | End:
+    """An orbit beside a point that has other events than these, if any, with the direction away from it; or why there is none.
 
     It is none of the branch of these points, as between two changes that are all but one it may lead back along itself.
     """
@@ -157,7 +160,7 @@ def other_events(point: OrbitPoint, sequence: EventSequence, points: Sequence[Or
                 ahead: OrbitPoint | None = curve.solve_within(point.place + probe * direction, direction, SETTINGS.near * probe)
                 if ahead is None or events_at(ahead).sequence == sequence or not _leads_away(point, ahead, probe):
                     continue
-                if not _lies_on(points, ahead, SETTINGS.same * probe):
+                if not is_image(ahead) and not _lies_on(points, ahead, SETTINGS.same * probe):
                     return ahead
     return End(reason, point.parameter, detail=detail)
 
@@ -166,6 +169,25 @@ def first_step(point: OrbitPoint, ahead: OrbitPoint) -> float:
     """The longest first step from an orbit with other events than those of the point beside it, or with another section."""
     way = ahead.curve.norm(ahead.place - point.place)
     return SETTINGS.first * way if way > SETTINGS.near * SETTINGS.probes[0] else np.inf
+
+
+def jump_over(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
+    """The period doubling, or of a symmetric orbit the breaking of its symmetry, at a change at which multipliers jump over -1.
+
+    At a grazing-sliding the map is continuous and its derivative is not. Where the numbers of multipliers below -1 on its two
+    sides are odd together, the doubled orbit begins there, none of which has the multiplier -1 (M. I. Feigin 1970; M. di
+    Bernardo, M. Feigin, S. Hogan, M. Homer, Chaos, Solitons and Fractals 10 (1999) 1881).
+    """
+    if cut.special is None or cut.special.kind != SpecialKind.GS:
+        return None
+    test, way = FLIP[cut.point.orbit.symmetric], following.place - cut.point.place
+    place = cut.point.place + SETTINGS.beside[-1] / following.curve.norm(way) * way
+    equations = following.curve.evaluate(place, thorough=True)
+    if equations is None or events_of_equations(equations).sequence != events_at(following).sequence:
+        return None
+    before, after = (test.value(point) for point in (cut.point, replace(following, place=place, equations=equations)))
+    evidence = replace(cut.special.evidence, before=before, after=after, value=before)
+    return SpecialPoint(test.kind, cut.point, evidence) if before * after < 0.0 else None
 
 
 def _lies_on(points: Sequence[OrbitPoint], ahead: OrbitPoint, same: float) -> bool:
@@ -192,7 +214,7 @@ def _is_discontinuous(equations: FollowedEquations) -> bool:
     return bool(np.abs(equations.residual).max() > SETTINGS.jump)
 
 
-def _beside(point: OrbitPoint, sequence: EventSequence) -> Iterator[FollowedEquations]:
+def _beside(point: OrbitPoint, sequence: EventSequence | None) -> Iterator[FollowedEquations]:
     """The equations at places beside a point, not solved, at which the events are others than these or come at other times:
     one for each other sequence at each distance. What is held at the section stays so, as it does on all orbits near."""
     problem = point.curve.problem
@@ -217,8 +239,10 @@ def events_of_equations(equations: FollowedEquations) -> FollowedEvents:
     return equations.followed
 
 
-def _section_is_near(point: OrbitPoint) -> bool:
-    return events_at(point).section_distance < 2.0 * EVENTS.section_distance
+def _section_comes(point: OrbitPoint) -> bool:
+    """Whether an event has come to the section of an orbit before any other change."""
+    found = events_at(point)
+    return found.section_distance - EVENTS.section_distance < min(found.distance, EVENTS.section_distance)
 
 
 def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
