@@ -47,6 +47,22 @@ def test_extrema_and_impacts_are_those_of_one_period():
     assert seen > 5
 
 
+def test_extrema_are_those_of_what_is_kept_whatever_else_is_recorded():
+    system, periods, kept = forced(), 14, 4
+    ends = find_recurrence(system, STATES, periods, kept=kept, max_period=2, extrema=True)
+    whole = find_recurrence(system, STATES, periods, kept=kept, max_period=2, extrema=True, whole=True)
+    rows = np.flatnonzero(ends.unsettled)
+    assert rows.size > 5
+    assert np.array_equal(ends.extrema[rows], whole.extrema[rows])
+    for row in rows[:8]:
+        motion = saltus.simulate(system, theta=STATES[row, 0], velocity=STATES[row, 1], periods=periods)
+        length = (motion.time - motion.start) / periods
+        for back in range(kept):
+            end = motion.time - back * length
+            dense = motion.at(np.linspace(end - length, end, 2001))[0]
+            assert (dense.max(), dense.min()) == pytest.approx(ends.extrema[row, -1 - back], abs=2e-5)
+
+
 def test_parameters_of_their_own_are_those_of_a_system_of_their_own():
     amplitudes = np.linspace(0.3, 0.9, len(STATES))
     together = find_recurrence(forced(), STATES, 100, parameters={AMPLITUDE: amplitudes})

@@ -92,6 +92,6 @@ class LanePart(IntEnum):
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-FIRST_PART = 35  # slot: those before it do not depend on the structure
+FIRST_PART = 36  # slot: those before it do not depend on the structure
 LOWEST_ORDER, HIGHEST_ORDER = 14, 22  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
 SERIES_LENGTH = HIGHEST_ORDER + 1

@@ -68,7 +68,8 @@ class Recurrence:
     periods: np.ndarray  # (n,): forcing periods that it was followed
     last: np.ndarray  # (n, d): the state at the end
     states: np.ndarray  # (n, kept, d): the stroboscopic states, the last one last, nan where there were fewer
-    extrema: np.ndarray | None = None  # (n, kept, 2): largest and smallest of all coordinates in each of these periods
+    # (n, kept, 2): largest and smallest of all coordinates in each of these periods, of what goes on or repeats itself
+    extrema: np.ndarray | None = None
     impact_counts: np.ndarray | None = None  # (n, kept): impacts in each of these periods
     speeds: np.ndarray | None = None  # (n, kept): the least speed before an impact in each of these periods, inf without
 
@@ -149,6 +150,7 @@ def find_recurrence(
     extrema: bool = False,
     impact_count: bool = False,
     speed: bool = False,
+    whole: bool = False,
     stop_early: bool = True,
     tol: float = RECURRENCE.tol,
     threads: int | None = None,
@@ -178,6 +180,9 @@ def find_recurrence(
         How many of the last stroboscopic states are kept, by default all; 0 for none.
     extrema, impact_count, speed
         Whether these are recorded, over max(kept, max_period) of the last forcing periods.
+    whole
+        Whether extrema are recorded from the start. Otherwise they are where a motion begins to repeat itself or its time is
+        almost up: those of motions that come to rest or are ended before are not known.
     stop_early
         False follows every motion for all periods, and reads its period off the last states (`near_return`).
     tol
@@ -195,6 +200,7 @@ def find_recurrence(
         limits=limits_of(system, ()),
         sample=tuple(name for name, chosen in sampled.items() if chosen),
         until=(Until.REST, Until.SETTLED) if stop_early else (),
+        whole=whole,
     )
     last = max(1, min(max(size, max_period if extrema or impact_count or speed else 1), periods))
     coordinates, velocity = _as_arguments(system, states)

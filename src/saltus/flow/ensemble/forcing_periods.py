@@ -89,6 +89,16 @@ def begin_time(lane, sizes, m, numbers, labels):
     put(m, Slot.NEXT_CHECK, lane, impacts_between_checks(sizes))
     put(m, Slot.LAST_CHECK, lane, start)
     put(m, Slot.STEP_SHARE, lane, 1.0)
+    put(m, Slot.RECORDED_FROM, lane, first_recorded(labels[JobLabel.LAST_PERIOD], sizes))
+
+
+@inline_jit
+def first_recorded(last, sizes):
+    """The first forcing period of which extrema are recorded where the motion goes on to the last one.
+
+    It is one before those that are kept, as a step past its end begins the next one; the last one may have no length.
+    """
+    return -np.inf if sizes[Size.WHOLE] > 0 else last - sizes[Size.KEPT] - 1.0
 
 
 @inline_jit
@@ -207,7 +217,10 @@ def end_period(lane, sizes, at, m, lanes, results):
         state[own + d] = get(m, at[LanePart.ENDED_VELOCITY] + d, lane)
     if labels[lane, LaneLabel.MODE] == Mode.CHATTER:
         state[own] = numbers[lane, LaneNumber.CHATTER_SPEED]
-    return recurrence_period(states[lane], agreements[lane], done, own)
+    period, agrees = recurrence_period(states[lane], agreements[lane], done, own)
+    last = labels[lane, LaneLabel.LAST_PERIOD]
+    put(m, Slot.RECORDED_FROM, lane, -np.inf if agrees else first_recorded(last, sizes))
+    return period
 
 
 @inline_jit

@@ -50,6 +50,7 @@ class Slot(IntEnum):
     FREE_POSITION = LaneSlot.FREE_POSITION
     FREE_VELOCITY = LaneSlot.FREE_VELOCITY
     STEP_SHARE = 34  # of the longest step, that the next one takes
+    RECORDED_FROM = 35  # number of the first forcing period of which extrema are recorded
 
 
 class Size(IntEnum):
@@ -73,7 +74,8 @@ class Size(IntEnum):
     GUARDS = 15  # of that series
     CONSTANT_GUARDS = 16
     FRICTIONS = 17  # their coordinates stand behind those of the contacts and their signs
-    CONTACTS = 18  # of a model with several; their coordinates stand behind, then their signs
+    WHOLE = 18  # whether extrema are recorded of the whole motion, not only of what is kept of it
+    CONTACTS = 19  # of a model with several; their coordinates stand behind, then their signs
 
 
 class LaneSetting(IntEnum):

@@ -98,10 +98,13 @@ def course(m, at, row, end, ratio, bend):
 def record_range(m, at, row, sizes, h, bend, begin, v_begin, end, x, v, chosen, helpers, poly, series):
     """Take the extrema of a coordinate from `begin` to `end` of this step into HIGHEST and LOWEST, for chosen lanes.
 
-    Lanes are left alone whose coordinate does not pass what has been recorded for certain. Where the velocity is monotonic for
-    certain, an extremum within the step is where it vanishes. Where neither that is certain nor that the velocity keeps its sign,
-    all turning points are looked for, lane by lane.
+    Lanes are left alone in forcing periods that are not recorded, and those whose coordinate does not pass what has been recorded
+    for certain. Where the velocity is monotonic for certain, an extremum within the step is where it vanishes. Where neither that
+    is certain nor that the velocity keeps its sign, all turning points are looked for, lane by lane.
     """
+    chosen &= bits(load(m, Slot.PERIOD) >= load(m, Slot.RECORDED_FROM))
+    if chosen == 0:
+        return
     order, positions = sizes[Size.ORDER], at[LanePart.POSITIONS] + row * SERIES_LENGTH
     high, low = load(m, Slot.HIGHEST), load(m, Slot.LOWEST)
     top, bottom = maximum(high, x), minimum(low, x)
@@ -189,12 +192,13 @@ def keep_ended(m, at, sizes, past):
 
 @lean_jit
 def recurrence_period(states, agreements, done, own):
-    """After how many forcing periods a trajectory repeats itself, or 0; `states` holds its last stroboscopic states.
+    """After how many forcing periods a trajectory repeats itself, or 0; and whether its last state agrees with an earlier one.
 
-    It repeats itself after q periods when 2 q + 2 states in a row agree with those q periods before. The smallest q counts, and
-    none while the states of a part of it are not clearly apart, as a recurrence of fewer periods may still be approached.
+    `states` holds its last stroboscopic states. It repeats itself after q periods when 2 q + 2 states in a row agree with those q
+    periods before. The smallest q counts, and none while the states of a part of it are not clearly apart, as a recurrence of
+    fewer periods may still be approached.
     """
-    here, found, near = states[done % (2 * LONGEST_RECURRENCE)], 0, 0
+    here, found, near, agrees = states[done % (2 * LONGEST_RECURRENCE)], 0, 0, False
     for q in range(1, min(LONGEST_RECURRENCE, done - 1) + 1):
         there, same, close = states[(done - q) % (2 * LONGEST_RECURRENCE)], True, True
         for i in range(2 * own):
@@ -205,11 +209,12 @@ def recurrence_period(states, agreements, done, own):
                     close = False
                     break
         agreements[q] = agreements[q] + 1 if same else 0
+        agrees |= same
         if close:
             near |= 1 << q
         if found == 0 and agreements[q] >= 2 * q + 2:
             found = q
     for d in range(1, found):
         if found % d == 0 and (near >> d) & 1:
-            return 0
-    return found
+            return 0, agrees
+    return found, agrees
