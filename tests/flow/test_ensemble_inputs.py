@@ -12,7 +12,8 @@ from lane_cases import Duffing
 
 import saltus
 from saltus.errors import ParameterError, SaltusError
-from saltus.flow import stop_names
+from saltus.flow import share_cores, stop_names
+from saltus.flow.ensemble.wanted import read_threads
 from saltus.systems import Harmonic, Load, Metainterface, Record, System, WallOscillator
 
 SYSTEM = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=1.0, horizontal=Harmonic(0.3), vertical=-0.5))
@@ -384,3 +385,12 @@ def test_a_record_and_a_model_without_contact_take_columns_too():
     for i, value in enumerate(scale):
         system = System(model=Duffing(), load=load).with_({"load.force.scale": value})
         assert float(ensemble.x[i]) == pytest.approx(saltus.simulate(system, x=0.2, duration=4.5).x, abs=1e-11)
+
+
+def test_processes_that_compute_at_the_same_time_share_the_cores(monkeypatch):
+    monkeypatch.setattr("os.sched_getaffinity", lambda process: set(range(8)), raising=False)
+    monkeypatch.setattr("saltus.flow.ensemble.threads._sharing", [lambda: 1])
+    assert read_threads(None) == 8
+    for processes, threads in ((2, 4), (3, 2), (8, 1), (20, 1), (0, 8)):
+        share_cores(lambda count=processes: count)
+        assert (read_threads(None), read_threads(5)) == (threads, 5)

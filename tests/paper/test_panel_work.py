@@ -1,11 +1,13 @@
 """The pool of the paper's panels: every part gets its own panels in their order, and what two parts share is computed once."""
 
 import os
+import time
 from functools import partial
 from pathlib import Path
 
 import pytest
 
+from saltus.flow import available_cores
 from saltus.paper.panel_work import compute_panels
 from saltus.paper.parts import FIGURES, ORDER
 
@@ -40,6 +42,24 @@ def test_parts_get_their_panels_in_order_and_a_shared_one_is_computed_once(tmp_p
 def test_a_panel_that_fails_ends_the_others_with_its_own_error(panels: dict) -> None:
     with pytest.raises(ZeroDivisionError):
         list(compute_panels({"part": panels}))
+
+
+def cores_beside(folder: str, own: str, other: str) -> int:
+    """The cores that a panel may use while another one is computed."""
+    (Path(folder) / own).touch()
+    late = time.monotonic() + 60.0
+    while not (Path(folder) / other).exists() and time.monotonic() < late:
+        time.sleep(0.01)
+    return available_cores()
+
+
+@pytest.mark.skipif(available_cores() < 2, reason="on one core panels come one after the other")
+def test_panels_that_are_computed_at_the_same_time_share_the_cores(tmp_path: Path) -> None:
+    panels = {own: partial(cores_beside, str(tmp_path), own, other) for own, other in (("a", "b"), ("b", "a"))}
+    ((_, made, _),) = compute_panels({"part": panels})
+    first, last = sorted(made.values())
+    assert first == available_cores() // 2
+    assert last in (first, available_cores())  # one may be done before the other one has asked
 
 
 def test_every_part_is_computed_once():

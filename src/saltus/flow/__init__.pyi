@@ -9,7 +9,7 @@ from .ensemble.ensemble import compiled_lanes, simulate_many
 from .ensemble.ensemble_dataset import extrema_names
 from .ensemble.inputs import Inputs, read_inputs
 from .ensemble.tangent_ensemble import TangentEnsemble
-from .ensemble.threads import Jobs, Lanes, available_cores
+from .ensemble.threads import Jobs, Lanes, available_cores, share_cores
 from .ensemble.wanted import Wanted
 from .kernel_layout import STRUCTURE_SIZES, Where
 from .load_release import Release, contact_pull, load_releases, peak_near
@@ -93,6 +93,7 @@ __all__ = [
     "return_distances",
     "return_period",
     "sensitivities",
+    "share_cores",
     "simulate",
     "simulate_many",
     "state_names",

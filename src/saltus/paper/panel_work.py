@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from saltus.flow import available_cores
+from saltus.flow import available_cores, share_cores
 
 Panels = Mapping[str, Callable[[], Any]]  # what computes each panel of a part, by the panel's name
 Task = tuple[str, str]  # the names of a part and of its panel
@@ -55,8 +55,10 @@ def _results(
     if cores < 2:
         yield ((tasks, _timed(make)) for make, tasks in work)
         return
-    with ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("spawn"), initializer=_deaf) as pool:
-        futures = {pool.submit(_timed, make): tasks for make, tasks in work}
+    context = multiprocessing.get_context("spawn")
+    left = context.Value("i", len(work))
+    with ProcessPoolExecutor(cores, mp_context=context, initializer=_begin, initargs=(left,)) as pool:
+        futures = {pool.submit(_counted, make): tasks for make, tasks in work}
         try:
             yield ((futures.pop(future), future.result()) for future in as_completed(list(futures)))
         except BaseException:  # interrupted, or a panel failed: the others are of no use any more
@@ -75,6 +77,22 @@ def _stop(pool: Executor) -> None:
         child.terminate()
 
 
-def _deaf() -> None:
-    """Leave Ctrl-C, which reaches every process of a terminal, to the one that knows what to say."""
+_left: list[Any] = []  # in a process of the pool: how many panels are not done
+
+
+def _begin(left: Any) -> None:
+    """Share the cores with the panels that are left.
+
+    Ctrl-C, which reaches every process of a terminal, is left to the one that knows what to say.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _left[:] = [left]
+    share_cores(lambda: int(left.value))
+
+
+def _counted(make: Callable[[], Any]) -> tuple[Any, float]:
+    """A panel of the pool; what is left then shares the cores anew."""
+    result = _timed(make)
+    with _left[0].get_lock():
+        _left[0].value -= 1
+    return result

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Any
@@ -86,9 +86,21 @@ class Ends:
         return column
 
 
+_sharing: list[Callable[[], int]] = [lambda: 1]  # how many processes share the cores
+
+
+def share_cores(processes: Callable[[], int]) -> None:
+    """Let this process use its share of the cores, where so many processes compute at the time.
+
+    Threads beyond the cores only divide the lanes of small ensembles, of which more then stand empty at the end.
+    """
+    _sharing[:] = [processes]
+
+
 def available_cores() -> int:
-    """The cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """The cores that this process may use, its share of them where it has one (`share_cores`)."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, cores // max(1, _sharing[0]()))
 
 
 @dataclass(frozen=True)
