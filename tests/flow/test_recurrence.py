@@ -7,6 +7,7 @@ from shared_systems import forced
 import saltus
 from saltus.flow import RECURRENCE, Outcome, find_recurrence, load_releases, nearest_return, return_distances, return_period
 from saltus.flow.recurrence import _long_period
+from saltus.systems import Harmonic, Load, RockingBlock, System
 
 STATES = np.random.default_rng(1).uniform(-1.5, 1.5, (32, 2))
 AMPLITUDE = "load.horizontal.amplitude"
@@ -61,6 +62,19 @@ def test_extrema_are_those_of_what_is_kept_whatever_else_is_recorded():
             end = motion.time - back * length
             dense = motion.at(np.linspace(end - length, end, 2001))[0]
             assert (dense.max(), dense.min()) == pytest.approx(ends.extrema[row, -1 - back], abs=2e-5)
+
+
+def test_extrema_of_a_motion_that_a_limit_ends_are_those_before_its_end():
+    load = Load(frequency=4.0, ground_horizontal=Harmonic(0.05))
+    system = System(model=RockingBlock(alpha=0.3), load=load)
+    states = np.random.default_rng(1).uniform(-0.1, 0.1, (4, 2))
+    ends = find_recurrence(system, states, 60, kept=3, max_period=2, extrema=True)
+    assert ends.ended.all()
+    for state, count, found in zip(states, ends.periods, ends.extrema, strict=True):
+        motion = saltus.simulate(system, theta=state[0], velocity=state[1], periods=60)
+        begin = motion.start + (np.ceil(count) - 2.0) * 2.0 * np.pi / 4.0  # of the last whole period
+        dense = motion.at(np.linspace(begin, begin + 2.0 * np.pi / 4.0, 2001))[0]
+        assert (dense.max(), dense.min()) == pytest.approx(found[-2], abs=2e-5)
 
 
 def test_parameters_of_their_own_are_those_of_a_system_of_their_own():

@@ -181,8 +181,8 @@ def find_recurrence(
     extrema, impact_count, speed
         Whether these are recorded, over max(kept, max_period) of the last forcing periods.
     whole
-        Whether extrema are recorded from the start. Otherwise they are where a motion begins to repeat itself or its time is
-        almost up: those of motions that come to rest or are ended before are not known.
+        Whether extrema are recorded from the start, as they are where a limit of the model may end a motion. Otherwise they are
+        where it begins to repeat itself or its time is almost up: those of motions that come to rest are not known.
     stop_early
         False follows every motion for all periods, and reads its period off the last states (`near_return`).
     tol
@@ -192,15 +192,16 @@ def find_recurrence(
     progress
         Called with the fraction done.
     """
+    limits = limits_of(system, ())
     sampled = {Sample.STATE: kept != 0, Sample.EXTREMA: extrema, Sample.IMPACT_COUNT: impact_count, Sample.SPEED: speed}
     size = periods if kept is None else kept
     wanted = Wanted(
         tol=tol,
         periods=periods,
-        limits=limits_of(system, ()),
+        limits=limits,
         sample=tuple(name for name, chosen in sampled.items() if chosen),
         until=(Until.REST, Until.SETTLED) if stop_early else (),
-        whole=whole,
+        whole=whole or bool(limits),
     )
     last = max(1, min(max(size, max_period if extrema or impact_count or speed else 1), periods))
     coordinates, velocity = _as_arguments(system, states)
