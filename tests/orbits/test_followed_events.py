@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 import saltus
-from saltus.orbits import OrbitEnd
+from saltus.orbits import OrbitEnd, solved_near
 from saltus.orbits.followed_problem import FollowedProblem
 
 
@@ -248,3 +248,56 @@ def test_a_state_beside_a_section_at_which_a_layer_is_held_has_events(bouncing: 
             beside[place] += step
             equations = problem.evaluate(beside, problem.values, with_extremes=True)
             assert equations is None or equations.followed is not None
+
+
+@pytest.fixture(scope="module")
+def turning(bouncing: saltus.PeriodicOrbit) -> tuple[saltus.Branch, saltus.Branch]:
+    """A branch that turns round three times where a layer at its contact is just left, from both of its ends."""
+    system, bounds = bouncing.system.with_({"load.frequency": 0.2665}), (0.265, 0.285)
+    motion = saltus.simulate(system, theta_1=0.1, theta_2=-0.05, velocity=(0.0, 0.0), periods=300, dense=False)
+    orbit = solved_near(system, "load.frequency", np.append(motion.position, motion.velocity), 1)
+    assert orbit is not None
+    ahead = saltus.continue_orbit(orbit, "load.frequency", bounds)
+    return ahead, saltus.continue_orbit(ahead.orbits[-6], "load.frequency", bounds, step=0.06)
+
+
+def slowest_first_impact(orbit: saltus.PeriodicOrbit) -> float:
+    """The least speed of the first impacts after others have died away."""
+    events = list(orbit.motion(tol=1e-14).events)
+    pairs = [(first, second) for first, second in pairwise(events) if (str(first.kind), str(second.kind)) == ("held", "impact")]
+    return min(float(np.abs(second.velocity_before).max()) for _, second in pairs)
+
+
+def test_a_change_towards_which_multipliers_grow_without_end_is_gone_through_from_both_sides(
+    turning: tuple[saltus.Branch, saltus.Branch],
+) -> None:
+    """An impact vanishes in proportion to the way, by which direct motions tell where. Orbits so near repel so strongly that
+    rounding keeps their residual large: the bracket says how far the last one is from the change."""
+    ahead, back = turning
+    for branch in turning:
+        assert kinds_of(branch) == ["SW", "SW", "SW", "PD"]
+        assert [str(end) for end in branch.ends] == ["bound 0.265", "bound 0.285"]
+        assert not branch.missed
+    for one, other in zip(ahead.special, back.special, strict=True):
+        assert abs(one.parameter - other.parameter) <= one.evidence.bracket + other.evidence.bracket + 1e-11
+    last = back.special[2].parameter
+    family = [orbit for orbit in ahead.orbits if 1e-6 < orbit.solution.values[0] - last < 4e-5]
+    speeds = {slowest_first_impact(orbit): float(orbit.solution.values[0]) for orbit in family}
+    slow = sorted(speed for speed in speeds if speed < 2e-3)[:4]
+    expected = np.polynomial.polynomial.polyfit(slow, [speeds[speed] for speed in slow], 2)[0]
+    assert back.special[2].evidence.bracket < 1e-10
+    assert abs(last - expected) < 1e-9
+    assert abs(ahead.special[2].parameter - expected) < ahead.special[2].evidence.bracket < 1e-6
+
+
+def test_orbits_of_twice_the_period_end_where_a_change_of_their_parent_bears_them(
+    turning: tuple[saltus.Branch, saltus.Branch],
+) -> None:
+    """They went on along the parent gone round twice, down to a change of that."""
+    doubling = turning[0].special[3]
+    (born,) = saltus.switch_branch(doubling, (0.265, 0.285))
+    assert born.ends[1].reason is OrbitEnd.IMAGE
+    change = turning[1].special[2]
+    (last,) = (point for point in born.special if point.kind == "SW" and point.parameter < 0.27)
+    assert abs(last.parameter - change.parameter) < last.evidence.bracket < 1e-4
+    assert born.special[-1].orbit.period == 1

@@ -50,7 +50,7 @@ class Corrected(Generic[E]):
 
 
 def newton(
-    evaluate: Callable[[np.ndarray, bool], E | None], linear: Linear[E], guess: np.ndarray, iterations: int
+    evaluate: Callable[[np.ndarray, bool], E | None], linear: Linear[E], guess: np.ndarray, iterations: int, rounded: float = 0.0
 ) -> Corrected[E] | None:
     """The zero of a system near a guess, or None where Newton's method does not converge.
 
@@ -65,6 +65,9 @@ def newton(
         Where to begin.
     iterations
         The most steps.
+    rounded
+        The largest residual that rounding may leave where derivatives are large: it is accepted where it moves the unknowns by no
+        more than `converged`.
     """
     place, before = guess.copy(), np.inf
     for iteration in range(iterations + 1):
@@ -73,13 +76,16 @@ def newton(
         if found is None:
             return None
         error, scale = np.abs(found.residual).max(), max(1.0, np.abs(place).max())
-        slow = error <= NEWTON.stalled * scale and error > NEWTON.slowdown * before
-        if error <= NEWTON.converged * scale or slow:
+        slow = error > NEWTON.slowdown * before
+        if error <= NEWTON.converged * scale or (slow and error <= NEWTON.stalled * scale):
             looked = found if thorough else evaluate(place, True)
             return None if looked is None else Corrected(place, looked, iteration)
         step = _step(*linear(found, place)) if error < NEWTON.diverged else None
         if step is None:
             return None
+        if slow and error <= rounded and np.abs(step).max() <= NEWTON.converged * scale:
+            looked = found if thorough else evaluate(place, True)
+            return None if looked is None else Corrected(place, looked, iteration)
         before, place = error, place + step
     return None
 

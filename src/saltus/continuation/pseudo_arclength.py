@@ -21,6 +21,7 @@ class EquationCurve(Curve[P]):
     iterations_at = 12  # and at a fixed number, where the guess may be farther away
     # Share of a step: a corrector that leads farther than this from where the step was predicted is given up.
     stray: float = math.inf
+    rounded: float = 0.0  # The largest residual that rounding may leave, where derivatives are large.
 
     @abstractmethod
     def evaluate(self, place: np.ndarray, thorough: bool) -> Evaluation | None:
@@ -48,7 +49,7 @@ class EquationCurve(Curve[P]):
         def linear(found: Evaluation, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return bordered(found.derivatives(), normal), -bordered(found.residual, normal @ (place - guess))
 
-        found = newton(evaluate, linear, guess, self.iterations)
+        found = newton(evaluate, linear, guess, self.iterations, self.rounded)
         return None if found is None else self.with_tangent(found, direction)
 
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
@@ -65,7 +66,7 @@ class EquationCurve(Curve[P]):
         def linear(found: Evaluation, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return found.derivatives()[:, free], -found.residual
 
-        found = newton(evaluate, linear, guess[free], self.iterations_at)
+        found = newton(evaluate, linear, guess[free], self.iterations_at, self.rounded)
         if found is None:
             return None
         return self.with_tangent(Corrected(filled(found.place), found.evaluation, found.iterations), direction)

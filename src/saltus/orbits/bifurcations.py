@@ -57,6 +57,7 @@ def torus(point: OrbitPoint) -> float:
             half = float(np.prod(_areas(equations.here) / _areas(equations.there)))
             product = (half**2 if point.orbit.symmetric else half) - 1.0
         else:
+            values = np.where(np.abs(values) > MULTIPLIER_ROUNDING * np.abs(values).max(), values, 0.0)
             first, second = np.triu_indices(len(values), 1)
             product = float(np.prod(values[first] * values[second] - 1.0).real)
     return -1.0 if not math.isfinite(product) else product if abs(product) > PRODUCT_ROUNDING else 0.0
@@ -100,6 +101,8 @@ def touching(point: OrbitPoint) -> float:
 
 
 PRODUCT_ROUNDING = 1e-12  # by which a product of multipliers may differ from 1 where nothing is lost
+# Multipliers smaller than the largest one by this factor are 0 but for rounding, whose product with it may have any size.
+MULTIPLIER_ROUNDING = 1e-12
 VANISHING = 1e-4  # modulus below which a complex pair of multipliers is one of zeros, by the root of rounding
 NEAREST = 1.0  # upper limit of the distance of an orbit from a grazing, which would be infinite for one that never turns
 

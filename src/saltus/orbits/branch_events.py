@@ -29,6 +29,7 @@ from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.switching_contacts import contact_change
 from saltus.orbits.switching_followed import (
+    TINY,
     beyond,
     change_at,
     events_at,
@@ -107,8 +108,11 @@ class BranchEvents(OrbitEvents):
         """Whether a step has not gone over to the orbits that are their own images, nor, from one grazing, beyond the next."""
         begun = point.iterations == 0  # with the signature of the other side of a grazing, where nothing had to be solved
         skipped = begun and grazing(point) <= TOLERANCES.touch and grazing(ahead) < 0.0
-        if isinstance(point.orbit.problem, FollowedProblem) and isinstance(self.cut(point, ahead), End):
-            return False  # the orbits ahead are others, as no way with a change of events leads there
+        if isinstance(point.orbit.problem, FollowedProblem):
+            if abs(ahead.orbit.multipliers[0]) > SETTINGS.steepest:
+                return False  # towards a change at which they grow without end: further steps would be rounding
+            if isinstance(self.cut(point, ahead), End):
+                return False  # the orbits ahead are others, as no way with a change of events leads there
         return not skipped and not falls_onto_image(point, ahead)
 
     def barrier(self, point: OrbitPoint) -> Test:
@@ -215,7 +219,7 @@ class BranchEvents(OrbitEvents):
         if isinstance(point.orbit.problem, FollowedProblem):
             if (end := refused_beyond(point, step, run.bounds)) is not None:
                 return end
-            if (cut := stalled_at(point, step)) is not None:
+            if (cut := stalled_at(point, step, run.points)) is not None:
                 return cut
         if point.orbit.problem.system.model.held and (limit := point.orbit.motion().limit) is not None:
             return End(OrbitEnd.REFUSED, point.parameter, detail=limit)
@@ -227,8 +231,12 @@ class BranchEvents(OrbitEvents):
 
 def _parent_at(run: Run, cut: Cut) -> SpecialPoint | None:
     """The special point of its parent at which a family ends where events change: there multipliers jump, see `jump_over`."""
-    parent = None if cut.special is None else parent_of(cut.point)
-    if parent is None or cut.special is None or all(is_image(point, TOLERANCES.grazing_orbits) for point in run.points):
+    near, point = TOLERANCES.grazing_orbits, cut.point
+    if cut.special is None or all(is_image(known, near) for known in run.points):
+        return None
+    way = cut.special.evidence.bracket / max(abs(point.tangent[-1]), TINY)  # to the change itself, if it was not reached
+    parent = parent_of(point, max(near, way * float(np.abs(point.tangent[:-1]).max())))
+    if parent is None:
         return None
     return SpecialPoint(SpecialKind.BPC if cut.point.orbit.period % 2 else SpecialKind.PD, parent, cut.special.evidence)
 

@@ -39,6 +39,7 @@ class FollowedProblem(Problem):
     period."""
 
     stray = 0.5  # Where the map jumps, the corrector wanders: ten times as far as a step may end from where it was predicted.
+    rounded = 1e-7  # Multipliers grow without end towards some changes of events: it is as large as rounding times 1e8 to 1e9.
     # The last place at which they were evaluated, and what was found: it is often asked for again, with more of it.
     _latest: tuple[np.ndarray, tuple[Motion, FollowedEquations] | None] | None = None
 

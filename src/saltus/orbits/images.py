@@ -100,11 +100,11 @@ def is_image(point: OrbitPoint, within: float = 1e-2 * TOLERANCES.image) -> bool
     return difference is not None and bool(np.abs(difference).max() < within)
 
 
-def parent_of(point: OrbitPoint) -> OrbitPoint | None:
-    """The orbit that is gone round twice, or from its image back to itself, of one that is its own image but for the square root
-    of rounding; None for others."""
+def parent_of(point: OrbitPoint, within: float = TOLERANCES.grazing_orbits) -> OrbitPoint | None:
+    """The orbit that is gone round twice, or from its image back to itself, of one that is its own image within so much; None for
+    others."""
     problem = point.curve.problem.halved
-    if problem is None or not is_image(point, TOLERANCES.grazing_orbits):
+    if problem is None or not is_image(point, within):
         return None
     curve = point.curve.with_problem(problem)
     parent: OrbitPoint | None = curve.solve_at(point.place, np.append(np.zeros(problem.size), 1.0))

@@ -71,6 +71,11 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
         """How far from the predicted one a point may be looked for."""
         return self.problem.stray
 
+    @property
+    def rounded(self) -> float:  # type: ignore[override]
+        """The largest residual that rounding may leave."""
+        return self.problem.rounded
+
     @cached_property
     def weights(self) -> np.ndarray:
         """The weights of the unknowns and the parameters in the norm."""

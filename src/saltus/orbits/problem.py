@@ -108,6 +108,7 @@ class Problem:
     """The equations of one signature of a system, as functions of the unknowns and of the parameters at `paths`."""
 
     stray: float = math.inf  # see `EquationCurve`
+    rounded: float = 0.0  # the largest residual that rounding may leave, where multipliers are large
 
     def __init__(self, system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> None:
         if system.load.frequency is None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -39,12 +39,22 @@ class OtherSideSettings:
     beside: tuple[float, ...] = (1e-9, 1e-8, 1e-7)
     # Distances at which an orbit is solved for on the other side: there the next event to change must not come before.
     probes: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+    # The same distances where the map is a square root: nearer than the first of them rounding is large.
+    steep_probes: tuple[float, ...] = (1e-4, 1e-3, 1e-5)
+    # Shares of such a distance before a change from which it is extrapolated where that is, how often at most, and the share of
+    # the square of the distance by which one begins beyond it.
+    approach: tuple[float, float] = (0.1, 0.01)
+    secants: int = 8
+    inside: float = 1e-3
     near: float = 3.0  # How far from the point such an orbit may be, in these distances.
     # Where the least of them led to none, the branch may turn round as soon: the first step is this many times the way to the
     # orbit. A longer one goes over to the part beyond the fold.
     first: float = 10.0
     # Where the map is continuous its residual so near to an orbit is no larger than this, a square root included.
     jump: float = 5e-3
+    fall: float = 10.0  # Orbits so many times as far from a change as the last one tell how far the rest of the way is.
+    rounded: float = 1e-10
+    doubt: float = 2.0  # The bracket of such a change, in units of that way.
     together: float = 1e-2  # Events of two orbits beside one another that are nearer than this are the same.
     refused: float = 10.0  # Steps ahead at which parameters are tried, where no step leads on.
     standing: float = 1e-11  # What moves by less sticks for good: slips grow as the third power of their duration.
@@ -89,7 +99,7 @@ def change_at(zero: Zero, reference: OrbitPoint) -> Cut | End:
         return Cut(zero.point, None)
     parent = parent_of(zero.point)  # it changes alike in both of its halves, while those of its family change places
     here, before = (zero.point, events_at(reference)) if parent is None else (parent, events_at(parent))
-    other = next(_beside(here, before.sequence), None)
+    _, other = next(_beside(here, before.sequence), (None, None))
     if other is None and events_at(zero.point).distance > SETTINGS.far:
         return End(CurveEnd.NOT_LOCATED, zero.parameter, SpecialKind.SW)
     if other is None:
@@ -112,15 +122,25 @@ def refused_beyond(point: OrbitPoint, step: float, bounds: Bounds) -> End | None
     return None
 
 
-def stalled_at(point: OrbitPoint, step: float) -> Cut | End | None:
-    """The cut at a point beyond which no step leads, if events change there: the branch turns round or ends."""
+def stalled_at(point: OrbitPoint, step: float, points: Sequence[OrbitPoint] = ()) -> Cut | End | None:
+    """The cut at the last one of a branch's points, beyond which no step leads, if events change there: the branch turns round or
+    ends. Where multipliers grow without end up to the change no orbit is solved for all the way: the rest is part of the bracket.
+    """
     here = parent_of(point) or point
-    beside = next(_beside(here, events_at(here).sequence), None)
+    _, beside = next(_beside(here, events_at(here).sequence), (None, None))
     if beside is None:
         return None
     test, width = same_events(point), step * np.abs(np.array(point.curve.scales))
-    there = -max(events_of_equations(beside).distance, TINY)
-    evidence = Evidence(point.residual, tuple(map(float, width)), test.value(point), there, test.value(point))
+    there, value = -max(events_of_equations(beside).distance, TINY), test.value(point)
+    known = [(value, point.parameters)]
+    for before in reversed(points):
+        if before.curve.joins(point.curve) and test.value(before) > SETTINGS.fall * max(known[-1][0], TINY):
+            known.append((test.value(before), before.parameters))
+    if len(known) > 1:
+        # what is told by an orbit whose residual rounding keeps large is its own rounding
+        (near, place), (far, other) = known[1:3] if len(known) > 2 and point.residual > SETTINGS.rounded else known[:2]
+        width = np.maximum(width, SETTINGS.doubt * np.abs(place - near / (far - near) * (other - place) - point.parameters))
+    evidence = Evidence(point.residual, tuple(map(float, width)), value, there, value)
     return change_at(SpecialPoint(SpecialKind.SW, point, evidence), point)
 
 
@@ -148,21 +168,49 @@ def other_events(point: OrbitPoint, sequence: EventSequence | None, points: Sequ
 
     It is none of the branch of these points, as between two changes that are all but one it may lead back along itself.
     """
-    reason, detail = OrbitEnd.NO_OTHER_EVENTS, ""
-    for equations in _beside(point, sequence):
+    reason, detail, sides = OrbitEnd.NO_OTHER_EVENTS, "", list[tuple[np.ndarray, np.ndarray]]()
+    curve = point.curve.with_problem(point.curve.problem)
+
+    def solved(place: np.ndarray, direction: np.ndarray, probe: float) -> OrbitPoint | None:
+        ahead: OrbitPoint | None = curve.solve_within(place, direction, SETTINGS.near * probe)
+        if ahead is None or events_at(ahead).sequence == sequence or not _leads_away(point, ahead, probe):
+            return None
+        return None if is_image(ahead) or _lies_on(points, ahead, SETTINGS.same * probe) else ahead
+
+    for beside, equations in _beside(point, sequence):
         if _is_discontinuous(equations):
             reason, detail = OrbitEnd.NOT_CONTINUOUS, f"{np.abs(equations.residual).max():.3g}"
             continue
-        curve = point.curve.with_problem(point.curve.problem)
         tangent = curve.along_kernel(Corrected(point.place, equations, 0)).tangent
-        for probe in SETTINGS.probes:
-            for direction in (tangent, -tangent):
-                ahead: OrbitPoint | None = curve.solve_within(point.place + probe * direction, direction, SETTINGS.near * probe)
-                if ahead is None or events_at(ahead).sequence == sequence or not _leads_away(point, ahead, probe):
-                    continue
-                if not is_image(ahead) and not _lies_on(points, ahead, SETTINGS.same * probe):
-                    return ahead
+        sides.append((beside, tangent))
+        for probe, direction in product(SETTINGS.probes, (tangent, -tangent)):
+            if (ahead := solved(point.place + probe * direction, direction, probe)) is not None:
+                return ahead
+    for (beside, tangent), probe, sign in product(sides[:2], SETTINGS.steep_probes, (1.0, -1.0)):
+        place = _just_beyond(point, point.place + sign * probe * tangent, beside - point.place, probe)
+        if place is not None and (ahead := solved(place, sign * tangent, probe)) is not None:
+            return ahead
     return End(reason, point.parameter, detail=detail)
+
+
+def _just_beyond(point: OrbitPoint, place: np.ndarray, way: np.ndarray, probe: float) -> np.ndarray | None:
+    """Where events have just changed on a line through a place, of the direction in which they do beside a point; None where that
+    is not known.
+
+    The orbits beyond may be as near to the change as the square of their distance from the point, as the map is a square root of
+    the way over it. Newton's method then converges only from between the change and the orbit.
+    """
+    axis = way / point.curve.norm(way)
+    known = list[tuple[float, float]]()
+    for _ in range(SETTINGS.secants):
+        at = -SETTINGS.approach[len(known)] * probe if len(known) < 2 else _zero_of_line(*known[-2:])
+        if len(known) > 1 and not abs(at - known[-1][0]) > SETTINGS.inside * probe**2:
+            return np.asarray(place + (at + SETTINGS.inside * probe**2) * axis)
+        equations = point.curve.evaluate(place + at * axis, thorough=True)
+        if equations is None or events_of_equations(equations).sequence != events_at(point).sequence:
+            return np.asarray(place + (at + SETTINGS.inside * probe**2) * axis) if len(known) > 1 else None
+        known.append((at, events_of_equations(equations).distance))
+    return None
 
 
 def first_step(point: OrbitPoint, ahead: OrbitPoint) -> float:
@@ -190,6 +238,12 @@ def jump_over(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
     return SpecialPoint(test.kind, cut.point, evidence) if before * after < 0.0 else None
 
 
+def _zero_of_line(first: tuple[float, float], second: tuple[float, float]) -> float:
+    """Where a function is 0 that has two values at two places; nan where they are equal."""
+    rise = second[1] - first[1]
+    return second[0] - second[1] * (second[0] - first[0]) / rise if rise else np.nan
+
+
 def _lies_on(points: Sequence[OrbitPoint], ahead: OrbitPoint, same: float) -> bool:
     """Whether an orbit is one of a branch of these points: solved for between them, it is no farther away than `same`."""
     begun, sequence = End(OrbitEnd.START), events_at(ahead).sequence
@@ -214,8 +268,8 @@ def _is_discontinuous(equations: FollowedEquations) -> bool:
     return bool(np.abs(equations.residual).max() > SETTINGS.jump)
 
 
-def _beside(point: OrbitPoint, sequence: EventSequence | None) -> Iterator[FollowedEquations]:
-    """The equations at places beside a point, not solved, at which the events are others than these or come at other times:
+def _beside(point: OrbitPoint, sequence: EventSequence | None) -> Iterator[tuple[np.ndarray, FollowedEquations]]:
+    """Places beside a point with the equations there, not solved, where the events are others than these or come at other times:
     one for each other sequence at each distance. What is held at the section stays so, as it does on all orbits near."""
     problem = point.curve.problem
     assert isinstance(problem, FollowedProblem)
@@ -224,13 +278,14 @@ def _beside(point: OrbitPoint, sequence: EventSequence | None) -> Iterator[Follo
     for distance in SETTINGS.beside:
         known = set()
         for direction in (point.tangent, -point.tangent, *axes, *-axes):
-            equations = point.curve.evaluate(point.place + distance * direction, thorough=True)
+            place = point.place + distance * direction
+            equations = point.curve.evaluate(place, thorough=True)
             if equations is None:
                 continue
             kind = events_of_equations(equations).sequence, _is_discontinuous(equations)
             if kind != (sequence, False) and kind not in known:
                 known.add(kind)
-                yield equations
+                yield place, equations
 
 
 def events_of_equations(equations: FollowedEquations) -> FollowedEvents:
