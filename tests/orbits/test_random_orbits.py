@@ -125,7 +125,7 @@ def test_a_load_without_frequency_has_no_orbits():
 
 def test_a_record_has_no_orbits():
     shaking = Record(time=np.linspace(0.0, 10.0, 41), value=np.sin(np.linspace(0.0, 10.0, 41)))
-    with pytest.raises(ParameterError, match=r"Record is not periodic.*Harmonic"):
+    with pytest.raises(ParameterError, match=r"Record or a pulse is not periodic.*Harmonic"):
         find_orbit(forced().with_({"load.horizontal": shaking}), theta=0.3)
 
 
