@@ -15,7 +15,7 @@ QUICK = {
     "fig12": {"values": [0.3, 2.0], "starts": 16, "max_period": 1, "repelling": 0, "switch": False},
     "fig13": {"values": [0.3, 1.2], "starts": 16, "max_period": 1, "repelling": 0, "switch": False},
 }
-ERRATA = {"fig09": {21, 22}, "fig10": {21, 22}, "fig11": {21, 24, 30, 36}, "fig12": {21, 36}, "fig13": {21, 35}}
+ERRATA = {"fig09": {21, 22}, "fig10": {21, 22}, "fig11": {21, 24, 30, 36, 37}, "fig12": {21, 36}, "fig13": {21, 35}}
 # How many motions there are, and where chaos begins and ends: not from a quick search at two or three values
 NEED_A_WHOLE_SEARCH = {
     *("fig09-chaos", "fig09-chaos-range", "fig09-pierced", "fig10-chaos", "fig10-pierced"),
