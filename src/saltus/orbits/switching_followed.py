@@ -53,7 +53,7 @@ class OtherSideSettings:
     # Where the map is continuous its residual so near to an orbit is no larger than this, a square root included.
     jump: float = 5e-3
     fall: float = 10.0  # Orbits so many times as far from a change as the last one tell how far the rest of the way is.
-    rounded: float = 1e-10
+    rounded: float = 1e-10  # An orbit of a larger residual tells its rounding, not how far it is from a change.
     doubt: float = 2.0  # The bracket of such a change, in units of that way.
     together: float = 1e-2  # Events of two orbits beside one another that are nearer than this are the same.
     refused: float = 10.0  # Steps ahead at which parameters are tried, where no step leads on.
