@@ -51,7 +51,7 @@ def test_extrema_and_impacts_are_those_of_one_period():
 def test_extrema_are_those_of_what_is_kept_whatever_else_is_recorded():
     system, periods, kept = forced(), 14, 4
     ends = find_recurrence(system, STATES, periods, kept=kept, max_period=2, extrema=True)
-    whole = find_recurrence(system, STATES, periods, kept=kept, max_period=2, extrema=True, whole=True)
+    whole = find_recurrence(system, STATES, periods, kept=kept, max_period=2, extrema=True, from_start=True)
     rows = np.flatnonzero(ends.unsettled)
     assert rows.size > 5
     assert np.array_equal(ends.extrema[rows], whole.extrema[rows])
@@ -62,6 +62,14 @@ def test_extrema_are_those_of_what_is_kept_whatever_else_is_recorded():
             end = motion.time - back * length
             dense = motion.at(np.linspace(end - length, end, 2001))[0]
             assert (dense.max(), dense.min()) == pytest.approx(ends.extrema[row, -1 - back], abs=2e-5)
+
+
+def test_motions_that_come_to_rest_have_no_extrema_unless_they_are_recorded_from_the_start():
+    system = forced(0.015)  # below the load of the fold at which motions begin
+    ends, all_of_it = (find_recurrence(system, STATES, 200, kept=2, extrema=True, from_start=start) for start in (False, True))
+    assert np.count_nonzero(ends.rest) > 5
+    assert np.isnan(ends.extrema[ends.rest]).all()
+    assert np.isfinite(all_of_it.extrema[ends.rest, -2:]).all()
 
 
 def test_extrema_of_a_motion_that_a_limit_ends_are_those_before_its_end():

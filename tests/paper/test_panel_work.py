@@ -1,7 +1,6 @@
 """The pool of the paper's panels: every part gets its own panels in their order, and what two parts share is computed once."""
 
 import os
-import time
 from functools import partial
 from pathlib import Path
 
@@ -44,18 +43,17 @@ def test_a_panel_that_fails_ends_the_others_with_its_own_error(panels: dict) -> 
         list(compute_panels({"part": panels}))
 
 
-def cores_beside(folder: str, own: str, other: str) -> int:
-    """The cores that a panel may use while another one is computed."""
-    (Path(folder) / own).touch()
-    late = time.monotonic() + 60.0
-    while not (Path(folder) / other).exists() and time.monotonic() < late:
-        time.sleep(0.01)
-    return available_cores()
+def cores_beside(pipe: str, mode: str) -> int:
+    """The cores that a panel may use while another one is computed, which opens the pipe too: each waits for the other."""
+    with open(pipe, mode):
+        return available_cores()
 
 
 @pytest.mark.skipif(available_cores() < 2, reason="on one core panels come one after the other")
 def test_panels_that_are_computed_at_the_same_time_share_the_cores(tmp_path: Path) -> None:
-    panels = {own: partial(cores_beside, str(tmp_path), own, other) for own, other in (("a", "b"), ("b", "a"))}
+    pipe = str(tmp_path / "pipe")
+    os.mkfifo(pipe)
+    panels = {mode: partial(cores_beside, pipe, mode) for mode in ("r", "w")}
     ((_, made, _),) = compute_panels({"part": panels})
     first, last = sorted(made.values())
     assert first == available_cores() // 2

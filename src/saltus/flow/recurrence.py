@@ -68,7 +68,7 @@ class Recurrence:
     periods: np.ndarray  # (n,): forcing periods that it was followed
     last: np.ndarray  # (n, d): the state at the end
     states: np.ndarray  # (n, kept, d): the stroboscopic states, the last one last, nan where there were fewer
-    # (n, kept, 2): largest and smallest of all coordinates in each of these periods, of what goes on or repeats itself
+    # (n, kept, 2): largest and smallest of all coordinates in each of these periods; nan where they were not recorded
     extrema: np.ndarray | None = None
     impact_counts: np.ndarray | None = None  # (n, kept): impacts in each of these periods
     speeds: np.ndarray | None = None  # (n, kept): the least speed before an impact in each of these periods, inf without
@@ -150,7 +150,7 @@ def find_recurrence(
     extrema: bool = False,
     impact_count: bool = False,
     speed: bool = False,
-    whole: bool = False,
+    from_start: bool = False,
     stop_early: bool = True,
     tol: float = RECURRENCE.tol,
     threads: int | None = None,
@@ -180,9 +180,9 @@ def find_recurrence(
         How many of the last stroboscopic states are kept, by default all; 0 for none.
     extrema, impact_count, speed
         Whether these are recorded, over max(kept, max_period) of the last forcing periods.
-    whole
+    from_start
         Whether extrema are recorded from the start, as they are where a limit of the model may end a motion. Otherwise they are
-        where it begins to repeat itself or its time is almost up: those of motions that come to rest are not known.
+        where it begins to repeat itself or its time is almost up, and nan for motions that come to rest for good or cannot go on.
     stop_early
         False follows every motion for all periods, and reads its period off the last states (`near_return`).
     tol
@@ -201,13 +201,15 @@ def find_recurrence(
         limits=limits,
         sample=tuple(name for name, chosen in sampled.items() if chosen),
         until=(Until.REST, Until.SETTLED) if stop_early else (),
-        whole=whole or bool(limits),
+        from_start=from_start or bool(limits),
     )
     last = max(1, min(max(size, max_period if extrema or impact_count or speed else 1), periods))
     coordinates, velocity = _as_arguments(system, states)
     inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
     result = run_ensemble(system, inputs, wanted, read_threads(threads), progress, last=last, captured=captured)
     found = replace(_read(result), outcome=_outcome(result, parameters is not None))
+    if found.extrema is not None and not wanted.from_start:
+        found.extrema[~result.stopped(Stop.HORIZON, Stop.REST, Stop.SETTLED)] = np.nan
     return _with_periods(found, result.recurrence_period if stop_early else None, max_period, settings)
 
 

@@ -98,7 +98,7 @@ class SweepRequest:
             max_period=self.max_period,
             kept=2 * self.max_period + 2 if self.stop_early else min(self.periods, self.max_period),
             extrema=True,
-            whole=True,
+            from_start=True,
             impact_count=True,
             stop_early=self.stop_early,
             tol=self.tol,

@@ -157,7 +157,7 @@ def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> L
         kept=kept if wanted.sample else 1,
         sampled=[column for kind in Sample if kind in wanted.sample for column in kind.columns(own)],
         extrema=Sample.EXTREMA in wanted.sample,
-        whole=wanted.whole,
+        from_start=wanted.from_start,
         settle=Until.SETTLED in wanted.until,
     )
 

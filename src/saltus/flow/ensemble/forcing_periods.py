@@ -98,7 +98,7 @@ def first_recorded(last, sizes):
 
     It is one before those that are kept, as a step past its end begins the next one; the last one may have no length.
     """
-    return -np.inf if sizes[Size.WHOLE] > 0 else last - sizes[Size.KEPT] - 1.0
+    return -np.inf if sizes[Size.FROM_START] > 0 else last - sizes[Size.KEPT] - 1.0
 
 
 @inline_jit

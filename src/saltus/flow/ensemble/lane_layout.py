@@ -74,7 +74,7 @@ class Size(IntEnum):
     GUARDS = 15  # of that series
     CONSTANT_GUARDS = 16
     FRICTIONS = 17  # their coordinates stand behind those of the contacts and their signs
-    WHOLE = 18  # whether extrema are recorded of the whole motion, not only of what is kept of it
+    FROM_START = 18  # whether extrema are recorded from the start, not only in the forcing periods that are kept
     CONTACTS = 19  # of a model with several; their coordinates stand behind, then their signs
 
 

@@ -115,7 +115,7 @@ class Lanes:
     kept: int  # how many of the last forcing periods are kept
     sampled: list[int]  # which columns of a sample are
     extrema: bool  # whether they are recorded
-    whole: bool  # of the whole motion, not only of what is kept of it
+    from_start: bool  # from the start of a motion, not only in the forcing periods that are kept
     settle: bool  # whether a trajectory ends when it repeats itself
 
     def run(self, jobs: Jobs, threads: int, progress: Progress = silent, total: float = 0.0) -> Ends:
@@ -211,7 +211,7 @@ class Lanes:
             Size.WORKSPACE: module.ROWS,
             Size.KEPT: self.kept,
             Size.EXTREMA: self.extrema,
-            Size.WHOLE: self.whole,
+            Size.FROM_START: self.from_start,
             Size.SETTLE: self.settle,
             Size.ENDS_ASKED: self.settle or bool(self.sampled),
             Size.EVERY_END: self.settle or self.kept > 1,

@@ -49,7 +49,7 @@ class Wanted:
     limits: tuple[str, ...]  # margins to stop at
     sample: tuple[str, ...] = ()  # of `Sample`
     until: tuple[str, ...] = ()  # of `Until`
-    whole: bool = True  # whether extrema are recorded of the whole motion, not only of what is kept of it: that takes time
+    from_start: bool = True  # whether extrema are recorded from the start, not only in the periods that are kept: that takes time
     paths: tuple[str, ...] | None = None  # of the parameters to differentiate to; None without derivatives
 
 
