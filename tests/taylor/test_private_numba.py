@@ -95,6 +95,39 @@ def test_machine_code_is_made_only_of_what_is_called_from_outside(tmp_path, monk
     assert numba.njit(lambda x: 3.0 * x)(2.0) == 6.0  # what others compile later is theirs to call
 
 
+REFERENCE = """
+import numpy as np
+from numba import float64
+from saltus.taylor.private_numba import cached_jit, jit, lean_jit
+from saltus.taylor.references import by_reference
+@lean_jit
+def element(both, i):
+    first, (second, factor) = both
+    return factor * (first[i] + second[i])
+@lean_jit
+def total_with(arrays, n):
+    both, total = by_reference(arrays), element(arrays, 0)
+    for i in range(1, n):
+        total += element(both, i)
+    return total
+@jit
+def count_from(first, n):
+    return np.arange(first, n) + 0.0
+@cached_jit(float64(float64))
+def total(x):
+    n = int(x)
+    return total_with((count_from(0, n), (np.ones(n), 2.0)), n)
+"""
+
+
+def test_a_tuple_by_reference_has_the_tuples_values_and_a_function_is_compiled_once_for_all_numbers(tmp_path, monkeypatch):
+    monkeypatch.setenv("SALTUS_CACHE_DIR", str(tmp_path))
+    made = load_module("reference", REFERENCE)
+    assert made.total(5.0) == 2.0 * (0 + 1 + 2 + 3 + 4 + 5)
+    assert len(made.count_from.overloads) == len(made.total_with.overloads) == 1
+    assert len(made.element.overloads) == 2  # of a tuple, and by reference, for every i
+
+
 def test_two_threads_that_compile_leave_numba_as_it_was(tmp_path):
     methods = [(CONTEXT, "get_executable"), (LIBRARY, "_optimize_final_module"), (LIBRARY, "_finalize_final_module")]
     before = [getattr(*method) for method in methods]

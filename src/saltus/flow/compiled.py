@@ -35,6 +35,7 @@ from saltus.flow.contacts import (
     contacts_kernel,
     frictions,
     segment_extremes,
+    solver_memory,
 )
 from saltus.flow.contacts.one_free import OneFree, equations_of_one_free
 from saltus.flow.memory_layout import State
@@ -66,6 +67,7 @@ import numpy as np
 
 from saltus.flow.function_types import *
 from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit
+from saltus.taylor.references import by_reference
 # types of {digest(source_of(function_types))}
 """
 ENV = {"parameter": ("parameters", 0), "constant": ("constants", 0), "record": ("table", 0)}
@@ -130,7 +132,16 @@ def load_contacts_kernel() -> Callable[..., int]:
 
 def contacts_module() -> ModuleType:
     """The module of the scalar kernel for models with several contacts."""
-    parts = (contact_layout, complementarity, contact_impacts, contact_tangent, frictions, contact_choice, closings)
+    parts = (
+        contact_layout,
+        solver_memory,
+        complementarity,
+        contact_impacts,
+        contact_tangent,
+        frictions,
+        contact_choice,
+        closings,
+    )
     return load_module("contacts", _text(kernel_layout, roots, steps, *parts, contact_decisions, contacts_kernel))
 
 
@@ -144,7 +155,7 @@ def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
 @cache
 def load_contact_segments() -> Callable[..., int]:
     """What orbits with several contacts are solved with: `follow_contact_segments` of `contacts/contact_segments.py`."""
-    parts = (contact_layout, complementarity, contact_impacts, contact_tangent, segment_extremes, contact_segments)
+    parts = (contact_layout, solver_memory, complementarity, contact_impacts, contact_tangent, segment_extremes, contact_segments)
     return entry_point(load_module("contact_segments", _text(kernel_layout, roots, steps, *parts)).follow_contact_segments)
 
 

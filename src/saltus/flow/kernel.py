@@ -49,7 +49,7 @@ from saltus.flow.steps import (
     step_size,
     work_arrays,
 )
-from saltus.taylor import cached_jit, lean_jit
+from saltus.taylor import by_reference, cached_jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -163,13 +163,10 @@ def held(where, state, settings, env, model, work, steps, origin, target):
         state[State.TIME] = t + tau if t + tau > t or released == 0 else np.nextafter(t, np.inf)  # time must go on
 
 
-@cached_jit(ADVANCE)
-def advance(where, state, settings, env, model, steps, events):
-    """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the reason.
-
-    All of the motion's state is in `where` and `state`, so a call goes on where the last one stopped.
-    """
-    work = work_arrays(where)
+@lean_jit
+def advance_with(where, state, settings, env_of, model_of, arrays, steps, events):
+    """`advance` with the arrays of `Work`."""
+    env, model, work = by_reference(env_of), by_reference(model_of), by_reference(arrays)
     for batch in range(BATCH):
         if where[Where.UNTIL_SMOOTH] > 0 and batch > 0 and where[Where.MODE] == Mode.ARC and where[Where.SKIP] <= 1:
             return Status.SMOOTH
@@ -194,3 +191,12 @@ def advance(where, state, settings, env, model, steps, events):
         if status != Status.PAUSED:
             return status
     return Status.PAUSED
+
+
+@cached_jit(ADVANCE)
+def advance(where, state, settings, env, model, steps, events):
+    """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the reason.
+
+    All of the motion's state is in `where` and `state`, so a call goes on where the last one stopped.
+    """
+    return advance_with(where, state, settings, env, model, work_arrays(where), steps, events)

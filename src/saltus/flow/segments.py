@@ -19,7 +19,7 @@ from saltus.flow.kernel_layout import ROUGHER, Geometry, ModelPart, Setting, Whe
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.roots import NOISE, SIMPLE, contact_root, horner, roots_within, scale_gap
 from saltus.flow.steps import column_step, expand, leaps, move, step_size, work_arrays
-from saltus.taylor import cached_jit, lean_jit
+from saltus.taylor import by_reference, cached_jit, jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -210,17 +210,12 @@ def copy_state(where, state, work, ends, columns, first):
             columns[own + i, j] = state[velocities + own * (1 + j) + i]
 
 
-@cached_jit(SEGMENTS)
-def follow_segments(where, settings, env, model, spans, sides, states, ends, columns, extremes):
-    """Follow all segments; returns how many of them have succeeded.
-
-    A segment's columns are d/d(speed before its impact), d/d(its start) and the parameters, or, started from a state (its
-    coordinates and velocities in `states`), its derivatives to that state and to the parameters. They stand in `columns` at the
-    end (first the coordinates, then the velocities) and then at the start. With `extremes` empty nothing is recorded between.
-    From a state with the side 0 a segment goes through all sides.
-    """
+@jit
+def follow_segments_with(where, settings, env_of, model_of, arrays, spans, sides, states, ends, columns, extremes):
+    """`follow_segments` with the arrays of `Work`."""
     dof, own = where[Where.DOF], where[Where.OWN]
-    work, roots, nothing = work_arrays(where), np.zeros(where[Where.ORDER] + 2), np.zeros(1)
+    env, model, work = by_reference(env_of), by_reference(model_of), by_reference(arrays)
+    roots, nothing = np.zeros(where[Where.ORDER] + 2), np.zeros(1)
     state = np.zeros(State.COORDINATES + 2 * dof + where[Where.COLUMNS])
     recording = extremes.shape[0] > 0
     for s in range(spans.shape[0]):
@@ -249,6 +244,19 @@ def follow_segments(where, settings, env, model, spans, sides, states, ends, col
         if not math.isfinite(ends[s, QUOTIENT]) or not math.isfinite(ends[s, KINDS + 2 * own]):
             return s
     return spans.shape[0]
+
+
+@cached_jit(SEGMENTS)
+def follow_segments(where, settings, env, model, spans, sides, states, ends, columns, extremes):
+    """Follow all segments; returns how many of them have succeeded.
+
+    A segment's columns are d/d(speed before its impact), d/d(its start) and the parameters, or, started from a state (its
+    coordinates and velocities in `states`), its derivatives to that state and to the parameters. They stand in `columns` at the
+    end (first the coordinates, then the velocities) and then at the start. With `extremes` empty nothing is recorded between.
+    From a state with the side 0 a segment goes through all sides.
+    """
+    arrays = work_arrays(where)
+    return follow_segments_with(where, settings, env, model, arrays, spans, sides, states, ends, columns, extremes)
 
 
 @cached_jit(IMPACT_EQUATIONS)

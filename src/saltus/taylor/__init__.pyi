@@ -5,7 +5,7 @@ from .equations import equations_of
 from .exact_algebra import Form, NoNormalForm, constant, constant_value, normal_form
 from .generated import Case, function_text, generated_header
 from .graph import RECORD_WIDTH, Expr, differentiate, is_steep, number, ordered, substitute
-from .kernel_functions import cached_jit, inline_jit, jit, lean_jit
+from .kernel_functions import by_reference, cached_jit, inline_jit, jit, lean_jit
 from .lane_vectors import (
     ALL,
     absolute,
@@ -59,6 +59,7 @@ __all__ = [
     "absolute",
     "anchor",
     "bits",
+    "by_reference",
     "cache_directory",
     "cached_jit",
     "check_size",

@@ -30,7 +30,7 @@ from types import CodeType, ModuleType
 from typing import cast
 
 from saltus.files import lock
-from saltus.taylor import private_numba
+from saltus.taylor import private_numba, references
 
 NOBODY = 65534  # to whom a container gives what belongs to the superuser outside of it
 MARKER = "# --- compiled from here on"
@@ -148,7 +148,7 @@ def digest(*texts: str) -> str:
 
 def module_name(kind: str, text: str) -> str:
     """The name of a generated source's module, with a digest of all that its compiled code depends on."""
-    return f"saltus_{kind}_{digest(text, source_of(private_numba))}"
+    return f"saltus_{kind}_{digest(text, source_of(private_numba), source_of(references))}"
 
 
 def is_compiled(name: str) -> bool:

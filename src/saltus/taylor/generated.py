@@ -16,7 +16,7 @@ from saltus.taylor import graph, instants, memory, records, rules, series, sums,
 from saltus.taylor.cache import digest, source_of
 from saltus.taylor.instants import instant
 from saltus.taylor.memory import Memory, Place, Places
-from saltus.taylor.private_numba import stack_of_cache_lines, written
+from saltus.taylor.private_numba import written
 from saltus.taylor.series import Rows, Series
 from saltus.taylor.tapes import Tape
 from saltus.taylor.vectors import CACHE_LINE, LONG, Arithmetic
@@ -98,3 +98,13 @@ def function_text(name: str, places: Places, arithmetic: str, content: Sequence[
             *("", "", ""),
         ]
     )
+
+
+def stack_of_cache_lines(function: Any, line: int) -> None:
+    """Have the vectors that find no register lie in one line of the cache each, or every use would touch two.
+
+    LLVM aligns the stack by itself for variables, but not for what it finds too late to be more than the registers hold. A
+    function taken into its caller would lose the attribute.
+    """
+    function.attributes.alignstack = line
+    function.attributes.add("noinline")

@@ -12,6 +12,8 @@ plain answer where a numba lacks it:
   that numba could compile, and `IndexDataCacheFile`, whose files get a digest: then numba's own `cache=True`;
 * what a function's library and context do when it has been compiled (`CPUContext`, `JITCodeLibrary`): machine code is made of
   those functions only that are called from outside: then it is made of all, which takes twice as long;
+* a dispatcher's `get_call_template`, through which calls are typed without the numbers that are written out in them: then a
+  function is compiled once more for each of these numbers;
 * `FunctionModel` and a compile result's `library` and `entry_point`, with which a function's address is looked up once, is given
   as a number, and calls skip numba's dispatch: then numba looks it up by Python code, at every call, and a Ctrl-C there is lost.
 """
@@ -33,7 +35,6 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from llvmlite import ir
 from numba import njit, types
 from numba.extending import NativeValue, intrinsic, lower_builtin, models, register_model, type_callable, typeof_impl, unbox
 
@@ -71,8 +72,20 @@ LEAN: dict[str, Any] = {"_nrt": False} | WITHIN
 def _njit(**options: Any) -> Callable[[Any], Any]:
     """numba's `njit` with saltus's options and those of the given ones that this numba knows."""
     known = {name: value for name, value in options.items() if not name.startswith("_") or hasattr(CPU_OPTIONS, name)}
-    decorator: Callable[[Any], Any] = njit(**OPTIONS | known)
-    return decorator
+
+    def decorated(function: Any) -> Any:
+        dispatcher = njit(**OPTIONS | known)(function)
+        template = getattr(dispatcher, "get_call_template", None)
+        if template is not None:
+            dispatcher.get_call_template = lambda args, kws: template(*_without_values(args, kws))
+        return dispatcher
+
+    return decorated
+
+
+def _without_values(args: Any, kws: Any) -> tuple[Any, Any]:
+    """The types of a call's arguments without the numbers that are written out in it, for each of which numba compiles anew."""
+    return tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
 
 
 jit = _njit(_nrt=True, **WITHIN)
@@ -374,22 +387,3 @@ def operator_meaning(symbol: Any, kind: type, result: Any, write: Callable[..., 
     for kinds in product((kind, types.Number), repeat=count):
         if kind in kinds:
             lower_builtin(symbol, *kinds)(code)
-
-
-def stack_of_cache_lines(function: Any, line: int) -> None:
-    """Have the vectors that find no register lie in one line of the cache each, or every use would touch two.
-
-    LLVM aligns the stack by itself for variables, but not for what it finds too late to be more than the registers hold. A
-    function taken into its caller would lose the attribute.
-    """
-    function.attributes.alignstack = line
-    function.attributes.add("noinline")
-
-
-def constant_table(builder: Any, numbers: list[float]) -> Any:
-    """LLVM's pointer to an array of numbers that the code carries along."""
-    values = ir.Constant(ir.ArrayType(ir.DoubleType(), len(numbers)), numbers)
-    module = builder.module
-    table = ir.GlobalVariable(module, values.type, module.get_unique_name("numbers"))
-    table.linkage, table.global_constant, table.initializer = "internal", True, values
-    return table

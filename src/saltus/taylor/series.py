@@ -16,9 +16,10 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
+from llvmlite import ir
+
 from saltus.taylor.graph import LEAVES, RECORD_WIDTH, degree
 from saltus.taylor.memory import Memory, Place
-from saltus.taylor.private_numba import constant_table
 from saltus.taylor.rules import ARITHMETIC, FUNCTIONS, by_slope
 from saltus.taylor.sums import SETTINGS, InnerLoop, Row
 from saltus.taylor.tapes import Node, Tape
@@ -355,3 +356,12 @@ def _needs_sums(op: str, degrees: list[int | None]) -> bool:
     if op == "mul":
         return degrees[0] is None and degrees[1] is None
     return op == "sqrt" or (op not in ("add", "sub") and degrees[-1 if op == "div" else 0] is None)
+
+
+def constant_table(builder: Any, numbers: list[float]) -> Any:
+    """LLVM's pointer to an array of numbers that the code carries along."""
+    values = ir.Constant(ir.ArrayType(ir.DoubleType(), len(numbers)), numbers)
+    module = builder.module
+    table = ir.GlobalVariable(module, values.type, module.get_unique_name("numbers"))
+    table.linkage, table.global_constant, table.initializer = "internal", True, values
+    return table

@@ -55,6 +55,7 @@ from saltus.flow.contacts.contact_tangent import (
     slope,
 )
 from saltus.flow.contacts.frictions import hold_frictions
+from saltus.flow.contacts.solver_memory import copy_all
 from saltus.flow.kernel_layout import Status, Where, Work
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.steps import expand, forget
@@ -173,7 +174,8 @@ def impacts_in_a_row(where, state, env, model, contacts, frictions, work, solver
             return -1
         if found != ImpactDetail.NO_SPEED and detail != ImpactDetail.REGULAR:
             found = detail
-        total += solver[Solver.IMPULSES]
+        for i in range(total.size):
+            total[i] += solver[Solver.IMPULSES][i]
         for j in range(where[Where.COLUMNS]):
             shift = state[shifts + j]
             together[j] = math.nan if begun and is_apart(together[j], shift) else shift
@@ -183,7 +185,7 @@ def impacts_in_a_row(where, state, env, model, contacts, frictions, work, solver
             move_columns(where, state, work, -1.0)
             clear_shifts(where, state)
     undecide(where, state, contacts, opened)
-    solver[Solver.IMPULSES][:] = total
+    copy_all(total, solver[Solver.IMPULSES])
     return found
 
 
@@ -211,7 +213,9 @@ def impacts_in_any_order(where, state, env, model, contacts, frictions, work, so
     rates_between(where, state, env, model, contacts, frictions, work, solver, t, origin, hit)
     move_columns(where, state, work, -1.0)
     other = state.copy()
-    state[:], contacts[:] = start, rows
+    copy_all(start, state)
+    for i in range(contacts.shape[0]):
+        copy_all(rows[i], contacts[i])
     hold_coordinates(where, env, contacts)
     hold_frictions(where, env, frictions)
     detail = impacts_in_a_row(where, state, env, model, contacts, frictions, work, solver, t, origin, hit, False)
@@ -267,5 +271,6 @@ def rests_in_a_row(where, state, env, model, contacts, frictions, work, solver, 
         bring_to_rest(where, state, model, contacts, solver, block)
         if where[Where.COLUMNS] > 0:
             rest_columns(where, state, env, model, contacts, solver, block)
-        total += solver[Solver.IMPULSES]
-    solver[Solver.IMPULSES][:] = total
+        for i in range(total.size):
+            total[i] += solver[Solver.IMPULSES][i]
+    copy_all(total, solver[Solver.IMPULSES])

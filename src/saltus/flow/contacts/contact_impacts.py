@@ -14,26 +14,9 @@ from saltus.flow.contacts.contact_layout import FINISHED, MOST_FROZEN_IMPACTS, V
 from saltus.flow.kernel_layout import CHATTER_SPEED, EXACT, ROUGHER, SLOW, Mode, Setting, Where, Work
 from saltus.flow.memory_layout import State
 from saltus.flow.steps import column_step, leaps, step_size
-from saltus.taylor import jit, lean_jit
+from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
-
-
-@jit
-def solver_arrays(own, count, columns, frictions):
-    """The arrays of `Solver`, for so many columns of a tangent."""
-    most, numbers = max(2 * own, count + 1), own * own + count * count + count + frictions
-    return (
-        np.zeros(numbers),
-        np.zeros((own, own)),
-        np.zeros((count, count)),
-        np.zeros((max(own, count), most)),
-        np.zeros((count, count)),
-        *(np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)),
-        *(np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)),
-        *(np.zeros(columns * numbers), np.zeros(own)),
-        *(np.zeros(columns), np.zeros((columns, count))),
-    )
 
 
 @lean_jit

@@ -22,7 +22,6 @@ from saltus.flow.contacts.contact_impacts import (
     impact_impulses,
     push,
     restitution,
-    solver_arrays,
 )
 from saltus.flow.contacts.contact_layout import ContactColumn, ContactPart, SegmentEnd, SegmentPlan, Solver
 from saltus.flow.contacts.contact_tangent import fill_slopes, hold_columns, impulse_columns, lift, note_velocities
@@ -33,11 +32,12 @@ from saltus.flow.contacts.segment_extremes import (
     extremes_at_step,
     gap_beside,
 )
+from saltus.flow.contacts.solver_memory import solver_arrays
 from saltus.flow.function_types import CONTACT_SEGMENTS
 from saltus.flow.kernel_layout import Where, Work
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.steps import expand, move, work_arrays
-from saltus.taylor import cached_jit, lean_jit
+from saltus.taylor import by_reference, cached_jit, jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -238,18 +238,13 @@ def pass_event(where, state, env, model, contacts, solver, row, ends, maps):
     return True
 
 
-@cached_jit(CONTACT_SEGMENTS)
-def follow_contact_segments(where, settings, env, model, contacts, plan, times, first, ends, columns, maps, extremes):
-    """Follow segments one after the other, each from the state that the event before it leaves; returns how many succeed.
-
-    `plan` says for each which contacts are closed along it, with which event it ends at which contact, and which contacts are
-    closed afterwards (`SegmentPlan`); `times` (n + 1) are those of its ends, `first` is the state at the first one. `ends` holds
-    numbers in the places of `SegmentEnd`; `columns` the derivatives to the state at the start and to the parameters of the state
-    at the end, at a fixed time, and of the guard; `maps` those of the state after the event to the state before it and to the
-    parameters. `extremes` is filled, in the places of `SegmentExtremes`, if it has rows.
-    """
+@jit
+def follow_with(
+    where, settings, env_of, model_of, contacts, arrays, solver_of, plan, times, first, ends, columns, maps, extremes
+):
+    """`follow_contact_segments` with the arrays of `Work` and of `Solver`."""
     own, dof = where[Where.OWN], where[Where.DOF]
-    work, solver = work_arrays(where), solver_arrays(own, contacts.shape[0], where[Where.COLUMNS], 0)
+    env, model, work, solver = by_reference(env_of), by_reference(model_of), by_reference(arrays), by_reference(solver_of)
     roots, nothing, least = np.zeros(where[Where.ORDER] + 2), np.zeros(1), np.zeros(2)
     state = np.zeros(State.COORDINATES + 2 * dof + where[Where.COLUMNS])
     for a in range(own):
@@ -294,3 +289,18 @@ def follow_contact_segments(where, settings, env, model, contacts, plan, times, 
             if extremes.shape[0] > 0 and kind == EventCode.IMPACT:
                 gap_beside(where, model, contacts, solver, plan, s, end - begin, ends[s], seen)
     return plan.shape[0]
+
+
+@cached_jit(CONTACT_SEGMENTS)
+def follow_contact_segments(where, settings, env, model, contacts, plan, times, first, ends, columns, maps, extremes):
+    """Follow segments one after the other, each from the state that the event before it leaves; returns how many succeed.
+
+    `plan` says for each which contacts are closed along it, with which event it ends at which contact, and which contacts are
+    closed afterwards (`SegmentPlan`); `times` (n + 1) are those of its ends, `first` is the state at the first one. `ends` holds
+    numbers in the places of `SegmentEnd`; `columns` the derivatives to the state at the start and to the parameters of the state
+    at the end, at a fixed time, and of the guard; `maps` those of the state after the event to the state before it and to the
+    parameters. `extremes` is filled, in the places of `SegmentExtremes`, if it has rows.
+    """
+    solver = solver_arrays(where[Where.OWN], contacts.shape[0], where[Where.COLUMNS], 0)
+    arrays = work_arrays(where)
+    return follow_with(where, settings, env, model, contacts, arrays, solver, plan, times, first, ends, columns, maps, extremes)

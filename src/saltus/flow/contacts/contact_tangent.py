@@ -17,6 +17,7 @@ import numpy as np
 from saltus.flow.contacts.complementarity import acting, invert
 from saltus.flow.contacts.contact_impacts import frozen_accumulation, restitution
 from saltus.flow.contacts.contact_layout import APART, RELATIVE_STEP, TIED, ContactColumn, ContactPart, ImpactDetail, Solver
+from saltus.flow.contacts.solver_memory import copy_all
 from saltus.flow.kernel_layout import Where, Work
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.steps import expand
@@ -247,8 +248,10 @@ def accumulation_shifts(where, state, env, model, contacts, work, solver, near, 
             perturb(where, state, model, contacts, solver, j, sign * step)
             left = frozen_accumulation(solver, own, count, near, np.inf)
             change += sign * (left if left >= 0.0 else math.nan)
-            solver[Solver.GAPS][:], solver[Solver.RATES][:], solver[Solver.PULLS][:] = gaps, rates, pulls
-            solver[Solver.NUMBERS][:] = numbers
+            copy_all(gaps, solver[Solver.GAPS])
+            copy_all(rates, solver[Solver.RATES])
+            copy_all(pulls, solver[Solver.PULLS])
+            copy_all(numbers, solver[Solver.NUMBERS])
         solver[Solver.EVENT_SHIFTS][j] += 0.5 * change / step if largest > 0.0 else 0.0
     perturb(where, state, model, contacts, solver, 0, 0.0)
 

@@ -29,7 +29,6 @@ from saltus.flow.contacts.contact_impacts import (
     hold_coordinates,
     is_smooth,
     record_contact_event,
-    solver_arrays,
 )
 from saltus.flow.contacts.contact_layout import (
     GAP_ROUNDING,
@@ -44,12 +43,13 @@ from saltus.flow.contacts.contact_tangent import (
     release_columns,
 )
 from saltus.flow.contacts.frictions import first_friction, friction_step_size, hold_frictions, reach
+from saltus.flow.contacts.solver_memory import solver_arrays
 from saltus.flow.function_types import ADVANCE_CONTACTS
 from saltus.flow.kernel_layout import BATCH, SHORTEST, ZERO, Mode, Setting, Status, Where, Work
 from saltus.flow.memory_layout import EventCode, State
 from saltus.flow.roots import NEVER, SIMPLE, contact_root, horner, horner_slope, margin_root
 from saltus.flow.steps import expand, move, next_target, record_step, work_arrays
-from saltus.taylor import cached_jit, lean_jit
+from saltus.taylor import by_reference, cached_jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -207,15 +207,10 @@ def contact_arc(where, state, settings, env, model, contacts, frictions, work, s
     return Status.PAUSED if ended else Status.STALLED
 
 
-@cached_jit(ADVANCE_CONTACTS)
-def advance_contacts(where, state, settings, env, model, rows, steps, events):
-    """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the reason.
-
-    `rows` are those of the contacts, then those of the frictions.
-    """
-    count = model[ContactPart.SIGNS].size
-    contacts, frictions = rows[:count], rows[count:]
-    work, solver = work_arrays(where), solver_arrays(where[Where.OWN], count, where[Where.COLUMNS], frictions.shape[0])
+@lean_jit
+def advance_contacts_with(where, state, settings, env_of, model_of, contacts, frictions, arrays, solver_of, steps, events):
+    """The same with the arrays of `Work` and of `Solver`."""
+    env, model, work, solver = by_reference(env_of), by_reference(model_of), by_reference(arrays), by_reference(solver_of)
     couple(where, state, env, model, contacts, solver)
     hold_coordinates(where, env, contacts)
     hold_frictions(where, env, frictions)
@@ -247,3 +242,17 @@ def advance_contacts(where, state, settings, env, model, rows, steps, events):
         if status != Status.PAUSED:
             return status
     return Status.PAUSED
+
+
+@cached_jit(ADVANCE_CONTACTS)
+def advance_contacts(where, state, settings, env, model, rows, steps, events):
+    """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the reason.
+
+    `rows` are those of the contacts, then those of the frictions.
+    """
+    count = model[ContactPart.SIGNS].size
+    contacts, frictions = rows[:count], rows[count:]
+    solver = solver_arrays(where[Where.OWN], count, where[Where.COLUMNS], frictions.shape[0])
+    return advance_contacts_with(
+        where, state, settings, env, model, contacts, frictions, work_arrays(where), solver, steps, events
+    )

@@ -12,7 +12,7 @@ from typing import Any
 from saltus.flow import contact_side, kernel_layout, memory_layout, roots
 from saltus.flow import function_types as scalar_types
 from saltus.flow.compiled import contacts_module, kernel_module
-from saltus.flow.contacts import complementarity, contact_impacts, contact_layout
+from saltus.flow.contacts import complementarity, contact_impacts, contact_layout, solver_memory
 from saltus.flow.ensemble import (
     contact_function_types,
     contact_steps,
@@ -55,6 +55,7 @@ _SIGNATURES = f"""
 from saltus.flow.ensemble.function_types import *
 from saltus.taylor.lane_vectors import *
 from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit, pointed_jit
+from saltus.taylor.references import by_reference
 # types and vectors of {_WRITTEN_BY}
 """
 
@@ -68,6 +69,7 @@ def load_driver(several: bool = False) -> Callable[..., None]:
 def _driver_text(several: bool) -> str:
     of_several = (
         contact_layout,
+        solver_memory,
         complementarity,
         contact_impacts,
         contacts_of_lane,

@@ -43,6 +43,7 @@ from saltus.taylor import (
     WIDTH,
     anchor,
     bits,
+    by_reference,
     cached_jit,
     expand_record,
     first_lane,
@@ -86,14 +87,14 @@ def begin_together(m, free):
     replace(m, Slot.PERIOD, going, period)
 
 
-@cached_jit(RUN_LANES, nogil=True)
-def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, results, control):
-    """Run all jobs. `control` = [whether to stop, forcing periods done so far]."""
-    tol = settings[LaneSetting.TOLERANCE]
-    limits = step_limits(sizes[Size.ORDER], tol), step_limits(sizes[Size.ORDER], ROUGHER * tol)
-    lanes, flags = lane_arrays(sizes, at), np.zeros(3, dtype=np.int64)
+@lean_jit
+def run_with(
+    code_of, scalar, helpers_of, sizes, at, settings, m, jobs_of, tables_of, results_of, control, limits, flags, arrays, room
+):
+    """`run_lanes` with the arrays of `LaneArray`, and room."""
+    code, helpers, jobs, tables = by_reference(code_of), by_reference(helpers_of), by_reference(jobs_of), by_reference(tables_of)
+    results, lanes, space = by_reference(results_of), by_reference(arrays), by_reference(room)
     count, following = jobs[JobArray.STATES].shape[0], 0
-    space = lane_space(sizes, at)
     while True:
         while flags[Flag.BUSY] != ALL and following < count:
             lane = first_lane(~flags[Flag.BUSY])
@@ -142,3 +143,12 @@ def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, resul
                 status = Status.CAPTURED
             if status != Status.PAUSED:
                 finish(lane, status, detail, code, sizes, at, m, flags, lanes, results)
+
+
+@cached_jit(RUN_LANES, nogil=True)
+def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, results, control):
+    """Run all jobs. `control` = [whether to stop, forcing periods done so far]."""
+    tol = settings[LaneSetting.TOLERANCE]
+    limits = step_limits(sizes[Size.ORDER], tol), step_limits(sizes[Size.ORDER], ROUGHER * tol)
+    lanes, flags, space = lane_arrays(sizes, at), np.zeros(3, dtype=np.int64), lane_space(sizes, at)
+    run_with(code, scalar, helpers, sizes, at, settings, m, jobs, tables, results, control, limits, flags, lanes, space)

@@ -41,7 +41,8 @@ def fill(lane, i, code, sizes, at, m, flags, lanes, jobs, tables):
     label[lane, LaneLabel.LEAVE_BY], label[lane, LaneLabel.PIECE] = labels[i, JobLabel.LEAVE_BY], labels[i, JobLabel.PIECE]
     label[lane, LaneLabel.HELD] = label[lane, LaneLabel.SKIP] = label[lane, LaneLabel.GRAZINGS] = 0
     number[lane, LaneNumber.END_TIME], number[lane, LaneNumber.CHATTER_SPEED] = numbers[i, JobNumber.END_TIME], 0.0
-    agreements[lane, :] = 0
+    for k in range(agreements.shape[1]):
+        agreements[lane, k] = 0
     breaks, table = own_records(tables, i)
     env = (parameters[i], constants[lane], breaks, table)
     code[Code.CONSTANTS](parameters[i], constants[lane])

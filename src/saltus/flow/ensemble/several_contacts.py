@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.contacts.contact_impacts import solver_arrays
 from saltus.flow.contacts.contact_layout import ContactColumn, FrictionColumn
+from saltus.flow.contacts.solver_memory import solver_arrays
 from saltus.flow.ensemble.contact_steps import free_step, of_free, one_free_step, one_is_free, pass_ends_of_free
 from saltus.flow.ensemble.contacts_of_lane import tell_closed
 from saltus.flow.ensemble.lane_impacts import resolve_impacts
