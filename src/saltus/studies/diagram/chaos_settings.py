@@ -33,7 +33,7 @@ class ChaosSettings:
     judgements: tuple[JudgementSettings, ...] = (
         replace(JUDGEMENT, companions=8, exposure=2000, round_periods=500, rounds=2),
         replace(JUDGEMENT, companions=16, exposure=20_000, round_periods=1125),
-        replace(JUDGEMENT, exposure=100_000, round_periods=1125, rounds=8),
+        replace(JUDGEMENT, exposure=100_000, round_periods=1125),
     )
     # Share of the range: the values of a band that lie so near to one another are judged together, by the sum of the forcing
     # periods in which none of their motions has settled.
