@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from saltus.systems import System
 
 # Raised whenever the same request gives other numbers than before: a result of another version is not gone on with.
-RESULT_VERSION = 10
+RESULT_VERSION = 11
 
 
 def provenance(system: System | None = None, *, tol: float | None = None, seed: int | None = None, **more: Any) -> dict[str, Any]:
