@@ -17,7 +17,7 @@ Work = tuple[Any, Any, Any]
 
 @dataclass(frozen=True)
 class ClimbSettings:
-    """How far and in how many steps a gap is opened."""
+    """The largest opening of a gap, and the steps in which it is opened."""
 
     widest: float = 1e6  # The largest opening that is considered.
     tries: int = 30  # The largest number of times that the first step is divided by 4, until it may be taken.

@@ -25,7 +25,7 @@ class EventCode(IntEnum):
 
 
 class RestDetail(IntEnum):
-    """How rest comes about, which decides its derivatives."""
+    """The way in which a system comes to rest, which decides the derivatives at rest."""
 
     AFTER_IMPACTS = 0  # as the limit of an accumulation of impacts
     AT_ONCE = 1  # after an impact that leaves no speed; motions from neighbouring states come to rest soon after
@@ -33,7 +33,7 @@ class RestDetail(IntEnum):
 
 
 class ReleaseDetail(IntEnum):
-    """What releases a system from rest, which decides the derivatives of the release."""
+    """The cause of a release from rest, which decides the derivatives of the release."""
 
     AT_A_ROOT = 0  # a simple root of the contact acceleration
     AT_A_JUMP = 1  # a jump of the contact acceleration through zero, whose time the load fixes

@@ -94,7 +94,7 @@ def start_by_impact(where, state, env, model, work, t, side, speed):
     set_state(where, state, model[ModelPart.GEOMETRY][Geometry.CONTACT], after)
     drift = state[velocities + where[Where.DOF] + 1]
     expand(where, state, env, model, work, t, 0.0, next_side, 0)
-    state[coordinates + 2] = -state[velocities]  # the column of the start: what the equation of motion adds to it
+    state[coordinates + 2] = -state[velocities]  # the column of the start: the term of the equation of motion
     state[velocities + 2] = drift - work[Work.ACCELERATIONS][0, 0]
     return next_side, drift
 

@@ -155,7 +155,7 @@ class Problem:
 
     @property
     def size(self) -> int:
-        """How many unknowns there are."""
+        """The number of unknowns."""
         return 2 * (len(self.signature.sides) or self.own)
 
     @property

@@ -36,9 +36,9 @@ def within_window(system: System, points: np.ndarray, window: Window, shrunk: An
     """The states (..., n, d) at points of the cube (-1, 1)^d, mapped to a window that is shrunk towards the contact by a factor.
 
     States beyond a contact are reflected at it. For a model with several contacts the states alternate, in pairs, between those
-    with all contacts open and those with some of the coordinates held at their nearest contacts, for each choice of coordinates
-    whose contacts lie in the window. Without this no motion would begin with a closed contact, because such states have no share
-    of the window's volume.
+    with all contacts open and those with some, but not all, coordinates held at their nearest contacts, for each choice of
+    coordinates whose contacts lie in the window. Without this no motion would begin with a closed contact, because such states
+    have no share of the window's volume.
     """
     rest = rest_state(system)
     states = np.asarray((points * window.half + (window.centre - rest)) * shrunk + rest)

@@ -70,7 +70,7 @@ class Switching:
                 yield _changed(events, {i: None, j: second})  # the impact on the other contact opens this one
                 swapped = before ^ (1 << other.contact) if not other.is_impact or other.closed >> other.contact & 1 else before
                 yield _changed(events, {i: replace(second, phase=first.phase).leaving(swapped), j: first.leaving(other.closed)})
-            elif one.is_impact:  # an impact, then a release at once: closed for no time
+            elif one.is_impact:  # it is closed for no time, or opens without speed and closes at once
                 yield _changed(events, {i: first.leaving(other.closed), j: None})
             else:
                 yield _changed(events, {i: None, j: None})

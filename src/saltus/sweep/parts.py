@@ -136,7 +136,7 @@ def text_rows(texts: Sequence[bytes], width: int) -> np.ndarray:
 
 
 def parts_of(store: Path, verify: bool = False) -> Iterator[StoreStatus]:
-    """How far the parts in a store are; to `verify` reads all of them."""
+    """The states of all parts in a store; with `verify` all of their files are read."""
     folder = store / PARTS
     for path in sorted(folder.iterdir()) if folder.is_dir() else ():
         if (path / "zarr.json").is_file():

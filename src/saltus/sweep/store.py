@@ -126,7 +126,7 @@ def opened(plan: Plan, path: Path) -> Iterator[Store]:
         The store cannot be made, or another run is writing to it.
     """
     check_store(plan, path)
-    if not (path / files.METADATA).is_file():  # it is what the lock is on
+    if not (path / files.METADATA).is_file():  # the lock is on this file
         (_restore if (path / files.CHECKSUMS).is_file() else _create)(plan, path)
     with files.locked(path) as got:
         if got is False:

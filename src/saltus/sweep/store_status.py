@@ -1,4 +1,4 @@
-"""How far a sweep is, read from the files of its store alone."""
+"""The state of a sweep, read from the files of its store alone."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ for each lane. `memory.py` has the places of the code's arguments, `vectors.py` 
 `lane_vectors.py` gives numba the same vectors for the ensemble's own loops. There is no second generator, and each function has
 one rule.
 
-What the generated code may assume. The time reaches it through the load only, as a local time that restarts with every forcing
+Assumptions of the generated code. The time enters through the load only, as a local time that restarts with every forcing
 period. Expressions that are expanded in series hold no comparisons; on one side of a contact they are analytic wherever they are
 finite. Parts that depend on parameters alone are computed once for a motion (`shared_constants`). Series may use fused
 multiply-adds; values at an instant never do, so that the difference of two equal products is 0. One motion divides and uses the C

@@ -108,7 +108,7 @@ class CommonForm:
             return self._multiplied(*e.args)
         if e.op == "div" and e.args[1].degree == 0:
             return {factors: coefficient / e.args[1] for factors, coefficient in self._terms_of(e.args[0]).items()}
-        if e.op in ("sin", "cos") and e.args[0].degree is None:  # those of the time alone cost little as they are
+        if e.op in ("sin", "cos") and e.args[0].degree is None:  # sines and cosines of the time alone are cheap as they are
             return self._split(e)
         return {(e,): number(1.0)}
 
@@ -158,5 +158,5 @@ def _peeled(e: Expr) -> tuple[Factors, Expr]:
 
 
 def _counted(factors: list[Expr]) -> list[tuple[Expr, int]]:
-    """Each factor with how often it is there, the most frequent ones first."""
+    """Each factor with its number of occurrences, the most frequent ones first."""
     return sorted({factor: factors.count(factor) for factor in factors}.items(), key=lambda item: -item[1])

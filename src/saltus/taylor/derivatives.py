@@ -54,7 +54,7 @@ def extend(trace: Trace, paths: tuple[str, ...]) -> None:
     """Append the tangent's columns to a trace as further coordinates; coordinate dof + j dof + d is u_d of column j."""
     own = list(trace.acceleration)
     trace.paths, trace.columns = paths, 2 * trace.dof + len(paths)
-    for path, order in list(trace.records):  # what the time derivative at a jump of the motion needs
+    for path, order in list(trace.records):  # the time derivative at a jump of the motion needs these
         if (path, order + 1) not in trace.records:
             trace.records.append((path, order + 1))
     for j in range(trace.columns):

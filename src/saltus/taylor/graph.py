@@ -13,7 +13,7 @@ import numpy as np
 from saltus.errors import TraceError
 from saltus.taylor.rules import FUNCTIONS
 
-# What a reset, evaluated at one instant, may use besides the operations that have a Taylor recurrence.
+# The operations without Taylor recurrence that a reset may use, because it is evaluated at one instant only.
 POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
 LEAVES = ("number", "parameter", "time", "origin", "side", "free", "slide", "coordinate", "velocity", "acceleration", "record")
 RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement

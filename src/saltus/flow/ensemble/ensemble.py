@@ -62,8 +62,9 @@ def simulate_many(
     parameters
         Arrays by dotted path, such as {"load.horizontal.amplitude": np.linspace(0, 1, 101)}.
     sample
-        What is kept of each of the `last` forcing periods, see `Sample`. Periods are counted from the start, and the period
-        in which the trajectory ends is kept, however short it is. "extrema" and "speed" are also returned for the whole motion.
+        The quantities that are kept for each of the `last` forcing periods, see `Sample`. Periods are counted from the start; the
+        period in which the trajectory ends is kept, however short it is. "extrema" and "speed" are also returned for the whole
+        motion.
     last
         For how many forcing periods samples are kept, counted back from the end; "all" keeps every one.
     until

@@ -147,8 +147,8 @@ def period_end(lane, m, lanes):
 def begin_period(lane, sizes, m, lanes, tables):
     """Set the end of a lane's forcing period, and the time beyond which no step goes.
 
-    This time is one period after the end, so that a step may go past the end, but no later than the end of the motion. Both are
-    at most the next breakpoint of the load's records.
+    This time is one period after the end, so that a step may go past the end; it is the end itself if the motion ends in this
+    period or the next. Both are at most the next breakpoint of the load's records.
     """
     labels = lanes[LaneArray.LABELS]
     breaks = tables[0]  # indexed with `own`: a row as an array of its own would need a locked instruction to count references

@@ -105,7 +105,7 @@ def available_cores() -> int:
 
 @dataclass(frozen=True)
 class Lanes:
-    """A structure ready to run in lanes, with what is the same for all of its trajectories."""
+    """A structure ready to run in lanes, with the settings that are the same for all of its trajectories."""
 
     program: Program
     slots: Slots
