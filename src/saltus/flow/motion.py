@@ -38,13 +38,13 @@ class EventKind(StrEnum):
     IMPACT = "impact"  #: an impact: the gap closes with a speed
     GRAZING = "grazing"  #: the gap touches zero without a speed, to within the working precision
     REST = "rest"  #: the system comes to rest at contact, at once or as the limit of impacts
-    RELEASE = "release"  #: it leaves contact from rest
+    RELEASE = "release"  #: the system leaves contact from rest
     CHATTER = "chatter"  #: impacts without loss became too small to follow; the phase is lost from here on
     LIMIT = "limit"  #: a margin reached zero
     HELD = "held"  #: of several contacts, some come to rest as the limit of impacts
-    STICK = "stick"  #: what slid with dry friction sticks
-    SLIP = "slip"  #: what stuck begins to slide
-    REVERSAL = "reversal"  #: it slides the other way without having stuck
+    STICK = "stick"  #: a friction changes from sliding to sticking
+    SLIP = "slip"  #: a friction changes from sticking to sliding
+    REVERSAL = "reversal"  #: a friction slides the other way without having stuck
 
 
 EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers

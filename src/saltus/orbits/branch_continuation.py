@@ -151,7 +151,7 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
 
 
 def _in_other_equations(orbit: PeriodicOrbit, path: str) -> PeriodicOrbit | None:
-    """An orbit solved for again, where whether its contact is a singularity depends on the parameter that is now varied."""
+    """The orbit solved for again, if the parameter that is now varied decides whether its contact is a singularity."""
     position, velocity = orbit.state
     state = {orbit.system.model.coordinates[0]: position, "velocity": velocity}
     return orbit_near(Problem(orbit.system, Signature((), 1), (path,)), state, orbit.period)

@@ -219,7 +219,7 @@ def _followed(system: System, amplitude: float, duration: float) -> Motion:
 
 
 def _found(system: System, amplitude: float) -> FreeOrbit | FreeOutcome:
-    """The free orbit that begins at rest at the coordinate `amplitude`, or what else becomes of the motion."""
+    """The free orbit that begins at rest at the coordinate `amplitude`, or the reason why the motion is not periodic."""
     duration = SETTINGS.first_duration
     while duration <= SETTINGS.most_duration:
         motion = _followed(system, amplitude, duration)

@@ -171,7 +171,7 @@ Cycle = tuple[ModeChange, ...]
 
 
 def cycle_of(signature: Signature) -> Cycle:
-    """The events of a signature in cyclic order, begun such that two signatures that differ in their first event only agree."""
+    """The events in cyclic order, the same for signatures that differ only in the event with which their lists begin."""
     events = signature.events
     return min((events[i:] + events[:i] for i in range(len(events))), key=repr, default=())
 

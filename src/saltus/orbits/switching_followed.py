@@ -28,7 +28,7 @@ from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
 
 EventSequence = tuple[OrbitEvent, ...]
-TINY = float(np.finfo(float).tiny)  # the least distance beyond a change that is given: the test function is then still negative
+TINY = float(np.finfo(float).tiny)  # replaces a distance of 0 before a change of events, to keep the test function negative there
 
 
 @dataclass(frozen=True)

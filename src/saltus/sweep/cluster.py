@@ -61,7 +61,7 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
                     raise_if_interrupted()
                     time.sleep(CLUSTER.poll)
                 future, result = next(done)
-                if isinstance(result, BaseException):  # the status may be that of a worker lost since, the result is not
+                if isinstance(result, BaseException):  # the status may be out of date if a worker was lost; the result is not
                     raise OSError("the task was given up")
                 yield flying.pop(future.key), Raised(_reason(result)) if future.status == "error" else result
                 del future, result  # so that the cluster forgets them

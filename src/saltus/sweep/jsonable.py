@@ -12,8 +12,8 @@ import numpy as np
 
 from saltus.errors import ParameterError
 
-QUOTED = 60  # characters of a value in a sentence
-DIGEST = re.compile(r"[0-9a-f]{20,}")  # for a digest a message says only that it has changed, not how
+QUOTED = 60  # the most characters of a value that a message shows
+DIGEST = re.compile(r"[0-9a-f]{20,}")  # messages say that a digest has changed, but do not show it
 
 
 def as_json(value: Any, place: str) -> Any:

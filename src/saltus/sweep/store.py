@@ -185,7 +185,7 @@ def remove_store(path: Path | str) -> None:
     >>> saltus.sweep.remove_store("nowhere.zarr")
     """
     path = Path(path)
-    if not os.path.exists(path):  # which a name that is too long is not, either
+    if not os.path.exists(path):  # also False for a name that is too long
         return
     if not ((path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file()):
         raise ParameterError(f"{path} is no store, so it is not removed; name another place", "path")

@@ -22,7 +22,7 @@ from saltus.sweep.chunk_grid import Index
 METADATA = "zarr.json"
 FAILURES = ".failures.json"
 CHECKSUMS = ".checksums.json"  # the digests of the files that are written when the store is made: all but the chunks
-ASKED_ONE_BY_ONE = 100_000  # up to so many chunks of a variable the system is asked for each file
+ASKED_ONE_BY_ONE = 100_000  # sizes and times are read of so many chunks of a variable; the others are only listed
 LOCK_PATIENCE = 1.0  # how long to wait for a lock, s: a process that only checks whether there is one holds it briefly
 
 
@@ -165,7 +165,7 @@ def finish(part: Path, path: Path) -> None:
 
 def sweep_up(path: Path) -> None:
     """Remove the half-written files of killed runs, in the store at `path` and beside it. The caller holds the lock."""
-    for part in list(path.rglob(f".*{PART}")):  # only who has the lock writes here
+    for part in list(path.rglob(f".*{PART}")):  # no other process writes here without the lock
         with contextlib.suppress(OSError):
             shutil.rmtree(part) if part.is_dir() else part.unlink()
     for part in path.parent.glob(f".{path.name}.*{PART}"):

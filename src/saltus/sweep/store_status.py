@@ -175,7 +175,7 @@ def read_plan(path: Path) -> dict[str, Any]:
         At `path` there is nothing, no store, or the store of something else than a sweep; or its metadata are damaged, or are not
         those of its plan.
     """
-    if not os.path.exists(path):  # which a name that is too long is not, either
+    if not os.path.exists(path):  # also False for a name that is too long
         raise ParameterError(f"there is no store at {path}", "path")
     if not path.is_dir():
         raise ParameterError(f"{path} is a file; the store of a sweep is a folder", "path")

@@ -85,7 +85,7 @@ class _Worker:
 
     def take(self, plan: Plan, index: Index) -> None:
         self.index = index
-        with contextlib.suppress(OSError):  # it died: `receive` sees that
+        with contextlib.suppress(OSError):  # the process has died, which `receive` finds out
             self.connection.send((plan.function, plan.arguments, plan.block(index)))
 
     def receive(self) -> Any:
@@ -118,8 +118,8 @@ def _death(code: int) -> str:
 
 def _work(connection: Connection) -> None:
     """The main loop of a process: compute the chunks that it is sent, until the pipe is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the process that writes decides
-    with contextlib.suppress(EOFError, OSError):  # that process has ended
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the one that writes decides when to stop
+    with contextlib.suppress(EOFError, OSError):  # the process that writes has ended
         connection.send(READY)
         while True:
             connection.send(attempt(*connection.recv()))

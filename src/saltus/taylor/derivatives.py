@@ -35,7 +35,7 @@ def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
     known = [path for path, _ in numbers(system)]
     for path in paths:
         if path not in known:
-            system.get(str(path))  # refuses what leads nowhere
+            system.get(str(path))  # refuses a path to a part that does not exist
             below = [name for name in known if name.startswith(f"{path}.")]
             raise ParameterError(f"{path} is not a number, so there is no derivative to it; {near(str(path), below or known)}")
         owner = system.get(path.rpartition(".")[0])

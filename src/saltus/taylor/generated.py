@@ -27,7 +27,7 @@ class Case:
     """The roots that a function of an instant computes if its arguments named in `when` have the given values."""
 
     tape: Tape
-    targets: Sequence[Place | None]  # of the roots; None: a result of the function
+    targets: Sequence[Place | None]  # where each root is stored; None: it is returned by the function
     when: Sequence[tuple[str, int]] = ()
 
 

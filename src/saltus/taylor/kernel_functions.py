@@ -1,7 +1,8 @@
 """The decorators of a kernel's functions, as seen by the files that contain these functions: they compile nothing.
 
 The text of such a file becomes a part of generated kernels (`compiled_part`), whose header imports the decorators with the same
-names from `private_numba.py`; those compile. Imported as it is, the file gives its constants, and its functions as plain Python.
+names from `private_numba.py`, which do compile. Imported directly, the file gives its constants, and its functions in plain
+Python.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ operator_meaning(operator.neg, VectorType, vector_type, _on_vectors(operator.neg
 
 
 def _log2(a: Vec) -> Vec:
-    """log2 to 0.05, for a > 0: a line in every octave, as a number's bits are those of an integer that grows like that."""
+    """log2 to 0.05, for a > 0: linear in every octave, as is the integer that has the same bits as the number."""
     bits = a.builder.bitcast(a.value, LANES.of(LONG))
     return Vec(a.builder, a.builder.sitofp(bits, LANES.of(DOUBLE)), LANES) * 2.0**-52 - (1023.0 - 0.043)
 

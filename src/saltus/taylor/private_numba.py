@@ -1,4 +1,4 @@
-"""The one way in which saltus compiles, and the one file that uses what numba does not promise to keep.
+"""The one way in which saltus compiles, and the one file that uses parts of numba that are not public.
 
 saltus compiles with numba, without Python's exceptions for division and with fused multiply-adds. Tested with numba 0.60.0 and
 0.68.1 (see tests/taylor/test_private_numba.py); pyproject.toml allows these and all versions between.
@@ -91,7 +91,7 @@ def _without_values(args: Any, kws: Any) -> tuple[Any, Any]:
 
 jit = _njit(_nrt=True, **WITHIN)
 lean_jit = _njit(**LEAN)
-inline_jit = _njit(**LEAN, forceinline=True)  # for what every step of the lanes calls
+inline_jit = _njit(**LEAN, forceinline=True)  # for functions that every step of the lanes calls
 
 
 # --- compiled at once, and kept on disk ------------------------------------------------------------------------------------
@@ -114,7 +114,7 @@ def _kept(function: Any) -> Any:
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             """The code for a signature, or None."""
-            RUNTIME.initialize(target_context)  # without which arrays cannot be counted
+            RUNTIME.initialize(target_context)  # numba cannot count references to arrays before this
             with self._guard_against_spurious_io_errors():
                 return self._load_overload(sig, target_context)
 
@@ -138,7 +138,7 @@ def _with_digests() -> Any:
 
         def _load_data(self, name: str) -> Any:
             if undamaged(self._data_path(name)) is None:
-                raise OSError("damaged")  # as if it were not there: it is compiled again
+                raise OSError("damaged")  # numba then compiles it again, as if the file were missing
             return super()._load_data(name)
 
     return CheckedFile

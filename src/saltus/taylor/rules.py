@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from saltus.taylor.sums import Row
     from saltus.taylor.vectors import Coefficient
 
-Rule = Callable[..., None]  # of the writer, the node's own series, which lacks the coefficient of this order, and its operands'
+Rule = Callable[..., None]  # arguments: the writer, the node's own series (still without this order), its operands' series
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,10 @@ class Function:
     numpy: Callable[..., Any]
     slope: Callable[[Any, Any], Any]  # f'(u) of u and y
     increasing: bool = False  # wherever it is defined: its bounds over an interval are then its values at the ends
-    # Whether it may bend sharply within a step by Taylor terms that are below rounding where it is expanded; steps are then
-    # checked.
+    # Whether the function may change steeply within a step although its Taylor terms are below rounding at the step's start;
+    # steps are then checked.
     steep: bool = False
-    recurrence: Rule | None = None  # in place of the one that follows from the slope
+    recurrence: Rule | None = None  # used in place of the recurrence that follows from the slope
 
 
 def by_slope(w: Series, own: Row, u: Row, slope: Row, factor: float, name: str) -> None:

@@ -37,10 +37,10 @@ class Rows:
 
     positions: Sequence[Place]
     velocities: Sequence[Place]
-    roots: Sequence[Place | None]  # None: not kept
+    roots: Sequence[Place | None]  # where the series of each root is stored; None: it is not kept
     capacity: int  # the most coefficients of a series
     any_order: bool
-    numbers: Sequence[Place] = ()  # of further roots that do not change
+    numbers: Sequence[Place] = ()  # where further roots that do not change are stored
 
 
 class Series:
@@ -52,7 +52,7 @@ class Series:
         self.ahead: int | None = None  # of a pair: 0 at order k, 1 at order k + 1; None among the first
         self.positions = [Row(None, True, place=memory.pointer(place)) for place in layout.positions]
         self.velocities = [Row(None, True, place=memory.pointer(place)) for place in layout.velocities]
-        self._nodes: dict[int, Node] = {}  # that the rows are for
+        self._nodes: dict[int, Node] = {}  # the node of each row, by the row's id
         self._scaled: dict[int, Row] = {}
         self._records: dict[int, Any] = {}
         self._inverses: dict[int, Any] = {}
@@ -65,7 +65,7 @@ class Series:
             self.rows.append(self._row(node))
             self._nodes.setdefault(id(self.rows[-1]), node)
         highest = max((row.degree for row in self.rows if row.degree is not None), default=0)
-        self.written_out = 2 * (highest // 2 + 1)  # how many orders are
+        self.written_out = 2 * (highest // 2 + 1)  # the number of orders whose code is written out
         if not memory.arithmetic.exact:
             self._table = constant_table(self.builder, [1.0 / max(k, 1) for k in range(layout.capacity + 2)])
 
@@ -299,7 +299,7 @@ class Series:
         return self.builder.goto_block(self._head) if self.ahead == 0 and row.early else nullcontext()
 
     def _back(self, row: Row, j: int) -> Coefficient:
-        """The coefficient of the order that is j below this one, of a pair."""
+        """A row's coefficient j orders below the present one, while a pair of orders is written."""
         if j == 0:
             return self.now(row)
         if j == self.ahead:

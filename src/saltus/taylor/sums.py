@@ -21,8 +21,8 @@ class SeriesSettings:
 
     # The most products in an inner loop, whose sums and loaded coefficients fit into the registers of AVX-512 and of AVX2.
     most_sums: int = 3
-    # The highest degree of a series whose end is made use of; the orders that are written out for it must be fewer than the
-    # lowest order of an ensemble's series.
+    # The highest degree of a polynomial whose vanishing coefficients are left out of the sums. The orders that are written out
+    # for it must be fewer than the lowest order of an ensemble's series.
     most_ending: int = 7
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from saltus.errors import ParameterError
 from saltus.systems import System
 
-MOST_SYSTEMS, MOST_PROVED = 16, 1 << 18  # systems, and parameter sets of each, whose speeds of capture are remembered
+MOST_SYSTEMS, MOST_PROVED = 16, 1 << 18  # the most systems, and parameter sets of each, whose capture speeds are kept
 
 
 def capture_speeds(

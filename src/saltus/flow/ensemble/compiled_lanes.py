@@ -92,7 +92,7 @@ def _text(several: bool, *modules: ModuleType) -> str:
 def compile_driver_aside(several: bool) -> subprocess.Popen[bytes] | None:
     """A process that compiles the driver while this one compiles the rest; None if the driver is already on disk.
 
-    Further calls get the same process, which has then ended.
+    Further calls return the same process, which may have ended since.
     """
     if is_compiled(module_name("lanes", _driver_text(several))):
         return None

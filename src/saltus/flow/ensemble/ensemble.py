@@ -143,7 +143,7 @@ def run_ensemble(
 
 
 def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> Lanes:
-    """The compiled lanes of a system, with what they are to keep of each trajectory."""
+    """The compiled lanes of a system, with the settings for the samples that they keep of each trajectory."""
     key = run.structure.module.__name__
     if key not in _functions:
         _functions[key] = load_lane_functions(run.trace)

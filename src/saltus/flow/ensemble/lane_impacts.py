@@ -142,7 +142,7 @@ def take_impulses(sizes, at, m, together, accepted, which, speed):
         before = load(m, at[LanePart.NEW_VELOCITY] + row)
         replace(m, at[LanePart.AFTER_POSITION] + row, chosen, load(m, at[LanePart.NEW_POSITION] + row))
         replace(m, at[LanePart.AFTER_VELOCITY] + row, chosen, before + load(m, change + row))
-    for i in range(count):  # all contacts before `free` changes, which says what was closed
+    for i in range(count):  # all contacts before `free` changes: it still says which were closed
         closing, closed = closing_lanes(i, accepted, which), closed_lanes(sizes, at, m, i) & accepted
         stays = (closing | closed) & bits(absolute(load(m, rates + i)) <= 0.0)
         side = select(mask(stays), side + 1.0 * (1 << i), side)

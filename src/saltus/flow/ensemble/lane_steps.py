@@ -37,7 +37,7 @@ from saltus.taylor import (
 
 ZERO_TERM = 1e-300
 LAST_TERMS = 4  # the largest of so many last terms of a series limits the step: two of them may nearly vanish together
-LOG_GAP = 0.35 * math.log2(math.e)  # corresponds to `kernel_layout.GAP`, for four last terms: if these vanish, so do others
+LOG_GAP = 0.35 * math.log2(math.e)  # like `kernel_layout.GAP`, but for the last four terms: if these vanish, so do others
 NEARLY = 1e-5  # of the time, and of the slope: after a shorter move the root is exact to rounding, as its cube is rounding
 
 

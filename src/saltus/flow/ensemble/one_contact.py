@@ -100,7 +100,7 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
         sound &= margins_certain(m, at, sizes, h)
     hit, waits, tau, at_root = 0, 0, h, v
     if sizes[Size.SIDES] > 0:
-        sign = select(mask(bits(rate_on(m, Slot.SIDE) > 0.0)), splat(1.0), splat(-1.0))  # all that a root depends on
+        sign = select(mask(bits(rate_on(m, Slot.SIDE) > 0.0)), splat(1.0), splat(-1.0))  # a root depends on these numbers alone
         end, skip = (x, v, a), flags[Flag.AT_CONTACT]
         patient = bits(share > SMALLEST_SHARE)
         hit, doubtful, waits, tau, at_root = meet(
