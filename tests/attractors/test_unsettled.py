@@ -7,8 +7,9 @@ import pytest
 from shared_systems import forced
 
 from saltus import WallOscillator, simulate_many
-from saltus.attractors import Doubt, Earlier, JudgementSettings, Unsettled, judge_unsettled
-from saltus.flow import Outcome, find_recurrence
+from saltus.attractors import JUDGEMENT, Doubt, Earlier, JudgementSettings, Unsettled, judge_unsettled
+from saltus.attractors.verdict import unsettled
+from saltus.flow import Outcome, Recurrence, find_recurrence
 from saltus.systems import Harmonic, Load, System
 
 FREQUENCY, AMPLITUDE = "load.frequency", "load.horizontal.amplitude"
@@ -117,3 +118,42 @@ def test_an_earlier_judgement_that_was_wrong_is_corrected():
     wrong = Earlier(np.array([0.1]), np.array([0.01]), np.array([2000.0]))
     states = unsettled_states(system, AMPLITUDE, 7.2, starts=24)
     assert judge_unsettled(system, states, {AMPLITUDE: np.array([7.2])}, earlier=wrong).verdict.tolist() == [Unsettled.TRANSIENT]
+
+
+@pytest.fixture
+def processes(monkeypatch):
+    """Motions that settle by chance in place of simulated ones: those with a coordinate of 0 as a Poisson process of the mean
+    life 2000, those with 1, which are on the attractor, never. Returns a list of the forcing periods that were asked for."""
+    rng, asked = np.random.default_rng(8), []
+
+    def settle_by_chance(system, states, periods, **options):
+        n, when = len(states), np.where(states[:, 0] > 0.5, np.inf, rng.exponential(2000.0, len(states)))
+        gone = when < periods
+        asked.append(np.minimum(when, periods).sum())
+        outcome = np.where(gone, Outcome.PERIODIC, Outcome.MOVING).astype(np.int8)
+        return Recurrence(outcome, gone.astype(int), np.minimum(when, periods), states, np.empty((n, 0, 2)))
+
+    monkeypatch.setattr(unsettled, "find_recurrence", settle_by_chance)
+    return asked
+
+
+def verdicts_of(on_attractor, settings=JUDGEMENT, count=200):
+    """The verdicts of questions of which so many of 24 companions are on the attractor, whose exponent is known."""
+    states = np.zeros((count, 24, 2))
+    states[:, :on_attractor, 0] = 1.0
+    known = Earlier(np.full(count, 0.1), np.full(count, 0.01), np.zeros(count))
+    return judge_unsettled(forced(0.2), states, {AMPLITUDE: np.full(count, 0.2)}, settings=settings, earlier=known).verdict
+
+
+def test_a_transient_is_told_without_waiting_for_an_attractor_that_is_not_there(processes):
+    assert (verdicts_of(0) == Unsettled.TRANSIENT).all()
+    early = sum(processes)
+    processes.clear()
+    assert (verdicts_of(0, replace(JUDGEMENT, fewest_rounds=100)) == Unsettled.TRANSIENT).all()
+    assert early < 0.6 * sum(processes)
+
+
+def test_an_attractor_beside_a_transient_is_seen_as_ever_fewer_motions_settle(processes):
+    """Of the companions that are not on it exp(-1/2) are left after each round: after twelve rounds all but a few are on it."""
+    assert (verdicts_of(24) == Unsettled.CHAOTIC).all()
+    assert (verdicts_of(8) == Unsettled.CHAOTIC).mean() > 0.75

@@ -57,7 +57,7 @@ def test_chaos_begins_where_the_stable_orbit_grazes(branches, bands):
 
 
 def test_the_other_end_of_the_chaos_is_a_cascade(branches, bands):
-    upper = max((band.upper for band in bands), key=lambda edge: edge.inner)
+    upper = max(bands, key=lambda band: band.high - band.low).upper
     doublings = [point.parameter for point in turning_points(branches) if point.kind == SpecialKind.PD]
     assert upper.kind is EdgeKind.CASCADE
     assert upper.special in doublings

@@ -80,6 +80,21 @@ def test_the_brackets_of_edges_are_narrow(quasi_periodic_band):
             assert not tried.chaotic[tried.values == edge.outer].any()
 
 
+def test_bands_exclude_long_transients_and_the_more_so_beside_transients():
+    """A mean life L is excluded with 95 % if none of the motions, all together, has settled within 3 L forcing periods."""
+    found = bands(forced(3.0), FREQUENCY, (1.784, 1.82), count=13)
+    tried, beside, longest = found.tried, 0, SETTINGS.judgements[-1].exposure / 3.0
+    for band in found.bands:
+        within = (tried.values >= band.low) & (tried.values <= band.high)
+        assert 3.0 * tried.life[within].sum() >= SETTINGS.judgements[1].exposure
+        for edge in (band.lower, band.upper):
+            inner, outer = np.searchsorted(tried.values, [edge.inner, edge.outer])
+            if tried.verdict[outer] == Unsettled.TRANSIENT:
+                assert tried.life[inner] >= min(SETTINGS.longer * tried.life[outer], longest)
+                beside += tried.life[outer] > 1000.0
+    assert beside  # such transients are longer than those that the first judgement excludes
+
+
 def test_a_quick_effort_halves_brackets_less_far():
     """To a thousandth of the range where "standard" goes on to a tenth of that; the edge is that of the band above."""
     low, high = 0.35, 0.37

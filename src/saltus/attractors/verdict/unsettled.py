@@ -46,13 +46,18 @@ class JudgementSettings:
     companions: int = 24
     first_periods: int = 250  # The first round in forcing periods; most transients end in it, and need no exponents.
     round_periods: int = 1000  # The length of each further round. After a round survivors take the places of what has settled.
-    rounds: int = 6  # The largest number of further rounds.
+    rounds: int = 12  # The largest number of further rounds.
     # Forcing periods, added up over companions, in which none may settle. If none has settled within E, transients of a mean life
     # of E / 3 or less are excluded with a probability of 95 %, as the number that settle within E is Poisson distributed.
     exposure: int = 30_000
     # Number of those that must have settled, where others go on: a life is estimated from three to within a factor of about 3.
     # Where some settle and others stop to do so, these must outlast three of the lives that the former show.
     settled: int = 3
+    # After so many rounds companions are called a transient if the rate at which they settle in the later half of the rounds is
+    # not less than this share of the rate in the earlier half: if some were on an attractor, they would become ever more of them.
+    # Pure transients take five rounds on an average; the rounds that are left are for those beside an attractor.
+    fewest_rounds: int = 4
+    steady: float = 0.9
     # Number of survivors of which the exponent is measured, all of which are samples of one attractor.
     measured: int = 12
     # Forcing periods of the shortest run of these, which is doubled up to the longest one as long as it leaves open what the
@@ -134,7 +139,8 @@ def judge_unsettled(
     largest exponents is above 0 by more than its 95 % error and the resolution 2 ln(t) / t. And within
     a number of forcing periods, added up over companions, none settles: settling from chaotic transients is a Poisson process,
     whose rate is estimated or bounded by that. If some settle, their places are taken by survivors, so that an attractor beside a
-    transient becomes an ever larger share of the companions, and shows itself by three mean lives in which none settles.
+    transient becomes an ever larger share of the companions, and shows itself by three mean lives in which none settles. If the
+    rate at which companions settle does not fall there is no such attractor.
 
     Parameters
     ----------
@@ -159,7 +165,7 @@ def judge_unsettled(
     else:
         run.take(earlier)
     for i in range(settings.rounds):
-        open_chaos = run.positive & ~run.lasts & run.may_last(settings.rounds - i)
+        open_chaos = run.positive & ~run.lasts & ~run.steady & run.may_last(settings.rounds - i)
         run.open &= open_chaos | (~run.positive & ~run.negative & (run.gone > 0))
         run.follow(settings.round_periods, part_of(progress, 0.3 + 0.7 * i / settings.rounds, 1.0, "judging"))
     run.look_for_long_periods(~run.all_gone)
@@ -184,6 +190,8 @@ class _Judgement:
     gone: np.ndarray  # (n,): number of companions that have settled, or have ended
     ended: np.ndarray  # (n,): number of those that a limit of the model has ended
     exposure: np.ndarray  # (n,): forcing periods of companions in all
+    rounds: np.ndarray  # (n,): how often they were followed
+    history: np.ndarray  # (2, rounds, n): how many of them settled in each round, and its forcing periods
     before: np.ndarray  # (n,): those of the rounds up to the last one in which any settled
     all_gone: np.ndarray  # (n,): whether no companion is left
     looked: np.ndarray  # (n,): whether a long period was looked for
@@ -200,13 +208,14 @@ class _Judgement:
             chosen[row] = _companions(system, given[np.isfinite(given).all(axis=-1)], settings)
         columns = {path: np.broadcast_to(np.asarray(values, dtype=float), n) for path, values in parameters.items()}
         flags = (np.zeros(n, dtype=bool) for _ in range(4))
-        zeros = (np.zeros(n, dtype=int) for _ in range(5))
+        zeros = (np.zeros(n, dtype=int) for _ in range(6))
         positive, negative, all_gone, looked = flags
-        period, gone, ended, exposure, before = zeros
+        period, gone, ended, exposure, rounds, before = zeros
+        history = np.zeros((2, settings.rounds + 1, n))
         empty = np.full((2, n), np.nan)
         return cls(
             system, columns, settings, chosen, np.ones(n, dtype=bool), positive, negative, empty[0], empty[1],
-            period, gone, ended, exposure, before, all_gone, looked, SettledLater.none(system.dimension),
+            period, gone, ended, exposure, rounds, history, before, all_gone, looked, SettledLater.none(system.dimension),
         )  # fmt: skip
 
     def take(self, earlier: Earlier) -> None:
@@ -237,8 +246,10 @@ class _Judgement:
         shape = (rows.size, self.settings.companions)
         moving, last = (ends.outcome == Outcome.MOVING).reshape(shape), ends.last.reshape(*shape, -1)
         self._keep_settled(rows, ends)
-        left = (~moving).sum(axis=1)
-        self.exposure[rows] += np.ceil(ends.periods).astype(int).reshape(shape).sum(axis=1)
+        left, followed = (~moving).sum(axis=1), np.ceil(ends.periods).astype(int).reshape(shape).sum(axis=1)
+        self.history[:, self.rounds[rows], rows] = left, followed
+        self.rounds[rows] += 1
+        self.exposure[rows] += followed
         self.gone[rows] += left
         self.ended[rows] += ends.ended.reshape(shape).sum(axis=1)
         self.before[rows] = np.where(left > 0, self.exposure[rows], self.before[rows])
@@ -258,6 +269,14 @@ class _Judgement:
         """In how many more forcing periods of companions none may settle, so that a transient is excluded, (n,)."""
         life = self.before / np.maximum(self.gone, 1)
         return np.asarray(np.maximum(self.settings.exposure, 3.0 * life) - (self.exposure - self.before))
+
+    @property
+    def steady(self) -> np.ndarray:
+        """Where companions settle at a rate that does not fall, so that none of them is on an attractor, (n,)."""
+        later = np.arange(self.history.shape[1])[:, None] >= self.rounds - self.rounds // 2
+        (left, followed), (left_late, followed_late) = self.history.sum(axis=1), np.where(later, self.history, 0.0).sum(axis=1)
+        does_not_fall = left_late * (followed - followed_late) >= self.settings.steady * (left - left_late) * followed_late
+        return np.asarray(does_not_fall & (left >= self.settings.settled) & (self.rounds >= self.settings.fewest_rounds))
 
     def may_last(self, rounds: int) -> np.ndarray:
         """Where so many more rounds can exclude a transient, or are needed to call it one, (n,)."""

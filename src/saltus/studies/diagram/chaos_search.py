@@ -137,12 +137,12 @@ class BandSearch:
                 fresh.append(origin)
                 insort(self.special, origin, key=lambda other: other.value)
         self.take(begun)
-        self.spread()
+        self.refine()
+        progress(0.4, "looking for chaos")
         self.beside_special_points(fresh)
-        progress(0.2, "looking for chaos")
         self.refine()
         progress(0.6, "looking for chaos")
-        self.locate_edges()
+        self.confirm()
         progress(1.0, "looking for chaos")
         further = self.further[known + 1 :]
         return further[0].joined(*further[1:]) if further else begun.only(slice(0))
@@ -210,75 +210,120 @@ class BandSearch:
             facts = int(motions.period[i]), impacts, float(motions.amplitude[i])
             self.place(float(motions.value[i])).settle(*facts, motions.last[i])
 
-    def spread(self) -> None:
-        """Carry what goes on to neighbouring values, and chaos to the ends of the range where no value lies beyond: motions begun
-        on it, as long as they find more."""
-        while True:
-            for bound, outermost in zip(self.bounds, (self.places[:1], self.places[-1:]), strict=True):
-                if any(place.chaotic for place in outermost):
-                    self.place(bound)
-            marked = [(place, place.goes_on) for place in self.places]
-            pairs = [(a, b) if on else (b, a) for (a, on), (b, other) in pairwise(marked) if on != other]
-            fresh = [(a, b) for a, b in pairs if (a.value, b.value) not in self.carried]
-            if not fresh:
-                return
-            self.carried.update((a.value, b.value) for a, b in fresh)
-            self.follow([b.value for _, b in fresh], [a.starts(self.settings.seeds, 0) for a, _ in fresh])
-
     def beside_special_points(self, special: Sequence[BandOrigin]) -> None:
-        """Begin motions on the orbits of special points at values beside these."""
+        """Begin motions on the orbits of special points at values beside these, except within chaos that is known."""
         chosen: list[BandOrigin] = []
         for origin in sorted(special, key=lambda origin: origin.value):
             if not chosen or origin.value - chosen[-1].value >= self.settings.spacing * self.span:
                 chosen.append(origin)
-        values = [(origin.value + share * self.span, origin.state) for origin in chosen for share in self.settings.beside]
+        outside = [origin for origin in chosen if not self._is_within_chaos(origin.value)]
+        values = [(origin.value + share * self.span, origin.state) for origin in outside for share in self.settings.beside]
         inside = [(value, state) for value, state in values if self.bounds[0] <= value <= self.bounds[1]]
         self.follow([value for value, _ in inside], [np.array([state]) for _, state in inside])
 
+    def _is_within_chaos(self, value: float) -> bool:
+        """Whether both values next to this one that were tried have chaos."""
+        at = bisect_left(self.places, SearchedValue(value))
+        return 0 < at < len(self.places) and all(place.chaotic for place in self.places[at - 1 : at + 1])
+
     def refine(self) -> None:
-        """Halve intervals in which something changes, or in which there is chaos, as long as they are wide."""
-        while pairs := [(a, b) for a, b in pairwise(self.places) if self._is_of_interest(a, b)]:
-            self._begin_between(pairs)
-            self.spread()
+        """Halve intervals and carry chaos to neighbouring values, until neither shows anything new.
+
+        All intervals and neighbours of a round are simulated together, as a few motions take nearly as long as many.
+        """
+        while True:
+            middles = [(a, b) for a, b in pairwise(self.places) if self._is_of_interest(a, b)]
+            carried = self._to_carry()
+            if not middles and not carried:
+                return
+            begun = {0: [(b.value, a.starts(self.settings.seeds, 0)) for a, b in carried]}
+            for a, b in middles:
+                begun.setdefault(self._care_between(a, b), []).append(self._begin_between(a, b))
+            for care, pairs in begun.items():
+                self.follow([value for value, _ in pairs], [states for _, states in pairs], care)
+
+    def _to_carry(self) -> list[tuple[SearchedValue, SearchedValue]]:
+        """Pairs of neighbouring values: motions that go on at the first one are to be continued at the second one.
+
+        Where the outermost value has chaos, the end of the range becomes a value, too.
+        """
+        for bound, outermost in zip(self.bounds, (self.places[:1], self.places[-1:]), strict=True):
+            if any(place.chaotic for place in outermost):
+                self.place(bound)
+        marked = [(place, place.goes_on) for place in self.places]
+        pairs = [(a, b) if on else (b, a) for (a, on), (b, other) in pairwise(marked) if on != other]
+        fresh = [(a, b) for a, b in pairs if (a.value, b.value) not in self.carried]
+        self.carried.update((a.value, b.value) for a, b in fresh)
+        return fresh
 
     def _is_of_interest(self, a: SearchedValue, b: SearchedValue) -> bool:
         """Whether chaos may begin, end or pause between two neighbouring values, and they are not near to one another yet."""
         width = (b.value - a.value) / self.span
         if a.verdict is b.verdict is Unsettled.UNDECIDED:
             width /= self.settings.undecided
+        if a.chaotic != b.chaotic:
+            return width > self.settings.edge
         if width <= self.settings.step:
-            near_chaos = not (a.chaotic and b.chaotic) and max(a.longest, b.longest) > self.settings.long_period
+            near_chaos = not a.chaotic and max(a.longest, b.longest) > self.settings.long_period
             return near_chaos and width > self.settings.fine_step
         inside = bisect_left(self.special, a.value, key=lambda origin: origin.value)
         special = inside < len(self.special) and self.special[inside].value <= b.value
         return special or a.kinds != b.kinds or bool(len(a.chaos) + len(b.chaos))
 
-    def _begin_between(self, pairs: Sequence[tuple[SearchedValue, SearchedValue]], care: int = 0) -> None:
-        """Motions at the middles of intervals, begun on those at both ends."""
-        middles = [0.5 * (a.value + b.value) for a, b in pairs]
-        few = (self.settings.seeds, self.settings.neighbours)
-        begun = [[some for some in (a.starts(*few), b.starts(*few)) if len(some)] for a, b in pairs]
-        self.follow(middles, [np.concatenate(some) if some else np.empty((0, 0)) for some in begun], care)
-        for (a, b), middle in zip(pairs, middles, strict=True):
-            self.place(middle)  # also where there is nothing to begin with: all that moves at both ends comes to rest
-            self.carried.update(((a.value, middle), (b.value, middle)))
+    def _begin_between(self, a: SearchedValue, b: SearchedValue) -> tuple[float, np.ndarray]:
+        """The middle of an interval, and the states from which motions begin there: those of the motions at both ends.
 
-    def locate_edges(self) -> None:
-        """Halve the brackets of all edges and judge their chaotic sides with care; where these are none, those near them, too."""
+        If all motions at both ends come to rest there are no such states; the middle then counts as tried all the same.
+        """
+        few, middle = (self.settings.seeds, self.settings.neighbours), 0.5 * (a.value + b.value)
+        some = [states for states in (a.starts(*few), b.starts(*few)) if len(states)]
+        self.place(middle)
+        self.carried.update(((a.value, middle), (b.value, middle)))
+        return middle, np.concatenate(some) if some else np.empty((0, 0))
+
+    def _care_between(self, a: SearchedValue, b: SearchedValue) -> int:
+        """The care with which chaos between two values is judged: where it has an edge, that which the edge asks for."""
+        return self._care_against(b if a.chaotic else a) if a.chaotic != b.chaotic else 0
+
+    def _care_against(self, other: SearchedValue) -> int:
+        """The care with which chaos next to a value without chaos is judged.
+
+        If the motions there are transients, it is the least care that excludes transients which live `longer` by that factor.
+        """
+        life = self.settings.longer * other.life if other.verdict is Unsettled.TRANSIENT else 0.0
+        judgements = self.settings.judgements
+        return next((care for care, one in enumerate(judgements) if one.exposure >= 3.0 * life), len(judgements) - 1)
+
+    def confirm(self) -> None:
+        """Judge the chaos that is doubtful with more care; where it turns out to be a transient, find the new edges."""
         for _ in range(self.settings.confirmations):
-            self._halve()
-            runs = [(run, self._some_of(run)) for run in self._runs()]
-            failed = self._confirm((place for run, some in runs for place in some + self._beside_windows(run)), 1)
-            leaving = [a for a, b in self._edges() if self.settings.lasting <= b.life < np.inf]
-            leaving += [place for _, some in runs for place in _beside_settled(some)]
-            leaving += [place for place in self.places if place.settled and place.care == 1]
-            failed += self._confirm(leaving, 2)
+            failed = [place for care, places in self._doubtful().items() for place in self._confirm(places, care)]
             if not failed:
                 return
             self._confirm_near(failed)
+            self.refine()
+
+    def _doubtful(self) -> dict[int, list[SearchedValue]]:
+        """The values whose chaos is doubtful, by the care with which it is to be judged.
+
+        Settling is a Poisson process, so the forcing periods in which nothing has settled add up over neighbouring values. In
+        each stretch of a band they are to be as many as the second judgement asks for; if they are fewer, its middle is judged
+        anew. So it is for the narrow parts of a band in which some motions settle, which may be windows with long transients.
+        The values at edges are judged as `_care_against` says, and those at which some companions have settled with more care.
+        """
+        runs, doubtful = self._runs(), dict[int, list[SearchedValue]]()
+        enough = self.settings.judgements[min(1, len(self.settings.judgements) - 1)].exposure
+        for part in [part for run in runs for part in (*self._stretches(run), *self._beside_windows(run))]:
+            if sum(place.quiet for place in part) < enough:
+                doubtful.setdefault(1, []).append(part[len(part) // 2])
+        for a, b in self._edges():
+            doubtful.setdefault(self._care_against(b), []).append(a)
+        for place in (place for run in runs for place in run if place.settled):
+            doubtful.setdefault(place.care + 1, []).append(place)
+        return doubtful
 
     def _confirm_near(self, failed: list[SearchedValue]) -> None:
-        """Judge chaos on each side of values that turned out to have none as these were judged, and beside those that fail."""
+        """Judge the nearest chaos beside values that turned out to have none, and go on where that fails as well."""
         for care in {place.care for place in failed}:
             beside, reach = [place.value for place in failed if place.care == care], self.settings.near
             while beside:
@@ -291,12 +336,6 @@ class BandSearch:
         """Neighbours of which the first is chaotic and the second is not."""
         pairs = [pair for a, b in pairwise(self.places) for pair in ((a, b), (b, a))]
         return [(a, b) for a, b in pairs if a.chaotic and not b.chaotic]
-
-    def _halve(self) -> None:
-        """Halve the brackets of all edges: with care where it took care to see that there is no chaos beyond."""
-        while wide := [(a, b) for a, b in self._edges() if abs(b.value - a.value) > self.settings.edge * self.span]:
-            for care in {b.care for _, b in wide}:
-                self._begin_between([pair for pair in wide if pair[1].care == care], care)
 
     def _confirm(self, places: Iterable[SearchedValue], care: int) -> list[SearchedValue]:
         """Judge chaos with more care where that has not been done; returns where there is none after all."""
@@ -318,19 +357,18 @@ class BandSearch:
                 runs.append([])
         return [run for run in runs if run]
 
-    def _some_of(self, run: list[SearchedValue]) -> list[SearchedValue]:
-        """The ends of a band, and values evenly between them."""
-        count = 2 + int((run[-1].value - run[0].value) / (self.settings.every * self.span))
-        return [run[i] for i in np.unique(np.linspace(0, len(run) - 1, count).astype(int))]
+    def _stretches(self, run: list[SearchedValue]) -> list[list[SearchedValue]]:
+        """The parts of a band that are judged as one, of equal numbers of values."""
+        count = 1 + int((run[-1].value - run[0].value) / (self.settings.every * self.span))
+        return [part.tolist() for part in np.array_split(np.array(run, dtype=object), min(count, len(run)))]
 
-    def _beside_windows(self, run: list[SearchedValue]) -> list[SearchedValue]:
-        """Ends and middles of narrow parts of a band in which motions of one kind settle beside chaos: they may be windows."""
+    def _beside_windows(self, run: list[SearchedValue]) -> list[list[SearchedValue]]:
+        """The narrow parts of a band in which some motions settle, each on orbits of one period with one number of impacts."""
         extents: dict[tuple[int, int], list[SearchedValue]] = {}
         for place in run:
             for kind in place.kinds:
                 extents.setdefault(kind, []).append(place)
-        narrow = [some for some in extents.values() if some[-1].value - some[0].value <= self.settings.every * self.span]
-        return [place for some in narrow for place in (some[0], some[len(some) // 2], some[-1])]
+        return [some for some in extents.values() if some[-1].value - some[0].value <= self.settings.every * self.span]
 
     def tried(self) -> Tried:
         """What became of motions at all values."""
@@ -347,12 +385,6 @@ class BandSearch:
             period=np.array([place.longest for place in self.places]),
             states=states,
         )
-
-
-def _beside_settled(some: list[SearchedValue]) -> list[SearchedValue]:
-    """Those next to chaos in which companions settled: it may be a long transient, and so may they."""
-    settled = [i for i, place in enumerate(some) if place.chaotic and place.settled]
-    return [some[i] for i in sorted({j for i in settled for j in (i - 1, i, i + 1) if 0 <= j < len(some)})]
 
 
 def _some(settled: SettledLater, most: int) -> SettledLater:

@@ -27,20 +27,23 @@ class ChaosSettings:
     beside: tuple[float, ...] = (-4e-4, -1.5e-4, 1.5e-4, 4e-4)
     spacing: float = 0.0  # Share of the range: of special points that are nearer to one another only the first one is taken.
     same: float = 1e-7  # Special points are one that differ by less than this in their states and, as a share, in the parameter.
-    # Judgements of rising care. The first one is made at all values, and excludes lives below 660 forcing periods; the second one
-    # at edges and at some values between them (6600). The third one is made at those of them beside which companions settled,
-    # and at edges beside which transients are long (33 000). With the time in which none has settled before, one round is enough
-    # for the second one and three are for the third one, where none settles.
+    # Judgements of rising care, which exclude transients of mean lives below 660, 6600 and 33 000 forcing periods. The first one
+    # is made at all values, the others where `BandSearch.confirm` finds the chaos doubtful. With the time in which none has
+    # settled before, one round is enough for the second one and three are for the third one, where none settles.
     judgements: tuple[JudgementSettings, ...] = (
         replace(JUDGEMENT, companions=8, exposure=2000, round_periods=500, rounds=2),
         replace(JUDGEMENT, companions=16, exposure=20_000, round_periods=1125),
-        replace(JUDGEMENT, exposure=100_000, round_periods=1125, rounds=8),
+        replace(JUDGEMENT, exposure=100_000, round_periods=1125),
     )
-    every: float = 0.02  # Share of the range in which each band has a value that is judged with care.
-    # Number of values with chaos on each side of one that fails a careful judgement that are judged so then, and twice as many on
-    # each side of those that fail, and so on.
-    near: int = 3
-    lasting: float = 1000.0  # Mean life, in forcing periods, from which transients beyond an edge are long.
+    # Share of the range: the values of a band that lie so near to one another are judged together, by the sum of the forcing
+    # periods in which none of their motions has settled.
+    every: float = 0.02
+    # Number of values with chaos, on each side of one that turns out to have none, that are judged next with as much care; where
+    # these fail too it is twice as many, and so on.
+    near: int = 1
+    # Chaos beside transients is to exclude mean lives so many times as long as theirs. Towards a crisis lives grow like a power
+    # between -1/2 and about -3/2 of the distance: the edge is then off by no more than the width of its bracket.
+    longer: float = 3.0
     confirmations: int = 20  # The largest number of rounds in which edges are located and confirmed.
 
 
